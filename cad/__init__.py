@@ -1,0 +1,1 @@
+"""How the scanner is made: parts, bought parts, assembly, export, URDF. Millimetres live here only."""

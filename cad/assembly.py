@@ -1,0 +1,95 @@
+"""The whole scanner in the rotation frame at gamma = 0: made parts, bought parts, names and colours. Millimetres.
+
+Every part is placed by an explicit location; the lidar by the angle set's own `T_rot_laser`, the one that the
+point cloud goes through.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cadquery as cq
+
+from cad import bought, solids
+from cad.deck import Deck, deck_of
+from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
+from cad.parts.base_mount import base_mount, mount_of
+from cad.parts.servo_shaft import servo_shaft, shaft_of
+from cad.parts.slip_ring_adapter import adapter_of, slip_ring_adapter
+from cad.sizing import Stack, stack_of
+from design.scanner import Scanner
+
+PRINTED, TURNED = (0.93, 0.45, 0.10), (0.75, 0.76, 0.78)
+BOUGHT = {"servo": (0.16, 0.16, 0.19), "ring": (0.72, 0.58, 0.20), "lidar": (0.20, 0.23, 0.27)}
+WINDOW = (0.35, 0.05, 0.08)
+
+
+TURNING = ("servo_shaft", "alignment_linkage")
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """Solids by name: `made` are the parts of this project. Rotation frame, mm."""
+
+    stack: Stack
+    deck: Deck
+    linkage: AlignmentLinkage
+    made: dict[str, cq.Solid]
+    bought: dict[str, cq.Solid]
+
+    def standing_parts(self) -> list[str]:
+        """Names of the made parts that stand still."""
+        return [name for name in self.made if name not in TURNING]
+
+    def turning_parts(self) -> list[str]:
+        """Names of the made parts that turn with the horn."""
+        return [name for name in self.made if name in TURNING]
+
+
+def make_parts(scanner: Scanner) -> Assembly:
+    """Make every part that this scanner needs, and the bought ones around them.
+
+    Raises:
+        BuildError: a part cannot be made; the message names part, feature, parameter and value.
+    """
+    stack = stack_of(scanner)
+    deck = deck_of(scanner, stack)
+    shaft, linkage = shaft_of(scanner, stack), linkage_of(scanner, stack)
+    made = {"servo_shaft": servo_shaft(shaft)}
+    if scanner.slip_ring is not None:
+        made["slip_ring_adapter"] = slip_ring_adapter(adapter_of(scanner, stack))
+    made["alignment_linkage"] = alignment_linkage(linkage)
+    if not deck.flat:
+        made["base_mount"] = base_mount(mount_of(scanner, stack, deck))
+    others = {
+        "servo_case": bought.servo_case(scanner.servo, stack),
+        "servo_horn": bought.servo_horn(scanner.servo, stack, shaft),
+    }
+    if scanner.slip_ring is not None:
+        others |= bought.ring_solids(stack)
+    T = scanner.angles.T_rot_laser()
+    optical = solids.location(stack.R(), T[:3, 3] * 1000)
+    base = optical * cq.Location(cq.Vector(0, 0, -scanner.lidar.optical_height_mm))
+    others |= {name: solid.moved(base) for name, solid in bought.lidar_solids(scanner.lidar).items()}
+    return Assembly(stack, deck, linkage, made, others)
+
+
+def as_tree(assembly: Assembly) -> cq.Assembly:
+    """All parts under one named root, each with its name and colour."""
+    tree = cq.Assembly(name="scanwright")
+    for name, solid in (assembly.made | assembly.bought).items():
+        tree.add(solid, name=name, color=cq.Color(*_colour(name)))
+    return tree
+
+
+def alone(name: str, solid: cq.Solid) -> cq.Assembly:
+    """One part under a named root: a STEP file without a root names its product by a process-wide counter."""
+    return cq.Assembly(name="scanwright").add(solid, name=name, color=cq.Color(*_colour(name)))
+
+
+def _colour(name: str) -> tuple[float, float, float]:
+    if name == "lidar_window":
+        return WINDOW
+    if name == "servo_shaft":
+        return TURNED
+    return BOUGHT.get(name.split("_")[0], PRINTED)

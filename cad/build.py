@@ -1,0 +1,160 @@
+"""Make all parts of one scanner and write them: `parts/*.step`, `parts/*.stl`, `assembly.step`, `scanner.urdf`.
+
+Importing this module is cheap; the kernel is imported when something is built.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cad.deck import deck_of
+from cad.findings import Finding, LeftOut
+from cad.kernel import require_kernel
+from cad.remarks import findings_of, left_out_of
+from cad.sizing import stack_of
+from design.errors import BuildError
+from design.scanner import Scanner
+
+if TYPE_CHECKING:
+    from cad.assembly import Assembly
+    from cad.mass import Inertial
+    from cad.mesh import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class PartReport:
+    """One made part: volume and mass of the solid material, box in the rotation frame."""
+
+    name: str
+    volume_mm3: float
+    mass_g: float
+    box_mm: tuple[tuple[float, float, float], tuple[float, float, float]]
+    triangles: int
+
+
+@dataclass(frozen=True, slots=True)
+class PartsResult:
+    """What `build_parts` made. `files` are relative to the build folder."""
+
+    t_world_rot_mm: tuple[float, float, float]
+    parts: tuple[PartReport, ...]
+    findings: tuple[Finding, ...]
+    left_out: tuple[LeftOut, ...]
+    files: tuple[str, ...]
+
+
+def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None]) -> PartsResult:
+    """Make every part and write it into a build folder.
+
+    Args:
+        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `deck.mount_offset_mm`, or zero.
+        folder: the build folder; `parts/` is made in it.
+        progress: called with a line of text before each step.
+
+    Raises:
+        BuildError: a part cannot be made, or the angle set names another place of the optical centre.
+    """
+    stack = stack_of(scanner)  # refuse what cannot be built before seconds go into the kernel
+    deck = deck_of(scanner, stack)
+    _check_offset(scanner, deck.t_world_rot)
+    progress("loading the CAD kernel")
+    require_kernel()
+    from cad.assembly import alone, as_tree, make_parts
+    from cad.export import step_text
+    from cad.mesh import checked_mesh, stl_bytes
+    from cad.urdf import urdf_text
+
+    progress("making the parts")
+    assembly = make_parts(scanner)
+    digest = config_hash(scanner)
+    files: dict[str, bytes] = {}
+    reports = []
+    for name, solid in assembly.made.items():
+        progress(f"meshing and writing {name}")
+        mesh = checked_mesh(solid, name)
+        files[f"parts/{name}.step"] = step_text(alone(name, solid), f"{name} config={digest}").encode("ascii")
+        files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
+        reports.append(_report(name, solid.Volume(), _density(name, scanner, assembly), mesh))
+    progress("writing assembly.step and scanner.urdf")
+    files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
+    bodies = link_bodies(scanner, assembly)
+    meshes = {"servo": assembly.standing_parts(), "rot": assembly.turning_parts()}
+    files["scanner.urdf"] = urdf_text(scanner, stack, bodies, meshes).encode("utf-8")
+    for file, content in files.items():
+        path = folder / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return PartsResult(
+        t_world_rot_mm=deck.t_world_rot,
+        parts=tuple(reports),
+        findings=findings_of(scanner, assembly, bodies),
+        left_out=left_out_of(scanner, deck),
+        files=tuple(sorted(files)),
+    )
+
+
+def config_hash(scanner: Scanner) -> str:
+    """Twelve hex digits of everything that shapes the parts: angles and products, not J or the task's name."""
+    angles = scanner.angles
+    content = {
+        "angles": angles.angles_deg.model_dump(),
+        "delta": angles.delta_rotvec_rot_deg,
+        "products": [
+            None if product is None else product.model_dump()
+            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, scanner.printer)
+        ],
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]
+
+
+def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
+    """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
+
+    Of bought parts only mass and size are known: homogeneous boxes; half the ring's mass turns.
+    """
+    from cad import mass
+
+    stack, servo, lidar, ring = assembly.stack, scanner.servo, scanner.lidar, scanner.slip_ring
+    own = {name: mass.of_solid(s, _density(name, scanner, assembly)) for name, s in assembly.made.items()}
+    case = ((*servo.case_min_mm[:2], servo.case_min_mm[2] + stack.horn), (*servo.case_max_mm[:2], stack.horn))
+    standing = [own[name] for name in assembly.standing_parts()]
+    standing.append(mass.of_box(servo.mass_g, *case))
+    turning = [own[name] for name in assembly.turning_parts()]
+    if ring is not None:
+        r = stack.ring_radius
+        half = mass.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top))
+        standing.append(half)
+        turning.append(half)
+    x, y, z = lidar.body_mm
+    base = -lidar.optical_height_mm
+    laser = mass.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
+    return {"servo": mass.together(standing), "rot": mass.together(turning), "laser": laser}
+
+
+def _density(name: str, scanner: Scanner, assembly: Assembly) -> float:
+    from cad.mass import ALUMINIUM_G_CM3
+    from cad.remarks import shaft_is_turned
+
+    if name == "servo_shaft" and shaft_is_turned(assembly.stack):
+        return ALUMINIUM_G_CM3
+    return scanner.printer.density_g_cm3
+
+
+def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
+    return PartReport(name, round(volume, 3), round(volume * density / 1000, 3), box, len(mesh.faces))
+
+
+def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:
+    given = scanner.angles.t_world_rot_mm
+    if any(given) and max(abs(a - b) for a, b in zip(given, offset, strict=True)) > 1e-3:
+        raise BuildError(
+            f"base_mount: t_world_rot_mm = {list(given)}: the mount of these angles puts the optical centre at "
+            f"{list(offset)}; build the angle set again, or set it to 0"
+        )

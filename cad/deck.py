@@ -1,0 +1,145 @@
+"""Where the deck lies that the scanner stands on or hangs from. No kernel: plain numpy.
+
+World frame: origin on the face of the deck, in the centre of the mount's four deck holes; z up. The deck is below the
+scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). Everything
+here is expressed in the rotation frame at gamma = 0, mm, unless its name says world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.screws import SCREWS
+from cad.sizing import Stack, rotor_radius, stack_of
+from design.frames import Array
+from design.scanner import Scanner
+
+FOOT_THICKNESS = 6.0
+PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
+BACK_THICKNESS = 8.0
+BACK_MARGIN = 5.0  # of the back plate around the rear holes
+DECK_SCREW = SCREWS["M4"]
+DECK_HOLES = ((40.0, 40.0), (-40.0, 40.0), (-40.0, -40.0), (40.0, -40.0))  # about the world origin
+FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
+FREE = 5.0  # above the foot, for everything that is not the mount
+SWEEP_MARGIN = 3.0  # around the turning lidar
+
+
+@dataclass(frozen=True, slots=True)
+class Deck:
+    """The deck in the rotation frame: `T_world_rot` at gamma = 0 is [R_world_rot | t_world_rot]."""
+
+    normal: tuple[float, float, float]  # from the deck into the room
+    along: tuple[float, float, float]  # world x
+    centre: tuple[float, float, float]  # world origin
+    hangs: bool
+    flat: bool  # the axis points up from a flat deck: no mount is needed
+    t_world_rot: tuple[float, float, float]
+    back_centre: tuple[float, float, float]  # middle of the back plate's front face
+    back_half: tuple[float, float]  # x, y
+    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold the case
+
+    def rotation(self) -> Array:
+        """Axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
+        along, normal = np.array(self.along), np.array(self.normal)
+        return np.stack([along, np.cross(normal, along), normal], axis=1)
+
+
+def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
+    """`t_world_rot_mm`: the optical centre in the world, whose origin is the centre of the deck holes.
+
+    Raises:
+        BuildError: the scanner cannot be built, as for `stack_of`.
+    """
+    return deck_of(scanner, stack_of(scanner)).t_world_rot
+
+
+def deck_of(scanner: Scanner, stack: Stack) -> Deck:
+    """Lay the deck so that rotor, ring, case and mount stay clear of it, rounded up to whole millimetres."""
+    servo = scanner.servo
+    R = scanner.angles.T_world_rot(0.0)[:3, :3]
+    R = np.where(np.abs(R) < 1e-12, 0.0, R)
+    hangs = bool(R[2, 2] < -1e-6)
+    normal = -R[2] if hangs else R[2]
+    along = R[0]
+    holes = _corner_holes(servo.case_rear_holes_mm)
+    xs, ys = [x for x, _ in holes], [y for _, y in holes]
+    half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
+    rear = stack.horn + servo.case_min_mm[2]
+    back = np.array([0.0, (max(ys) + min(ys)) / 2, rear - PLUG_GAP])
+    flat = bool(R[2, 2] > 1.0 - 1e-9)
+    if flat:
+        centre = np.array([0.0, 0.0, rear])
+    else:
+        height = _height_of_back(scanner, stack, normal, back, half)
+        centre = back - height * normal + _foot_shift(scanner, holes, back, normal, R[0], height)
+    offset = -R @ centre
+    offset[np.abs(offset) < 1e-9] = 0.0
+    return Deck(
+        normal=_triple(normal),
+        along=_triple(along),
+        centre=_triple(centre),
+        hangs=hangs,
+        flat=flat,
+        t_world_rot=_triple(np.round(offset, 6)),
+        back_centre=_triple(back),
+        back_half=half,
+        rear_holes=holes,
+    )
+
+
+def _height_of_back(scanner: Scanner, stack: Stack, normal: Array, back: Array, half: tuple[float, float]) -> float:
+    """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
+    servo = scanner.servo
+    low, high = servo.case_min_mm, servo.case_max_mm
+    case = [(x, y, stack.horn + z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    plate = [
+        (sx * half[0], back[1] + sy * half[1], back[2] - depth)
+        for sx in (1, -1)
+        for sy in (1, -1)
+        for depth in (0.0, BACK_THICKNESS)
+    ]
+    below = [float(-(np.array(point) @ normal)) for point in (*case, *plate)]
+    sideways = float(np.hypot(normal[0], normal[1]))
+    around = max(stack.ring_radius + 8.0, stack.hub_radius)  # the adapter's arms stand around the ring
+    below += [around * sideways - z * float(normal[2]) for z in (stack.horn, stack.ring_top)]
+    below.append(rotor_radius(scanner.lidar) + SWEEP_MARGIN)
+    return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
+
+
+def _foot_shift(
+    scanner: Scanner, holes: tuple[tuple[float, float], ...], back: Array, normal: Array, along: Array, height: float
+) -> Array:
+    """Least shift of the foot in the deck's plane that keeps the drivers of the case screws off the deck screws.
+
+    The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
+    """
+    room = SCREWS[scanner.servo.case_screw].head_room + DECK_SCREW.head_room
+    left = np.cross(normal, along)
+    shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
+    depths = np.linspace(0.0, FOOT_THICKNESS + DECK_SCREW.head_height, 11)
+
+    def clearance(shift: tuple[float, float]) -> float:
+        centre = back - height * normal + shift[0] * along + shift[1] * left
+        screws = [centre + u * along + v * left + depth * normal for u, v in DECK_HOLES for depth in depths]
+        return min(
+            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
+            for point in screws
+            for x, y in holes
+        )
+
+    a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
+    return a * along + b * left
+
+
+def _corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """The four holes of the widest column pair that lie furthest apart along y."""
+    widest = max(x for x, _ in holes)
+    ys = sorted(y for x, y in holes if x == widest)
+    return ((widest, ys[-1]), (-widest, ys[-1]), (-widest, ys[0]), (widest, ys[0]))
+
+
+def _triple(v: Array) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])

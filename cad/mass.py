@@ -1,0 +1,55 @@
+"""Mass, centre of mass and inertia of bodies, and of several together. SI units; rotation frame unless said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+
+from design.frames import Array
+
+ALUMINIUM_G_CM3 = 2.7
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """A rigid body."""
+
+    mass_kg: float
+    centre_m: Array  # (3,)
+    inertia_kg_m2: Array  # (3, 3), about the centre of mass
+
+    def moved(self, T: Array) -> Inertial:
+        """The same body in the frame that T maps to."""
+        R = T[:3, :3]
+        return Inertial(self.mass_kg, R @ self.centre_m + T[:3, 3], R @ self.inertia_kg_m2 @ R.T)
+
+
+def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
+    """Of a homogeneous solid in mm."""
+    kg_per_mm3 = density_g_cm3 * 1e-6
+    centre = np.array(solid.Center().toTuple()) / 1000
+    inertia = np.array(cq.Shape.matrixOfInertia(solid)) * kg_per_mm3 * 1e-6
+    return Inertial(solid.Volume() * kg_per_mm3, centre, (inertia + inertia.T) / 2)
+
+
+def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> Inertial:
+    """Of a homogeneous box: bought parts, of which only mass and size are known."""
+    low, high = np.array(tuple(low_mm)) / 1000, np.array(tuple(high_mm)) / 1000
+    x, y, z = (high - low) ** 2
+    mass = mass_g / 1000
+    return Inertial(mass, (low + high) / 2, mass / 12 * np.diag([y + z, z + x, x + y]))
+
+
+def together(bodies: Iterable[Inertial]) -> Inertial:
+    """Several bodies as one (Steiner)."""
+    bodies = list(bodies)
+    mass = sum(body.mass_kg for body in bodies)
+    centre = sum((body.mass_kg * body.centre_m for body in bodies), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for body in bodies:
+        d = body.centre_m - centre
+        inertia += body.inertia_kg_m2 + body.mass_kg * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertial(mass, centre, inertia)

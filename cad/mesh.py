@@ -1,0 +1,82 @@
+"""One canonical triangle mesh per solid, and its binary STL. Millimetres, rotation frame.
+
+The kernel's tessellation depends on what was meshed before (it is cached in the shape) and repeats vertices face by
+face. Here: a fresh copy, vertices rounded and merged, triangles without area dropped, everything sorted; so the same
+solid gives the same bytes in every process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import BuildError
+from design.frames import Array
+
+CHORD_ERROR = 0.01  # mm, of the longest edge's share: volume within 1e-4 on the parts (measured)
+CHORD_ANGLE = 0.1  # rad: 63 sides to a hole
+DECIMALS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles, counter-clockwise from outside."""
+
+    vertices: Array  # (n, 3), mm
+    faces: NDArray[np.int64]  # (m, 3)
+
+    def volume(self) -> float:
+        """Enclosed volume [mm3]."""
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+    def is_closed(self) -> bool:
+        """Whether every edge is shared by exactly two triangles that run it in opposite directions."""
+        edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
+        forth = np.sort(edges[:, 0] * len(self.vertices) + edges[:, 1])
+        back = np.sort(edges[:, 1] * len(self.vertices) + edges[:, 0])
+        return bool(len(np.unique(forth)) == len(forth) and np.array_equal(forth, back))
+
+
+def mesh_of(solid: cq.Solid) -> Mesh:
+    """Tessellate a solid canonically."""
+    points, triangles = solid.copy().tessellate(CHORD_ERROR, CHORD_ANGLE)
+    raw = np.round(np.array([(p.x, p.y, p.z) for p in points], dtype=float), DECIMALS) + 0.0  # no -0.0
+    vertices, index = np.unique(raw, axis=0, return_inverse=True)
+    faces = index.reshape(-1)[np.array(triangles, dtype=np.int64)]
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    first = np.argmin(faces, axis=1)
+    faces = np.stack([faces[np.arange(len(faces)), (first + k) % 3] for k in range(3)], axis=1)
+    return Mesh(vertices, faces[np.lexsort(faces.T[::-1])])
+
+
+def checked_mesh(solid: cq.Solid, part: str) -> Mesh:
+    """The mesh of a part, closed and of the right volume.
+
+    Raises:
+        BuildError: the mesh is open, or its volume is off by more than 0.1 %.
+    """
+    mesh = mesh_of(solid)
+    if not mesh.is_closed():
+        raise BuildError(f"{part}: mesh: tolerance = {CHORD_ERROR} mm: the surface is not closed")
+    off = mesh.volume() / solid.Volume() - 1
+    if abs(off) > 1e-3:
+        raise BuildError(f"{part}: mesh: tolerance = {CHORD_ERROR} mm: volume is off by {off:.2%}")
+    return mesh
+
+
+def stl_bytes(mesh: Mesh, part: str, config_hash: str) -> bytes:
+    """Binary STL; the 80 bytes of its header name the part, the configuration and the unit."""
+    header = f"{part} config={config_hash} unit=mm".encode("ascii")
+    corners = mesh.vertices[mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    table = np.zeros(len(corners), dtype=record)
+    table["normal"], table["corners"] = np.round(normal, DECIMALS) + 0.0, corners
+    return header.ljust(80)[:80] + np.uint32(len(corners)).tobytes() + table.tobytes()

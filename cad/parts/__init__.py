@@ -1,0 +1,1 @@
+"""One file per printed or turned part. Lengths are millimetres, frames are the rotation frame."""

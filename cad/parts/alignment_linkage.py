@@ -1,0 +1,259 @@
+"""Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
+
+Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm. A hub clamps the shaft's spigot (blind bore with a flat at
++y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must stay free, leads
+to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a square
+notch at its -x below the cables, a groove in the hub at +y (index).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+
+from cad import solids
+from cad.mesh import checked_mesh
+from cad.screws import SCREWS, Screw
+from cad.sizing import BODY_GAP, HUB_HEIGHT, PLATE_THICKNESS, Box, Stack, box_corners, envelope_of
+from cad.solids import building, checked
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+
+PART = "alignment_linkage"
+FAR = 200.0  # beyond any linkage
+CLAMP_SCREW = SCREWS["M3"]
+CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
+RETRIES = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentLinkage:
+    """Lengths in mm, angles in rad, directions in the rotation frame."""
+
+    stack: Stack
+    seat: float  # z of the seat in the laser frame
+    half_x: float
+    half_y: float
+    chamfer: float
+    body: Box
+    cables: tuple[Box, ...]
+    fan_z: tuple[float, float]  # the window's edges in the laser frame
+    fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
+    screw: Screw
+    screw_hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+    fit: float  # diametral clearance of the spigot
+    clamp_azimuths: tuple[float, ...]
+
+
+def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
+    """Parameters of the linkage of one scanner.
+
+    Raises:
+        BuildError: the screw holes come too near to the plate's edge.
+    """
+    lidar, printer = scanner.lidar, scanner.printer
+    envelope = envelope_of(lidar)
+    screw = SCREWS[lidar.mount_screw]
+    hole = screw.nominal + printer.screw_clearance_mm
+    half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
+    edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in lidar.mount_holes_mm) - hole / 2
+    if edge < printer.min_wall_mm:
+        raise BuildError(
+            f"{PART}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm at the edge "
+            f"of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
+        )
+    # the cut corner leaves the wall that the straight edge leaves
+    corner = min(half_x + half_y - abs(x) - abs(y) for x, y in lidar.mount_holes_mm)
+    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
+    low, high = lidar.window_z_mm
+    return AlignmentLinkage(
+        stack=stack,
+        seat=-lidar.optical_height_mm,
+        half_x=half_x,
+        half_y=half_y,
+        chamfer=chamfer,
+        body=envelope.body,
+        cables=envelope.cables,
+        fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
+        fan=_free_bearings(stack, lidar.bearings_rad()),
+        screw=screw,
+        screw_hole=hole,
+        holes=lidar.mount_holes_mm,
+        fit=printer.fit_clearance_mm,
+        clamp_azimuths=_clamp_azimuths(stack.R()[:, 2]),
+    )
+
+
+def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
+    """Make the linkage.
+
+    A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck, and only the neck, is then
+    turned a little and made again, so that the height, and with it the frame chain, stays what `sizing` said.
+
+    Raises:
+        BuildError: no attempt gave one valid watertight solid.
+    """
+    fault = None
+    for attempt in range(RETRIES + 1):
+        try:
+            return _attempt(p, attempt)
+        except BuildError as error:
+            fault = fault or error
+    raise BuildError(f"{fault} (after {RETRIES + 1} attempts)")
+
+
+def covered_screws(p: AlignmentLinkage) -> list[int]:
+    """Which base screws (index into `holes`) the hub hides from a straight driver."""
+    return [i for i, hole in enumerate(p.holes) if not _driver_passes(p, hole)]
+
+
+def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
+    tilt = f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
+    stack = p.stack
+    laser = solids.location(stack.R())
+    with building(PART, "plate and neck", "tilt", tilt):
+        plate = solids.prism(solids.octagon(p.half_x, p.half_y, p.chamfer), p.seat - PLATE_THICKNESS, p.seat)
+        body = plate.moved(laser).fuse(_neck(p, attempt))
+        body = checked(body, PART, "plate and neck", "tilt", tilt)
+    with building(PART, "free room of lidar, cables and fan", "tilt", tilt):
+        lidar_room = [shape.moved(laser) for shape in _lidar_room(p)]
+        drivers = [_driver(p, hole).moved(laser) for hole in p.holes]
+        fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z).moved(laser) for start, end in p.fan]
+        body = body.cut(*lidar_room, *drivers, *fan)
+        # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
+        body = _largest(body)
+    with building(PART, "hub", "h", f"{stack.h} mm"):
+        hub = solids.upright(stack.hub_radius, stack.hub_bottom, -stack.h)
+        free = [_driver(p, hole).moved(laser) for hole in p.holes if _driver_passes(p, hole)]
+        body = body.fuse(hub).cut(*lidar_room, *free)
+        body = checked(body, PART, "hub", "h", f"{stack.h} mm")
+    with building(PART, "holes and marks", "h", f"{stack.h} mm"):
+        holes = [solids.upright(p.screw_hole / 2, p.seat - 30.0, p.seat + 1.0, *hole).moved(laser) for hole in p.holes]
+        marks = [shape.moved(laser) for shape in _plate_marks(p)]
+        body = body.cut(*holes, *marks, *_clamps(p), _index_groove(p), _bore(p)).clean()
+        body = checked(body, PART, "holes and marks", "h", f"{stack.h} mm")
+    bottom = body.BoundingBox().zmin
+    if abs(bottom - stack.hub_bottom) > 1e-3:
+        raise BuildError(f"{PART}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub")
+    checked_mesh(body, PART)
+    return body
+
+
+def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
+    """Hull of the hub's core, raised to just under the lidar, and the plate.
+
+    No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
+    """
+    stack = p.stack
+    turn = math.radians(0.7 + 1.9 * attempt)
+    ring = solids.polygon(stack.hub_radius - 1.0 - 0.05 * attempt, 24, turn)
+    R = stack.R()
+    under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
+    top = min(max(-stack.h, under_body), 40.0 - stack.h)
+    layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.hub_bottom + 1.5, top)]
+    outline = solids.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
+    for z in (p.seat - 0.2, p.seat - PLATE_THICKNESS + 0.5):
+        layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
+    return solids.hull(np.concatenate(layers))
+
+
+def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
+    """What must stay free so that the lidar can be put in along its own z: body and cables, swept upwards."""
+    (x0, y0, z0), (x1, y1, _) = p.body
+    room = [solids.box((x0, y0, z0), (x1, y1, FAR))]
+    for (cx0, cy0, cz0), (cx1, cy1, _) in p.cables:
+        room.append(solids.box((cx0, cy0, cz0), (cx1, cy1, FAR)))
+    return room
+
+
+def _driver(p: AlignmentLinkage, hole: tuple[float, float]) -> cq.Solid:
+    """Head and driver of one base screw, from the plate's lower face along -z of the laser frame."""
+    return solids.upright(p.screw.head_room, p.seat - PLATE_THICKNESS - 150.0, p.seat - PLATE_THICKNESS, *hole)
+
+
+def _driver_passes(p: AlignmentLinkage, hole: tuple[float, float]) -> bool:
+    """Whether the driver's way misses the hub, or takes no more than its rim."""
+    stack = p.stack
+    R = stack.R()
+    depth = np.linspace(0.0, 150.0, 601)
+    line = np.array([*hole, p.seat - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
+    near = np.abs(line[:, 2] + stack.h + HUB_HEIGHT / 2) < HUB_HEIGHT / 2 + p.screw.head_room
+    reach = np.hypot(line[near, 0], line[near, 1])
+    return not near.any() or float(reach.min()) > stack.shaft_diameter / 2 + 3.0 + p.screw.head_room
+
+
+def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
+    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there."""
+    first, last = float(bearings.min()), float(bearings.max())
+    q = stack.R()[2]
+    tilt_sine = math.hypot(q[0], q[1])
+    cosine = math.cos(stack.shadow_half_angle)
+    if tilt_sine <= cosine:
+        return ((first, last),)
+    half = math.acos(cosine / tilt_sine)
+    centre = math.atan2(-q[1], -q[0])
+    pieces = [(first, last)]
+    for turn in (-2 * math.pi, 0.0, 2 * math.pi):
+        low, high = centre + turn - half, centre + turn + half
+        pieces = [
+            piece
+            for start, end in pieces
+            for piece in ((start, min(end, low)), (max(start, high), end))
+            if piece[1] - piece[0] > 1e-3
+        ]
+    return tuple(pieces)
+
+
+def _clamp_azimuths(normal: Array) -> tuple[float, ...]:
+    """Two radial screws 90 deg apart on the side away from the plate, in steps of 45 deg from the flat at +y."""
+    towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else math.pi / 4
+    middle = round((towards - math.pi / 2) / (math.pi / 4) - 1e-6) * (math.pi / 4) + math.pi / 2
+    return middle - math.pi / 4, middle + math.pi / 4
+
+
+def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
+    stack = p.stack
+    cuts = []
+    for azimuth in p.clamp_azimuths:
+        out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        centre = np.array([0.0, 0.0, stack.clamp])
+        cuts.append(solids.cylinder(CLAMP_SCREW.core / 2, centre, out, 80.0))
+        # 1.5 mm into the hub: a spot face, not a tangent plane
+        cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - 1.5) * out, out, 80.0))
+    return cuts
+
+
+def _bore(p: AlignmentLinkage) -> cq.Shape:
+    """Room of the spigot: a cylinder with a flat at +y."""
+    stack = p.stack
+    radius = (stack.shaft_diameter + p.fit) / 2
+    round_bore = solids.upright(radius, stack.hub_bottom - 1.0, stack.spigot_top)
+    low = (-2 * radius, -2 * radius, stack.hub_bottom - 2.0)
+    return round_bore.intersect(solids.box(low, (2 * radius, stack.flat + p.fit / 2, stack.spigot_top + 1.0)))
+
+
+def _index_groove(p: AlignmentLinkage) -> cq.Solid:
+    stack = p.stack
+    return solids.prism(solids.diamond(1.0, stack.hub_radius), stack.hub_bottom - 1.0, stack.hub_bottom + 4.0)
+
+
+def _plate_marks(p: AlignmentLinkage) -> list[cq.Solid]:
+    """FRONT: a V in the edge at +x; below the cables a square notch at -x. Laser frame."""
+    under = p.seat - PLATE_THICKNESS - 1.0
+    x = p.half_x
+    front = np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + 1.0, 4.0]])
+    rear = np.array([[-x - BODY_GAP - 1.0, -4.0], [3.0 - x, -4.0], [3.0 - x, 4.0], [-x - BODY_GAP - 1.0, 4.0]])
+    return [solids.prism(outline, under, p.seat + 1.0) for outline in (front, rear)]
+
+
+def _largest(shape: cq.Shape) -> cq.Shape:
+    """The body that holds the plate; crumbs under 2 % of it are dropped, more than that is a broken neck."""
+    bodies = sorted(shape.Solids(), key=lambda solid: -solid.Volume())
+    if len(bodies) > 1 and bodies[1].Volume() < 0.02 * bodies[0].Volume():
+        return bodies[0]
+    return shape

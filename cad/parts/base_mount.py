@@ -1,0 +1,111 @@
+"""Base mount: holds the servo case on a deck with the rotation axis where the angles want it.
+
+Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm; the deck is that of `cad/deck.py`. Two rails with feet take
+the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut that stays
+wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with four M4 holes on
+80 x 80 mm. Screws: first the case from behind through the strut, then the foot on the deck.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+
+from cad import solids
+from cad.deck import BACK_THICKNESS, DECK_HOLES, DECK_SCREW, FOOT_THICKNESS, PLUG_GAP, Deck
+from cad.screws import SCREWS, Screw
+from cad.sizing import Stack
+from cad.solids import building, checked
+from design.frames import Array
+from design.scanner import Scanner
+
+PART = "base_mount"
+FOOT_HALF = 50.0
+PAD_HALF = 26.0  # of the strut on the foot
+RAIL_HALF_WIDTH = 4.0
+FOOT_RADIUS = 3.0
+UNDER_HEAD = 5.0
+SEAT_GAP = 0.2  # the feet carry, not the rails
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseMount:
+    """Lengths in mm."""
+
+    deck: Deck
+    rear: float  # z of the case's rear face
+    ears: float  # z of the planes around the rear holes
+    screw: Screw
+    hole: float  # diameter, of the case screws
+    deck_hole: float
+
+
+def mount_of(scanner: Scanner, stack: Stack, deck: Deck) -> BaseMount:
+    """Parameters of the mount of one scanner."""
+    servo, printer = scanner.servo, scanner.printer
+    screw = SCREWS[servo.case_screw]
+    return BaseMount(
+        deck=deck,
+        rear=stack.horn + servo.case_min_mm[2],
+        ears=stack.horn + servo.case_rear_holes_z_mm,
+        screw=screw,
+        hole=screw.nominal + printer.screw_clearance_mm,
+        deck_hole=DECK_SCREW.nominal + printer.screw_clearance_mm,
+    )
+
+
+def base_mount(p: BaseMount) -> cq.Solid:
+    """Make the mount.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    deck = p.deck
+    axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
+    frame = deck.rotation()
+    on_deck = solids.location(frame, deck.centre)
+    back = np.array(deck.back_centre)
+    with building(PART, "strut and foot", "deck normal", axis):
+        foot = solids.prism(solids.octagon(FOOT_HALF, FOOT_HALF, 12.0), 0.0, FOOT_THICKNESS).moved(on_deck)
+        body: cq.Shape = _back_plate(p).fuse(foot, _strut(p, frame))
+        body = checked(body, PART, "strut and foot", "deck normal", axis)
+    with building(PART, "rails and screw holes", "deck normal", axis):
+        rails = [_rail(p, side) for side in (1.0, -1.0)]
+        feet = [solids.upright(FOOT_RADIUS, p.rear - 1.0, p.ears, x, y) for x, y in deck.rear_holes]
+        body = body.fuse(*rails, *feet)
+        cuts = []
+        for x, y in deck.rear_holes:
+            cuts.append(solids.upright(p.hole / 2, back[2] - 20.0, p.ears + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.head_room, back[2] - 400.0, p.ears - UNDER_HEAD, x, y))
+        for x, y in DECK_HOLES:
+            cuts.append(solids.upright(p.deck_hole / 2, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
+        return checked(body.cut(*cuts).clean(), PART, "rails and screw holes", "deck normal", axis)
+
+
+def _back_plate(p: BaseMount) -> cq.Solid:
+    x, y = p.deck.back_half
+    _, cy, cz = p.deck.back_centre
+    return solids.prism(solids.octagon(x, y, 3.0, cy), cz - BACK_THICKNESS, cz)
+
+
+def _strut(p: BaseMount, frame: Array) -> cq.Shape:
+    """Hull of back plate and a pad in the foot, behind the front of the back plate."""
+    x, y = p.deck.back_half
+    _, cy, cz = p.deck.back_centre
+    plate = solids.octagon(x - 0.4, y - 0.4, 3.0, cy)
+    pad = solids.octagon(PAD_HALF, PAD_HALF, 8.0)
+    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
+    for z in (0.8, FOOT_THICKNESS - 0.9):
+        layers.append(np.column_stack([pad, np.full(8, z)]) @ frame.T + np.array(p.deck.centre))
+    whole = solids.hull(np.concatenate(layers))
+    return whole.cut(solids.box((-400.0, -400.0, cz - 0.3), (400.0, 400.0, cz + 400.0)))
+
+
+def _rail(p: BaseMount, side: float) -> cq.Solid:
+    x = side * p.deck.rear_holes[0][0]
+    _, cy, cz = p.deck.back_centre
+    y = p.deck.back_half[1] - 0.8
+    low = (x - RAIL_HALF_WIDTH, cy - y, cz - BACK_THICKNESS / 2)
+    return solids.box(low, (x + RAIL_HALF_WIDTH, cy + y, cz + PLUG_GAP - SEAT_GAP))

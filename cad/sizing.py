@@ -1,0 +1,263 @@
+"""Every number that more than one part needs, derived from a `Scanner` once. No kernel: plain numpy.
+
+Rotation frame at gamma = 0, mm: origin at the optical centre, z the rotation axis out of the servo horn, +y
+towards the servo's +Y face, where the index marks meet. Everything that turns stays above the plane of the
+ring's top, everything that stands still beside the shaft stays below it: clearance of a whole turn needs no stepping.
+
+    z = 0             optical centre
+    -h                top of the linkage's hub
+    -h - HUB_HEIGHT   bottom of the hub
+    ring_top          HUB_GAP below: the rotor's wires leave here
+    ring_bottom       the ring's length below
+                      RING_GAP below: top of the shaft's collar
+    horn              the servo's horn face
+
+The same boxes of the lidar (`Envelope`) give h and are cut from the linkage, so the two cannot disagree.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.screws import SCREWS, Screw
+from design.catalogue import Lidar, Servo
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+
+HUB_HEIGHT = 14.0
+HUB_WALL = 11.0  # around the spigot: thread length of the radial screws
+HUB_GAP = 10.0  # the rotor's wires leave the ring's end face here
+RING_GAP = 3.0
+SPIGOT = 11.0  # length of the shaft inside the hub
+CLAMP_ABOVE_BOTTOM = 5.0  # of the radial screws, from the hub's lower face
+SHAFT_PLAIN = 12.0  # without a ring
+SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
+SHAFT_MIN = 8.0
+PLATE_THICKNESS = 8.0
+BODY_GAP = 0.6  # around the lidar's body
+H_FLOOR = (45.0, 58.0)  # for an upright lidar and from 60 deg of tilt: stiffness and shadow (measured study)
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """What belongs to the lidar, as boxes (low corner, high corner) in the laser frame."""
+
+    body: Box
+    cables: tuple[Box, ...]
+    plate: Box
+    heads: Box
+
+    def corners(self) -> Array:
+        """Corners of all boxes, shape (n, 3)."""
+        return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.heads)])
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """The scanner along its axis: radii, lengths and the z of each plane (rotation frame)."""
+
+    h: float
+    R_rot_laser: tuple[tuple[float, float, float], ...]
+    ring_length: float
+    ring_radius: float
+    ring_bore: float
+    shaft_diameter: float
+    flange_radius: float
+    flange_thickness: float
+    collar_radius: float
+    collar_height: float
+
+    @property
+    def hub_radius(self) -> float:
+        """Of the linkage's hub."""
+        return self.shaft_diameter / 2 + HUB_WALL
+
+    @property
+    def hub_bottom(self) -> float:
+        """Height of the hub's lower face."""
+        return -self.h - HUB_HEIGHT
+
+    @property
+    def clamp(self) -> float:
+        """Height of the radial screws."""
+        return self.hub_bottom + CLAMP_ABOVE_BOTTOM
+
+    @property
+    def spigot_top(self) -> float:
+        """Height of the shaft's upper end, which is the floor of the hub's bore."""
+        return self.hub_bottom + SPIGOT
+
+    @property
+    def ring_top(self) -> float:
+        """Height of the ring's upper face."""
+        return self.hub_bottom - HUB_GAP
+
+    @property
+    def ring_bottom(self) -> float:
+        """Height of the ring's lower face."""
+        return self.ring_top - self.ring_length
+
+    @property
+    def horn(self) -> float:
+        """Height of the servo's horn face."""
+        return self.ring_bottom - RING_GAP - self.collar_height
+
+    @property
+    def flat(self) -> float:
+        """Distance from the axis of the flat that keys the spigot."""
+        return self.shaft_diameter / 2 - 1.0
+
+    @property
+    def shadow_half_angle(self) -> float:
+        """Half angle [rad] of the cone about -z that the ring hides from the optical centre."""
+        return math.atan2(max(self.ring_radius, self.hub_radius), -self.ring_top)
+
+    def R(self) -> Array:
+        """Laser in the rotation frame, shape (3, 3)."""
+        return np.array(self.R_rot_laser)
+
+
+def stack_of(scanner: Scanner) -> Stack:
+    """Lay out the stack of one scanner.
+
+    Raises:
+        BuildError: the ring has no bore, a bore too small for a shaft, or the lidar would hang upside down.
+    """
+    R = exact(scanner.angles.R_rot_laser())
+    if R[2, 2] < -1e-9:
+        tilt = math.degrees(math.acos(R[2, 2]))
+        raise BuildError(
+            f"alignment_linkage: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
+            "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
+        )
+    shaft, length, radius, bore = _ring(scanner)
+    flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
+    h = _hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius)
+    rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
+    return Stack(
+        h=h,
+        R_rot_laser=rows,
+        ring_length=length,
+        ring_radius=radius,
+        ring_bore=bore,
+        shaft_diameter=shaft,
+        flange_radius=flange_radius,
+        flange_thickness=flange_thickness,
+        collar_radius=collar_radius,
+        collar_height=collar_height,
+    )
+
+
+def envelope_of(lidar: Lidar) -> Envelope:
+    """The boxes of one lidar, gaps included, in the laser frame (origin at the optical centre)."""
+    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    seat = -lidar.optical_height_mm
+    top = lidar.body_mm[2] - lidar.optical_height_mm
+    room = lidar.cable_diameter_mm / 2 + 2.0
+    back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
+    cables = tuple(
+        (
+            (back, y - room, seat + max(lidar.cable_z_mm - room, 0.5)),
+            (1.0 - half_x, y + room, seat + lidar.cable_z_mm + room),
+        )
+        for y in lidar.cable_y_mm
+    )
+    screw = SCREWS[lidar.mount_screw]
+    under = seat - PLATE_THICKNESS
+    gap = BODY_GAP
+    return Envelope(
+        body=((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)),
+        cables=cables,
+        plate=((-half_x, -half_y, under), (half_x, half_y, seat)),
+        heads=((-half_x, -half_y, under - screw.head_height - 0.5), (half_x, half_y, under)),
+    )
+
+
+def rotor_radius(lidar: Lidar) -> float:
+    """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
+    return float(np.linalg.norm(envelope_of(lidar).corners(), axis=1).max())
+
+
+def box_corners(box: Box) -> Array:
+    """The eight corners, shape (8, 3)."""
+    low, high = box
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def exact(R: Array) -> Array:
+    """Cosines of 90 deg are 6e-17 in floating point: make them 0, so that right angles stay planar in the kernel."""
+    return np.where(np.abs(R) < 1e-12, 0.0, R)
+
+
+def horn_screw(servo: Servo) -> Screw:
+    """Screw of the horn's pattern."""
+    return SCREWS[servo.horn_screw]
+
+
+def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
+    """Shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
+    ring = scanner.slip_ring
+    if ring is None:
+        return SHAFT_PLAIN, 0.0, 0.0, 0.0
+    if ring.bore_mm == 0:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
+            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {_least_bore():.1f}"
+        )
+    # half millimetres: bar stock and reamers come in them
+    shaft = math.floor((ring.bore_mm - SHAFT_RUNNING_GAP) * 2) / 2
+    if shaft < SHAFT_MIN:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
+            f"take a ring with bore_mm >= {_least_bore():.1f}"
+        )
+    if ring.bore_mm + 4.0 > ring.outer_diameter_mm:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: leaves no ring in outer_diameter_mm = "
+            f"{ring.outer_diameter_mm:g}"
+        )
+    return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
+
+
+def _least_bore() -> float:
+    return SHAFT_MIN + SHAFT_RUNNING_GAP
+
+
+def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:
+    """Radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
+    screw = horn_screw(servo)
+    circle = servo.horn_circle_mm / 2
+    radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)
+    collar = max(shaft_diameter / 2, servo.horn_boss_diameter_mm / 2 + 2.4)
+    room = circle - screw.head_diameter / 2
+    if collar > room:
+        raise BuildError(
+            f"servo_shaft: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
+            f"{servo.horn_circle_mm:g} mm leave {room:g} mm; take a ring with a smaller bore"
+        )
+    thickness = 4.0
+    return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)
+
+
+def _hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float) -> float:
+    """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
+    envelope = envelope_of(lidar)
+    lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
+    plate = float((box_corners(envelope.plate) @ R[2]).min())
+    heads = float((box_corners(envelope.heads) @ R[2]).min())
+    wishes = [1.0 - z for z in lowest]
+    wishes.append(1.0 - heads - HUB_HEIGHT)
+    wishes.append(1.0 - plate - (HUB_HEIGHT - CLAMP_ABOVE_BOTTOM - 3.0))  # a driver reaches the radial screws
+    if ring_radius > hub_radius:
+        # the hub stays inside the cone that the ring hides anyway
+        wishes.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
+    tilt = math.degrees(math.acos(min(1.0, R[2, 2])))
+    low, high = H_FLOOR
+    wishes.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))
+    return math.ceil(max(wishes) * 4 - 1e-6) / 4

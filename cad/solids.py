@@ -1,0 +1,143 @@
+"""The few kernel operations that the parts are made of, each checked. Millimetres, rotation frame.
+
+OCC calls empty and split results valid, so every step that can fail ends in `checked`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import cadquery as cq
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull
+
+from design.errors import BuildError
+from design.frames import Array
+
+
+@contextmanager
+def building(part: str, feature: str, parameter: str, value: object) -> Iterator[None]:
+    """Turn whatever the kernel throws inside into one line that names part, feature, parameter and value."""
+    try:
+        yield
+    except BuildError:
+        raise
+    except Exception as error:
+        raise BuildError(f"{part}: {feature}: {parameter} = {value}: the CAD kernel failed: {error}") from error
+
+
+def checked(shape: cq.Shape, part: str, feature: str, parameter: str, value: object) -> cq.Solid:
+    """Return the one valid solid that a step made.
+
+    Raises:
+        BuildError: the step split the part, emptied it, or left an invalid solid.
+    """
+    solids = shape.Solids()
+    fault = None
+    if len(solids) != 1:
+        volumes = ", ".join(f"{solid.Volume():.3g}" for solid in solids)
+        fault = f"gives {len(solids)} bodies ({volumes} mm3) instead of one"
+    elif solids[0].Volume() <= 0:
+        fault = "gives no volume"
+    elif not solids[0].isValid():
+        fault = "gives an invalid solid"
+    if fault is not None:
+        raise BuildError(f"{part}: {feature}: {parameter} = {value}: {fault}")
+    return solids[0]
+
+
+def location(R: ArrayLike, t: ArrayLike = (0.0, 0.0, 0.0)) -> cq.Location:
+    """Pose with rotation R and origin t."""
+    R = np.asarray(R, dtype=float)
+    plane = cq.Plane(origin=vector(t), xDir=vector(R[:, 0]), normal=vector(R[:, 2]))
+    return cq.Location(plane)
+
+
+def vector(v: ArrayLike) -> cq.Vector:
+    """Kernel vector from three numbers."""
+    x, y, z = (float(c) for c in np.asarray(v, dtype=float))
+    return cq.Vector(x, y, z)
+
+
+def box(low: Sequence[float], high: Sequence[float]) -> cq.Solid:
+    """Axis-parallel box between two corners."""
+    x, y, z = (b - a for a, b in zip(low, high, strict=True))
+    return cq.Solid.makeBox(x, y, z, pnt=vector(low))
+
+
+def cylinder(radius: float, start: ArrayLike, direction: ArrayLike, length: float) -> cq.Solid:
+    """Cylinder from `start` along `direction`."""
+    return cq.Solid.makeCylinder(radius, length, vector(start), vector(direction))
+
+
+def upright(radius: float, z_low: float, z_high: float, x: float = 0.0, y: float = 0.0) -> cq.Solid:
+    """Cylinder parallel to z."""
+    return cylinder(radius, (x, y, z_low), (0.0, 0.0, 1.0), z_high - z_low)
+
+
+def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
+    """Polygon (n, 2) extruded along z."""
+    points = [cq.Vector(float(x), float(y), z_low) for x, y in np.asarray(outline, dtype=float)]
+    wire = cq.Wire.makePolygon(points, close=True)
+    return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
+
+
+def diamond(half: float, y: float) -> Array:
+    """Square on its corner about (0, y), shape (4, 2): cuts a V into what ends at y."""
+    return np.array([[half, y], [0.0, y + half], [-half, y], [0.0, y - half]])
+
+
+def octagon(half_x: float, half_y: float, chamfer: float, y: float = 0.0) -> Array:
+    """Rectangle about (0, y) with cut corners, counter-clockwise, shape (8, 2)."""
+    a, b, c = half_x, half_y, chamfer
+    corners = [[a, c - b], [a, b - c], [a - c, b], [c - a, b], [-a, b - c], [-a, c - b], [c - a, -b], [a - c, -b]]
+    return np.array([[px, py + y] for px, py in corners])
+
+
+def polygon(radius: float, sides: int, turn: float = 0.0) -> Array:
+    """Regular polygon with its corners on `radius`, shape (sides, 2); `turn` [rad] is its first corner."""
+    angle = turn + 2 * math.pi * np.arange(sides) / sides
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def sector(r_low: float, r_high: float, start: float, end: float, z_low: float, z_high: float) -> cq.Solid:
+    """Part of a thick ring about z between two angles [rad], with chords for arcs: planes cut more safely."""
+    count = max(2, math.ceil((end - start) / 0.2) + 1)
+    angle = np.linspace(start, end, count)
+    arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outer = arc * (r_high / math.cos((end - start) / (count - 1) / 2))
+    return prism(np.concatenate([outer, r_low * arc[::-1]]), z_low, z_high)
+
+
+def hull(points: Array) -> cq.Solid:
+    """Convex hull of points (n, 3) with one planar face per plane of the hull."""
+    points = np.unique(np.round(points, 9), axis=0)
+    found = ConvexHull(points)
+    order = np.lexsort(np.round(found.equations, 7).T)
+    planes: list[Array] = []
+    faces: list[cq.Face] = []
+    for plane in found.equations[order]:
+        if any(np.abs(plane - seen).max() < 1e-6 for seen in planes):
+            continue
+        planes.append(plane)
+        corners = points[np.abs(points @ plane[:3] + plane[3]) < 1e-6]
+        wire = cq.Wire.makePolygon([vector(p) for p in _around(corners, plane[:3])], close=True)
+        faces.append(cq.Face.makeFromWires(wire))
+    solid = cq.Solid.makeSolid(cq.Shell.makeShell(faces))
+    if solid.Volume() < 0:
+        solid = cq.Solid(solid.wrapped.Reversed())
+    return solid
+
+
+def _around(corners: Array, normal: Array) -> Array:
+    """Corners of a convex polygon in order about its normal, those inside an edge dropped."""
+    centre = corners.mean(axis=0)
+    first = corners[0] - centre
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    flat = np.stack([(corners - centre) @ first, (corners - centre) @ second], axis=1)
+    outline = ConvexHull(flat).vertices
+    return corners[np.roll(outline, -int(np.argmin(outline)))]

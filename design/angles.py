@@ -1,0 +1,117 @@
+"""The angle set: the one record that joins optimiser, parts and acquisition.
+
+Files carry degrees and millimetres; the methods return radians and metres. `design.md`'s frame chain:
+
+    T_world_laser(gamma) = T_world_rot(gamma) @ T_rot_laser
+    T_world_rot(gamma)   = [Rx(alpha_rot) Ry(beta_rot) Rz(gamma + gamma_rot) | t_world_rot]
+    T_rot_laser          = [exp(delta) Rz(gamma_laser) Ry(beta_laser) Rx(alpha_laser) | t_rot_laser]
+
+where gamma is the joint position. `delta` and `t_rot_laser` are zero by design; their x and y are what a
+calibration can see. Rotation about the axis and translation along it are gauges.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, ValidationError
+
+from design import frames
+from design.errors import TaskError
+from design.frames import Array
+from design.record import Record, explain
+
+STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
+"""(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
+
+
+class Angles(Record):
+    """The six angles of the paper in degrees; the two gammas are 0 by design."""
+
+    alpha_rot: float
+    beta_rot: float
+    gamma_rot: float = 0.0
+    alpha_laser: float
+    beta_laser: float
+    gamma_laser: float = 0.0
+
+
+class Spin(Record):
+    """Continuous rotation at constant speed."""
+
+    mode: Literal["spin"] = "spin"
+    period_s: float = Field(gt=0, le=3600, description="time of one full turn of the servo")
+
+
+class AngleSet(Record):
+    """One scanner's angles, as designed or as calibrated. `angles.json` is this record."""
+
+    schema_id: Literal["scanwright/angles/1"] = Field(default="scanwright/angles/1", alias="schema")
+    task: str
+    task_sha256: str | None = None
+    source: Literal["design", "calibration"] = "design"
+    angles_deg: Angles
+    delta_rotvec_rot_deg: tuple[float, float] = (0.0, 0.0)
+    t_rot_laser_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    t_world_rot_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sensor: str
+    servo: str
+    slip_ring: str | None = None
+    motion: Spin | None = None
+    J: float | None = None
+    J_error: float | None = None
+    covariance: tuple[tuple[float, float, float, float], ...] | None = Field(default=None, min_length=4, max_length=4)
+    versions: dict[str, str] = Field(default_factory=dict)
+
+    def R_rot_laser(self) -> Array:
+        """Orientation of the laser in the rotation frame, calibration included, shape (3, 3)."""
+        a = self.angles_deg
+        designed = frames.R_rot_laser(*np.radians([a.alpha_laser, a.beta_laser, a.gamma_laser]))
+        return frames.rotvec_to_matrix(np.radians([*self.delta_rotvec_rot_deg, 0.0])) @ designed
+
+    def T_rot_laser(self) -> Array:
+        """Pose of the laser in the rotation frame [m], shape (4, 4)."""
+        return frames.rigid(self.R_rot_laser(), np.array(self.t_rot_laser_mm) / 1000)
+
+    def T_world_rot(self, joint_rad: ArrayLike) -> Array:
+        """Pose of the turning rotation frame in the world [m] at joint positions [rad], shape (..., 4, 4)."""
+        a = self.angles_deg
+        gamma = np.asarray(joint_rad, dtype=float) + np.radians(a.gamma_rot)
+        R = frames.R_world_rot(np.radians(a.alpha_rot), np.radians(a.beta_rot), gamma)
+        return frames.rigid(R, np.array(self.t_world_rot_mm) / 1000)
+
+    def T_world_laser(self, joint_rad: ArrayLike) -> Array:
+        """Pose of the laser in the world [m] at joint positions [rad], shape (..., 4, 4)."""
+        return self.T_world_rot(joint_rad) @ self.T_rot_laser()
+
+    def axis_world(self) -> Array:
+        """Unit vector of the rotation axis in the world, shape (3,)."""
+        return self.T_world_rot(0.0)[:3, 2]
+
+    def to_json(self) -> str:
+        """The text of `angles.json`: keys in the order of the record, one trailing line feed."""
+        return json.dumps(self.model_dump(by_alias=True), indent=2) + "\n"
+
+
+def load_angles(path: Path) -> AngleSet:
+    """Read `angles.json`.
+
+    Raises:
+        TaskError: the file is missing, is not JSON, or is not an angle set.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise TaskError(f"{path}: cannot read the angle set: {_reason(error)}") from error
+    try:
+        return AngleSet.model_validate_json(text)
+    except ValidationError as error:
+        raise TaskError(explain(error, path, AngleSet)) from error
+
+
+def _reason(error: OSError | UnicodeDecodeError) -> str:
+    return error.strerror or str(error) if isinstance(error, OSError) else "not UTF-8 text"

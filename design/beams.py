@@ -1,0 +1,63 @@
+"""Beams of the 2D lidar in the rotation frame, scan lines of one full turn, and the simulated scan on the sphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from design import frames
+from design.frames import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """The scan lines of one full turn: line k stands at `k * step_rad`, k = 0 .. count - 1.
+
+    `T f` is not rounded: where it is no integer the gap behind the last line is shorter than `step_rad`.
+    """
+
+    count: int
+    step_rad: float
+
+    @property
+    def angles_rad(self) -> Array:
+        """Axis angles of all lines, shape (count,)."""
+        return self.step_rad * np.arange(self.count)
+
+
+def scan_lines(period_s: float, scan_rate_hz: float) -> Lines:
+    """Lines of one turn of `period_s` seconds: `gamma_k = 2 pi k / (T f)`, k = 0 .. ceil(T f) - 1."""
+    turns = period_s * scan_rate_hz
+    nearest = round(turns)
+    if nearest >= 1 and abs(turns - nearest) < 1e-9 * turns:  # 0.07 * 100 is 7 and not 7.000000000000001
+        turns = nearest
+    return Lines(count=int(np.ceil(turns)), step_rad=2 * np.pi / turns)
+
+
+def beam_directions_rot(bearings_rad: Array, alpha_laser_rad: float, beta_laser_rad: float) -> Array:
+    """Unit vectors of all beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`."""
+    in_laser = np.stack([np.cos(bearings_rad), np.sin(bearings_rad), np.zeros_like(bearings_rad)], axis=1)
+    return in_laser @ frames.R_rot_laser(alpha_laser_rad, beta_laser_rad).T
+
+
+def polar_and_azimuth(directions: Array) -> tuple[Array, Array]:
+    """Angle from z and angle about z of unit vectors, (n, 3) -> (n,), (n,) [rad]; accurate close to the poles."""
+    x, y, z = directions.T
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+
+
+def simulated_scan(bearings_rad: Array, lines: Lines, angles_rad: ArrayLike, start_phase_rad: float = 0.0) -> Array:
+    """Directions of one full scan in the world (paper, section 4.1), shape (lines * beams, 3), line after line.
+
+    Args:
+        bearings_rad: beam table of the lidar, shape (beams,).
+        lines: scan lines of the turn.
+        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        start_phase_rad: axis angle of the first line.
+    """
+    alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
+    beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser)
+    R = frames.R_world_rot(alpha_rot, beta_rot, lines.angles_rad + start_phase_rad)
+    return np.einsum("kij,bj->kbi", R, beams).reshape(-1, 3)

@@ -1,0 +1,41 @@
+"""Every error that Scanwright raises on purpose.
+
+    ScanwrightError            wrong input: one line, exit 2
+     +-- TaskError             a task file or a catalogue file is missing, malformed or inconsistent
+     +-- BuildError            a part, a drawing or a build folder cannot be made as asked
+     +-- RecordingError        a recording is unreadable, or lacks what the command needs
+
+A command prints one of these as one line and exits with 2; anything else is a bug and gets its traceback.
+Each line names file, field, value, bound and a suggestion, as far as they apply.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ScanwrightError(Exception):
+    """Base of every error that a person can mend."""
+
+
+class TaskError(ScanwrightError):
+    """A task file or a catalogue file is missing, malformed or inconsistent."""
+
+
+class BuildError(ScanwrightError):
+    """A part or a build folder cannot be made as asked. The message names part, feature, parameter and value."""
+
+
+class RecordingError(ScanwrightError):
+    """A recording is unreadable, or lacks what the command needs."""
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean 'X'?", or the list of what is known where nothing comes close."""
+    names = sorted(known)
+    folded = {name.lower(): name for name in names}
+    close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean '{folded[close[0]]}'?"
+    return f"; known: {', '.join(names)}" if names else ""

@@ -1,0 +1,79 @@
+"""Rotations and rigid transforms.
+
+`T_a_b` maps coordinates in frame b to coordinates in frame a: `p_a = T_a_b @ p_b`. Neighbouring subscripts
+cancel, so `T_world_laser = T_world_rot @ T_rot_laser` can be checked by eye. All frames are right-handed; metres
+and radians. Frames: `world` (the robot), `rot` (the servo axis is z), `laser` (x forward, z the normal of the
+scan plane).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[Any]
+"""float64 unless a docstring says otherwise."""
+
+
+def Rx(angle_rad: ArrayLike) -> Array:
+    """Rotation about x, shape (..., 3, 3)."""
+    return _axis_rotation(angle_rad, 0)
+
+
+def Ry(angle_rad: ArrayLike) -> Array:
+    """Rotation about y, shape (..., 3, 3)."""
+    return _axis_rotation(angle_rad, 1)
+
+
+def Rz(angle_rad: ArrayLike) -> Array:
+    """Rotation about z, shape (..., 3, 3)."""
+    return _axis_rotation(angle_rad, 2)
+
+
+def R_world_rot(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Array:
+    """Rotation frame in the world, `Rx(alpha_rot) Ry(beta_rot) Rz(gamma_rot)` (paper, section 4.1)."""
+    return Rx(alpha_rad) @ Ry(beta_rad) @ Rz(gamma_rad)
+
+
+def R_rot_laser(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Array:
+    """Laser in the rotation frame, `Rz(gamma_laser) Ry(beta_laser) Rx(alpha_laser)` (paper, section 4.1)."""
+    return Rz(gamma_rad) @ Ry(beta_rad) @ Rx(alpha_rad)
+
+
+def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Array:
+    """Rotation by |v| about v (Rodrigues), shape (3, 3)."""
+    v = np.asarray(rotvec_rad, dtype=float)
+    angle = float(np.linalg.norm(v))
+    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    # sin(a)/a and (1 - cos(a))/a^2 in forms that stay exact as a -> 0
+    return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
+
+
+def rigid(R_a_b: Array, t_a_b: ArrayLike) -> Array:
+    """4x4 transform from a rotation and the origin of b in a; leading axes broadcast."""
+    t = np.asarray(t_a_b, dtype=float)
+    T = np.zeros((*np.broadcast_shapes(R_a_b.shape[:-2], t.shape[:-1]), 4, 4))
+    T[..., :3, :3] = R_a_b
+    T[..., :3, 3] = t
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def apply(T_a_b: Array, points_b: Array) -> Array:
+    """Points of frame b, shape (n, 3), in frame a."""
+    return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+
+
+def _axis_rotation(angle_rad: ArrayLike, axis: int) -> Array:
+    angle = np.asarray(angle_rad, dtype=float)
+    c, s = np.cos(angle), np.sin(angle)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    R = np.zeros((*angle.shape, 3, 3))
+    R[..., axis, axis] = 1.0
+    R[..., j, j] = c
+    R[..., k, k] = c
+    R[..., j, k] = -s
+    R[..., k, j] = s
+    return R

@@ -1,0 +1,220 @@
+"""The objective `J = int w <g(d)> dO / int w dO` of one setting, with the error of its own quadrature.
+
+In coordinates about the axis the integral is one-dimensional: the zonal `<g(d)>` (`design.density`) times the mean
+weight of each circle (`design.regions`), both exact at every polar angle. What is left is the quadrature over that
+angle. Its segments end where a circle touches an edge of the region or passes a corner of it; the rule with a third
+of the nodes is inside the full one, and their difference measures the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.beams import Lines, beam_directions_rot, polar_and_azimuth, scan_lines
+from design.density import mean_count, zones
+from design.errors import TaskError
+from design.frames import Array, R_world_rot
+from design.regions import Field, field_of
+from design.sphere import equal_angle_grid
+from design.task import LoadedTask
+
+NODES = 6561  # per setting, spread over the segments
+SAFETY = 3  # the full rule is at least this much nearer than its third: 7 to 25 times in benchmarks/objective.py
+ROUNDING = 1e-6  # floor of the stated error
+EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
+MANY_EDGES = 64  # above this (maps) corners are not looked for: the nodes are then spread evenly
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A task as numbers: beams, lines, ball, weights, and g of every possible count."""
+
+    bearings_rad: Array
+    lines: Lines
+    ball_rad: float
+    field: Field
+    g: Array
+    grid_step_deg: float | None
+    """Step of the paper's equal-angle sum, or None for solid angles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """J of one setting.
+
+    Attributes:
+        J: the objective.
+        J_error: bound on its numerical error.
+        J_lower: with g of the mean count, a lower bound of J as g is convex.
+        least: lowest count in the weighted region at any start phase, beams per ball.
+        blind_weight: share of the weight that is never seen, at no phase.
+    """
+
+    J: float
+    J_error: float
+    J_lower: float
+    least: int
+    blind_weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class PolarRule:
+    """Quadrature over the polar angle about an axis.
+
+    Attributes:
+        polar_rad: nodes, shape (n,).
+        fine: what each node adds to `int w dO`, shape (n,).
+        coarse: the same for the rule with a third of the nodes: zero on two of three, shape (n,).
+        segment: the segment that each node belongs to, shape (n,).
+    """
+
+    polar_rad: Array
+    fine: Array
+    coarse: Array
+    segment: NDArray[np.intp]
+
+
+def log_density(counts: Array) -> Array:
+    """`g(d) = -ln(1 + d)`: rewards every direction's first beams most (the paper's logarithm, with its sign)."""
+    return -np.log1p(counts)
+
+
+def problem_of(loaded: LoadedTask) -> Problem:
+    """The numbers that decide J."""
+    density = loaded.task.density
+    lidar = loaded.lidar
+    bearings = lidar.bearings_rad()
+    lines = scan_lines(loaded.task.motion.period_s, lidar.scan_rate_hz)
+    return Problem(
+        bearings_rad=bearings,
+        lines=lines,
+        ball_rad=float(np.radians(density.ball_radius_deg)),
+        field=field_of(loaded),
+        g=log_density(np.arange(lines.count * len(bearings) + 1.0)),
+        grid_step_deg=density.grid_step_deg if density.quadrature == "equal_angle" else None,
+    )
+
+
+def score(problem: Problem, angles_rad: Array, nodes: int = NODES) -> Score:
+    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    rule, polar, azimuth = _rule(problem, angles_rad, nodes)
+    total = rule.fine.sum()
+    z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.g)
+    by_segment = np.bincount(rule.segment, (rule.fine - rule.coarse) * z.mean_g)
+    lower = log_density(mean_count(rule.polar_rad, polar, problem.lines, problem.ball_rad))
+    return Score(
+        J=float(rule.fine @ z.mean_g / total),
+        J_error=float(np.abs(by_segment).sum() / (SAFETY * total)) + ROUNDING,
+        J_lower=float(rule.fine @ lower / total),
+        least=int(z.least[rule.fine > 0].min()),
+        blind_weight=float(rule.fine @ (z.most == 0) / total),
+    )
+
+
+def quick_J(problem: Problem, angles_rad: Array, nodes: int) -> float:
+    """J alone, as `score` computes it: for searches that call it often."""
+    rule, polar, azimuth = _rule(problem, angles_rad, nodes)
+    z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.g)
+    return float(rule.fine @ z.mean_g / rule.fine.sum())
+
+
+def _rule(problem: Problem, angles_rad: Array, nodes: int) -> tuple[PolarRule, Array, Array]:
+    """Quadrature for one setting, and the polar angles and azimuths of its beams."""
+    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
+    rule = _grid_rule(problem, axis) if problem.grid_step_deg else _circle_rule(problem, axis, polar, nodes)
+    if not rule.fine.sum() > 0:
+        raise TaskError(EMPTY)
+    return rule, polar, azimuth
+
+
+def _grid_rule(problem: Problem, axis: Array) -> PolarRule:
+    """The paper's sum: every grid node counts the same, poles and all."""
+    assert problem.grid_step_deg is not None
+    grid = equal_angle_grid(problem.grid_step_deg)
+    weights = problem.field.weight_at(grid)
+    hit = weights > 0
+    polar = np.arccos(np.clip(grid[hit] @ axis, -1, 1))
+    unique, index = np.unique(np.round(polar, 12), return_inverse=True)
+    summed = np.bincount(index, weights[hit], len(unique))
+    return PolarRule(unique, summed, summed, np.zeros(len(unique), dtype=np.intp))
+
+
+def _circle_rule(problem: Problem, axis: Array, beam_polar_rad: Array, nodes: int) -> PolarRule:
+    """Midpoint rule on each segment, nodes gathered at its ends: there the integrand starts like a square root."""
+    field = problem.field
+    segments = _weighted_segments(field, axis, _density_breaks(beam_polar_rad, problem.ball_rad))
+    length = sum(b - a for a, b in segments)
+    polar, fine, coarse = [], [], []
+    for a, b in segments:
+        thirds = max(3, round(nodes / 3 * (b - a) / length))
+        s = np.pi * (np.arange(3 * thirds) + 0.5) / (3 * thirds)
+        width = (b - a) / 2 * np.sin(s) * np.pi / (3 * thirds)
+        polar.append(a + (b - a) * np.sin(s / 2) ** 2)
+        fine.append(width)
+        coarse.append(np.where(np.arange(3 * thirds) % 3 == 1, 3 * width, 0.0))
+    if not segments:
+        raise TaskError(EMPTY)
+    t = np.concatenate(polar)
+    means, _ = field.on_circles(axis, t)
+    around = 2 * np.pi * np.sin(t) * means
+    segment = np.repeat(np.arange(len(polar)), [len(p) for p in polar])
+    return PolarRule(t, np.concatenate(fine) * around, np.concatenate(coarse) * around, segment)
+
+
+def _density_breaks(beam_polar_rad: Array, ball_rad: float) -> Array:
+    """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends."""
+    marks = np.array([beam_polar_rad.min(), beam_polar_rad.max(), beam_polar_rad[0], beam_polar_rad[-1]])
+    return _fold(np.concatenate([marks - ball_rad, marks, marks + ball_rad]))
+
+
+def _fold(polar_rad: Array) -> Array:
+    """Bring polar angles past a pole back to 0 .. pi."""
+    beyond = np.abs(polar_rad) % (2 * np.pi)
+    return np.where(beyond > np.pi, 2 * np.pi - beyond, beyond)
+
+
+def _weighted_segments(field: Field, axis: Array, more_breaks: Array) -> list[tuple[float, float]]:
+    """Ranges of the polar angle between breaks, those of weight zero left out."""
+    of_field = _breaks(np.concatenate([field.weight.planes, field.mask.planes]), axis)
+    breaks = np.unique(np.round(np.concatenate([of_field, more_breaks]), 12))
+    middles = (breaks[:-1] + breaks[1:]) / 2
+    means, _ = field.on_circles(axis, middles)
+    return [(a, b) for a, b, m in zip(breaks[:-1], breaks[1:], means, strict=True) if m > 0 and b - a > 1e-12]
+
+
+def _breaks(planes: Array, axis: Array) -> Array:
+    """Polar angles at which a circle about `axis` touches an edge circle or passes a corner; 0 and pi too."""
+    if len(planes) > MANY_EDGES:
+        return np.radians(np.arange(0, 181.0))
+    normals, offsets = planes[:, :3], planes[:, 3]
+    tilt = np.arctan2(np.linalg.norm(np.cross(normals, axis), axis=1), normals @ axis)
+    radius = np.arccos(np.clip(offsets, -1, 1))
+    touching = _fold(np.concatenate([tilt - radius, tilt + radius]))
+    corners = _corners(planes)
+    passing = np.arctan2(np.linalg.norm(np.cross(corners, axis), axis=1), corners @ axis)
+    return np.concatenate([[0.0, np.pi], touching, passing])
+
+
+def _corners(planes: Array) -> Array:
+    """Points of the sphere where two edge planes meet, shape (n, 3)."""
+    i, j = np.triu_indices(len(planes), 1)
+    m, n = planes[i, :3], planes[j, :3]
+    along = np.cross(m, n)
+    square = (along**2).sum(axis=1)
+    meet = square > 1e-18
+    m, n, along, square = m[meet], n[meet], along[meet], square[meet]
+    c, d = planes[i, 3][meet], planes[j, 3][meet]
+    # the point of the common line next to the centre, then along the line to the sphere
+    foot = (np.cross(n, along) * c[:, None] + np.cross(along, m) * d[:, None]) / square[:, None]
+    rest = 1 - (foot**2).sum(axis=1)
+    on = rest > 0
+    reach = (along * np.sqrt(np.maximum(rest, 0) / square)[:, None])[on]
+    return np.concatenate([foot[on] + reach, foot[on] - reach])

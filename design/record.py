@@ -1,0 +1,81 @@
+"""The base of every record that is read from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from design.errors import suggest
+
+
+class Record(BaseModel):
+    """Immutable; a misspelt key is an error and not a default; NaN and infinity are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+def explain(error: ValidationError, source: Path | str, model: type[BaseModel]) -> str:
+    """One line for a person: file, field, value, what is wrong, and a suggestion where one is near.
+
+    Only the first fault is told in full, an unknown key before a missing one: the others often follow from it.
+    """
+    faults = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+    fault = faults[0]
+    loc = fault["loc"]
+    record, path = _walk(model, loc)
+    where = ".".join(path) or "(whole file)"
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    if fault["type"] == "extra_forbidden":
+        known = [field.alias or name for name, field in record.model_fields.items()]
+        return f"{source}: {where}: unknown key{suggest(str(loc[-1]), known)}{more}"
+    if fault["type"] == "missing":
+        return f"{source}: {where}: this key is required{more}"
+    if fault["type"] == "json_invalid":
+        return f"{source}: not a JSON file: {fault['msg'].removeprefix('Invalid JSON: ')}"
+    shown = repr(fault["input"])
+    value = f" = {shown}" if len(shown) < 80 else ""
+    return f"{source}: {where}{value}: {fault['msg'].removeprefix('Value error, ')}{more}"
+
+
+def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[BaseModel], list[str]]:
+    """The record that holds the last part of `loc`, and the path as the file's author wrote it.
+
+    pydantic puts the tag of a union or the name of a tried type into `loc`: those parts are no keys of the file.
+    """
+    record: type[BaseModel] = model
+    inside: Any = model
+    path: list[str] = []
+    for part in loc:
+        records = _records_in(inside)
+        if isinstance(part, int):
+            path.append(str(part))
+            continue
+        holder = next((r for r in records if part in _keys(r)), None)
+        if holder is not None:
+            record, path = holder, [*path, part]
+            inside = _keys(holder)[part]
+            continue
+        tagged = next((r for r in records if part in _tags(r)), None)
+        if tagged is not None:
+            record, inside = tagged, tagged
+        elif part is loc[-1] and records:
+            record, path = records[0], [*path, part]
+    return record, path
+
+
+def _records_in(annotation: Any) -> list[type[BaseModel]]:
+    """Record classes inside an annotation such as `tuple[Region, ...]` or `Spin | Sweep`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [record for argument in get_args(annotation) for record in _records_in(argument)]
+
+
+def _keys(record: type[BaseModel]) -> dict[str, Any]:
+    return {field.alias or name: field.annotation for name, field in record.model_fields.items()}
+
+
+def _tags(record: type[BaseModel]) -> set[str]:
+    fields = record.model_fields
+    return {str(value) for name in ("shape", "mode") if name in fields for value in get_args(fields[name].annotation)}

@@ -1,0 +1,34 @@
+"""One scanner: an angle set and the products it is made of. What `cad` builds and the report describes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from design.angles import AngleSet
+from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing
+
+
+@dataclass(frozen=True, slots=True)
+class Scanner:
+    """Angles with their products; `slip_ring` is None where the motion needs none."""
+
+    angles: AngleSet
+    lidar: Lidar
+    servo: Servo
+    slip_ring: SlipRing | None
+    printer: Printer
+
+
+def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue) -> Scanner:
+    """Look up the products that an angle set names.
+
+    Raises:
+        TaskError: a product is not in the catalogue.
+    """
+    return Scanner(
+        angles=angles,
+        lidar=catalogue.get(angles.sensor, Lidar),
+        servo=catalogue.get(angles.servo, Servo),
+        slip_ring=None if angles.slip_ring is None else catalogue.get(angles.slip_ring, SlipRing),
+        printer=catalogue.get(printer, Printer),
+    )

@@ -1,0 +1,254 @@
+"""The task file: what the scanner shall see, what it is made of, and which angles may be chosen.
+
+Files speak degrees and millimetres; every key that has a unit ends in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from design.angles import Spin
+from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
+from design.errors import TaskError
+from design.frames import Array
+from design.record import Record, explain
+
+SHIPPED = Path(__file__).parent / "tasks"
+
+Limits = tuple[float, float]
+Angle = float | Limits
+"""One value fixes the angle; two are the range to search, in degrees."""
+
+NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+
+Value = Annotated[float, Field(ge=0)]
+
+
+class AngleRanges(Record):
+    """Mounting angles to search over, or fixed."""
+
+    alpha_rot_deg: Angle = (-180.0, 180.0)
+    beta_rot_deg: Angle = (-90.0, 90.0)
+    alpha_laser_deg: Angle = (-90.0, 90.0)
+    beta_laser_deg: Angle = (-90.0, 90.0)
+    step_deg: float = Field(default=5.0, ge=0.5, le=45)
+
+    @model_validator(mode="after")
+    def _within_bounds(self) -> AngleRanges:
+        for name, bound in (("alpha_rot", 180), ("beta_rot", 90), ("alpha_laser", 90), ("beta_laser", 90)):
+            lower, upper = self.limits(name)
+            if not -bound <= lower <= upper <= bound:
+                raise ValueError(f"{name}_deg = {[lower, upper]} does not rise within -{bound} .. {bound}")
+        return self
+
+    def limits(self, name: str) -> Limits:
+        """Range of one angle in degrees; both ends are equal where it is fixed."""
+        angle: Angle = getattr(self, f"{name}_deg")
+        return angle if isinstance(angle, tuple) else (angle, angle)
+
+    def grid_deg(self, name: str) -> Array:
+        """Settings of one angle that the search visits, both limits included."""
+        lower, upper = self.limits(name)
+        steps = int(np.floor((upper - lower) / self.step_deg + 1e-9))
+        grid = lower + self.step_deg * np.arange(steps + 1)
+        return grid if upper - grid[-1] < 1e-9 else np.append(grid, upper)
+
+
+class DensityRules(Record):
+    """How density is counted and judged; see `design.md`, Definitions."""
+
+    ball_radius_deg: float = Field(default=2.0, ge=0.01, le=90)
+    objective: Literal["log"] = "log"
+    background: Value = 0.0
+    quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
+    grid_step_deg: float = Field(default=1.0, ge=0.25, le=10)
+
+
+class All(Record):
+    """Every direction."""
+
+    shape: Literal["all"]
+    value: Value = 1.0
+
+
+class Band(Record):
+    """theta from the world's z axis, phi from its x axis; edges inclusive, phi wraps."""
+
+    shape: Literal["band"]
+    theta_deg: Limits = (0.0, 180.0)
+    phi_deg: Limits = (-180.0, 180.0)
+    value: Value = 1.0
+
+    @model_validator(mode="after")
+    def _edges_rise(self) -> Band:
+        if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
+            raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
+        if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
+            raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
+        return self
+
+
+class Cone(Record):
+    """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
+
+    shape: Literal["cone"]
+    axis: tuple[float, float, float]
+    half_angle_deg: float = Field(gt=0, le=180)
+    value: Value = 1.0
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not np.linalg.norm(axis) > 0:
+            raise ValueError("an axis of length zero has no direction")
+        return axis
+
+
+class Map(Record):
+    """A picture or table of weights: rows theta 0..180, columns phi 0..360, cell centres; PNG value / 255 (grey).
+
+    A .npy or .csv table is taken as it is. `value` scales it.
+    """
+
+    shape: Literal["map"]
+    file: str
+    value: Value = 1.0
+
+
+Region = Annotated[All | Band | Cone | Map, Field(discriminator="shape")]
+
+
+class Task(Record):
+    """One task file with every default written out."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
+    sensor: str
+    servo: str
+    slip_ring: str | None = None
+    printer: str = "fdm-0.4"
+    catalogue: tuple[str, ...] = ()
+    motion: Spin
+    angles: AngleRanges = AngleRanges()
+    density: DensityRules = DensityRules()
+    weight: tuple[Region, ...] = ()
+    mask: tuple[Region, ...] = ()
+
+    @field_validator("name", mode="before")
+    @classmethod
+    def _is_a_folder_name(cls, name: Any) -> Any:
+        if isinstance(name, str) and ("/" in name or "\\" in name or ".." in name):
+            raise ValueError("a task name becomes a folder name and cannot hold a path: use letters, digits, _ and -")
+        return name
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedTask:
+    """A task, the file it came from, the products it names, and its maps.
+
+    `maps` holds the tables of the `map` regions, weights first, then masks, in their order; (rows, columns) each.
+    """
+
+    task: Task
+    source: Path
+    products: Catalogue
+    maps: tuple[Array, ...]
+
+    @property
+    def lidar(self) -> Lidar:
+        """The 2D lidar of the task."""
+        return self.products.get(self.task.sensor, Lidar)
+
+    @property
+    def servo(self) -> Servo:
+        """The servo of the task."""
+        return self.products.get(self.task.servo, Servo)
+
+    def sha256(self) -> str:
+        """Digest of all that decides the result: the task, its maps, and the records of its products."""
+        parts = [json.dumps(self.task.model_dump(mode="json", exclude={"catalogue"}), sort_keys=True)]
+        names = [self.task.sensor, self.task.servo, self.task.slip_ring, self.task.printer]
+        parts += [self.products.products[name].model_dump_json() for name in names if name]
+        digest = hashlib.sha256("\n".join(parts).encode())
+        for table in self.maps:
+            digest.update(np.ascontiguousarray(table).tobytes())
+        return digest.hexdigest()
+
+
+def load_task(path: Path) -> LoadedTask:
+    """Read a task file, or a shipped task by its name.
+
+    Raises:
+        TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
+            cannot do the motion.
+    """
+    source = _find(path)
+    table = read_toml(source, "the task file")
+    try:
+        task = Task.model_validate(table)
+    except ValidationError as error:
+        raise TaskError(explain(error, source, Task)) from error
+    products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
+    _check_products(task, products, source)
+    regions = [*task.weight, *task.mask]
+    maps = tuple(_read_map(source.parent / region.file) for region in regions if isinstance(region, Map))
+    return LoadedTask(task=task, source=source, products=products, maps=maps)
+
+
+def shipped_tasks() -> list[str]:
+    """Names of the tasks that come with the package."""
+    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def _find(path: Path) -> Path:
+    if path.suffix == ".toml" or path.exists():
+        return path
+    named = SHIPPED / f"{path}.toml"
+    if path.parent == Path() and named.exists():
+        return named
+    raise TaskError(f"{path}: no such task file, and no shipped task of that name: {', '.join(shipped_tasks())}")
+
+
+def _check_products(task: Task, products: Catalogue, source: Path) -> None:
+    try:
+        products.get(task.sensor, Lidar)
+        products.get(task.servo, Servo)
+        products.get(task.printer, Printer)
+        ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
+    except TaskError as error:
+        raise TaskError(f"{source}: {error}") from error
+    if ring is None:
+        raise TaskError(f"{source}: slip_ring: motion.mode = 'spin' turns without end and needs a slip ring")
+    if ring.bore_mm == 0:
+        raise TaskError(
+            f"{source}: slip_ring = '{ring.name}': bore_mm = 0: a capsule ring lets no shaft through, so in "
+            "direct drive the servo cannot reach the lidar past the ring's stator; take a through-bore ring (12.7 mm)"
+        )
+
+
+def _read_map(path: Path) -> Array:
+    try:
+        if path.suffix == ".npy":
+            table = np.load(path, allow_pickle=False).astype(float)
+        elif path.suffix == ".csv":
+            table = np.loadtxt(path, delimiter=",", ndmin=2)
+        elif path.suffix == ".png":
+            from matplotlib.image import imread
+
+            picture = imread(path)  # 0..1 already, (rows, columns[, channels])
+            table = (picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)).astype(float)
+        else:
+            raise TaskError(f"{path}: a map is a .png, .csv or .npy file")
+    except (OSError, ValueError, SyntaxError) as error:
+        raise TaskError(f"{path}: cannot read the map: {error}") from error
+    if table.ndim != 2 or table.size == 0:
+        raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
+    if not np.isfinite(table).all() or (table < 0).any():
+        raise TaskError(f"{path}: a map holds weights: finite and not negative")
+    return table

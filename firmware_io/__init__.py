@@ -1,0 +1,1 @@
+"""How the scanner is run: recordings, de-skew and assembly, cloud files."""

@@ -1,0 +1,104 @@
+"""Which clock the times of an imported bag are on, and the joint log on that clock.
+
+A scan and an angle are on one clock or they cannot be joined. Header stamps are the better times (a stamp is when
+the sensor measured, a receive time is when somebody heard of it), but not every message has one, and not every
+sensor's clock is the host's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware_io.samples import Floats, JointLog, Times
+
+_SAME_CLOCK_NS = (
+    1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stamps:
+    """Times of the messages of one source, both shape (n,); a stamp is 0 where the message has none."""
+
+    stamp_ns: Times
+    receive_ns: Times
+
+    def complete(self) -> bool:
+        """Whether every message has a stamp."""
+        return bool((self.stamp_ns > 0).all())
+
+    def on_host_clock(self) -> bool:
+        """Whether the stamps could come from the clock of the receiver."""
+        delay_ns = self.receive_ns - self.stamp_ns
+        return self.complete() and bool((np.abs(delay_ns) < _SAME_CLOCK_NS).all())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OneClock:
+    """Scan and angle times on one clock; `said` is "" where both are header stamps, else what a person must know."""
+
+    scan_ns: Times
+    angle_ns: Times
+    said: str
+
+
+def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
+    """Choose the times of scans and angles, each shape (n,)."""
+    if scans.complete() and angles.complete() and _overlap(scans.stamp_ns, angles.stamp_ns):
+        return OneClock(scans.stamp_ns, angles.stamp_ns, "")
+    if scans.on_host_clock() and not angles.complete():
+        said = "angles carry no stamp: they take the time they were received, which is late by their transport"
+        return OneClock(scans.stamp_ns, angles.receive_ns, said)
+    if not angles.complete() or not scans.complete():
+        who = "angles" if scans.complete() else "scans" if angles.complete() else "scans and angles"
+        said = f"{who} carry no stamp"
+        if scans.complete():
+            said += f", and the scans' stamps are from another clock (they start at {scans.stamp_ns[0] / 1e9:.0f} s)"
+    else:
+        said = (
+            f"the stamps of scans (from {scans.stamp_ns[0] / 1e9:.0f} s) and angles (from "
+            f"{angles.stamp_ns[0] / 1e9:.0f} s) have no time in common"
+        )
+    said += ": both take the time they were received; a scan is received after its last beam, so expect a lag"
+    return OneClock(scans.receive_ns, angles.receive_ns, said)
+
+
+def unwrapped_log(time_ns: Times, angle_rad: Floats) -> JointLog:
+    """A log sorted by time, one sample per time (the first one), turns counted."""
+    one_per_time, first = np.unique(time_ns, return_index=True)
+    return JointLog(one_per_time, np.unwrap(angle_rad[first]))
+
+
+def held_log(log: JointLog, begin_ns: Times, arc_ns: Times) -> tuple[JointLog, int]:
+    """A log that stands still during each scan: two samples, at its first and at its last beam, with one angle.
+
+    The angle is the last one of `log` at or before the first beam. A scan that begins outside `log` gets no sample.
+
+    Args:
+        log: unwrapped angles.
+        begin_ns: time of the first beam of each scan, shape (n,).
+        arc_ns: from the first to the last beam of each scan, shape (n,).
+
+    Returns:
+        The log, and the number of scans that had to be cut short because the next one begins before their last beam.
+    """
+    begin_ns, first = np.unique(begin_ns, return_index=True)
+    known = (begin_ns >= log.time_ns[0]) & (begin_ns <= log.time_ns[-1])
+    begin_ns, end_ns = begin_ns[known], (begin_ns + arc_ns[first])[known]
+    angle_rad = log.position_rad[np.searchsorted(log.time_ns, begin_ns, side="right") - 1]
+    latest_ns = np.append(begin_ns[1:] - 1, end_ns[-1:])
+    both_ns = np.stack([begin_ns, np.minimum(end_ns, latest_ns)], axis=1).ravel()
+    kept = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment begins and ends at once
+    return JointLog(both_ns[kept], np.repeat(angle_rad, 2)[kept]), int(np.sum(end_ns > latest_ns))
+
+
+def times(values: Sequence[int]) -> Times:
+    """Integer nanoseconds as an array."""
+    return np.array(values, dtype=np.int64)
+
+
+def _overlap(a_ns: Times, b_ns: Times) -> bool:
+    return bool(max(a_ns.min(), b_ns.min()) <= min(a_ns.max(), b_ns.max()))

@@ -1,0 +1,70 @@
+"""Files that are whole or not there, and foreign readers whose every failure is one clear line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from design.errors import RecordingError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside `path`; rename it to `path` when the body ends well, delete it when not.
+
+    Raises:
+        RecordingError: the file cannot be written there.
+    """
+    if path.is_dir():
+        raise RecordingError(f"{path}: this is a folder; name a file in it")
+    if not path.parent.is_dir():
+        raise RecordingError(f"{path}: the folder {path.parent} does not exist")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot write: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """Return `call(...)`. The parsers of other people's bytes fail with a dozen exception types: all become one line.
+
+    Raises:
+        RecordingError: the call failed; `what` says for which file.
+    """
+    try:
+        return call(*args, **kwargs)
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"{what}: {error.strerror or _first_line(error)}") from error
+    except Exception as error:
+        raise RecordingError(f"{what}: {_first_line(error)}") from error
+
+
+def foreign_items(what: str, items: Iterable[T]) -> Iterator[T]:
+    """Pass on what a foreign reader yields; only the reader's own failures become RecordingError, not the caller's."""
+    iterator = foreign(what, iter, items)
+    while found := foreign(what, _next, iterator):
+        yield from found
+
+
+def _next(iterator: Iterator[T]) -> tuple[T] | tuple[()]:
+    """The next item in a tuple, or an empty one: StopIteration would be mistaken for a failure."""
+    for item in iterator:
+        return (item,)
+    return ()
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip() or type(error).__name__
+    return text.splitlines()[0]

@@ -1,0 +1,95 @@
+"""What the two devices said: one scan of the lidar, and the log of the servo's angle.
+
+Times are integer nanoseconds of one clock; angles are radians, ranges metres. A beam keeps its index from the
+sensor to the cloud: nothing here removes one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import RecordingError
+
+Float32s = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scan:
+    """One turn of the 2D lidar, as a LaserScan holds it.
+
+    Attributes:
+        stamp_ns: time of the first beam.
+        angle_min_rad: bearing of the first beam, counter-clockwise from the laser's x.
+        angle_increment_rad: from one beam to the next; negative for a lidar that turns clockwise.
+        time_increment_s: from one beam to the next; 0 where the sensor does not say.
+        scan_time_s: from one scan to the next; 0 where the sensor does not say.
+        range_min_m: shortest range the sensor can mean.
+        range_max_m: longest range the sensor can mean.
+        range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.
+        intensity: shape (n,), or (0,) from a sensor that measures none.
+    """
+
+    stamp_ns: int
+    angle_min_rad: float
+    angle_increment_rad: float
+    time_increment_s: float
+    scan_time_s: float
+    range_min_m: float
+    range_max_m: float
+    range_m: Float32s
+    intensity: Float32s
+
+    @property
+    def bearing_rad(self) -> Floats:
+        """Bearing of each beam in the scan plane, shape (n,)."""
+        return self.angle_min_rad + self.angle_increment_rad * np.arange(self.range_m.size, dtype=np.float64)
+
+    @property
+    def time_ns(self) -> Times:
+        """Time of each beam, shape (n,)."""
+        offset_ns = np.rint(np.arange(self.range_m.size) * (self.time_increment_s * 1e9))
+        return self.stamp_ns + offset_ns.astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointLog:
+    """Servo angles over time.
+
+    Attributes:
+        time_ns: shape (m,), strictly increasing.
+        position_rad: shape (m,), unwrapped (it counts turns), finite.
+    """
+
+    time_ns: Times
+    position_rad: Floats
+
+    def __post_init__(self) -> None:
+        if self.time_ns.shape != self.position_rad.shape or self.time_ns.ndim != 1 or not self.time_ns.size:
+            raise RecordingError(f"joint log: {self.time_ns.size} times and {self.position_rad.size} positions")
+        if not np.isfinite(self.position_rad).all():
+            raise RecordingError("joint log: a position is not a finite number")
+        if np.any(np.diff(self.time_ns) <= 0):
+            where = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
+            raise RecordingError(f"joint log: sample {where} is not later than the one before it")
+
+    def angle_at(self, time_ns: Times) -> Floats:
+        """Angle [rad] at each time, straight between samples, shape (n,).
+
+        Outside the log it is NaN: where the axis was before the first and after the last sample nobody knows.
+        """
+        if not time_ns.size:
+            return np.empty(0)
+        first, last = np.searchsorted(self.time_ns, [time_ns.min(), time_ns.max()])
+        near = slice(max(int(first) - 1, 0), int(last) + 1)
+        if not self.time_ns[near].size:
+            return np.full(time_ns.size, np.nan)
+        # Epoch nanoseconds do not fit a float64 (they lose 256 ns), differences do.
+        origin_ns = self.time_ns[near][0]
+        known_ns = (self.time_ns[near] - origin_ns).astype(float)
+        asked_ns = (time_ns - origin_ns).astype(float)
+        return np.interp(asked_ns, known_ns, self.position_rad[near], left=np.nan, right=np.nan)
