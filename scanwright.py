@@ -77,7 +77,7 @@ def build(
         folder.write_manifest(work, loaded, [asdict(part) for part in made.parts])
     _print_optimum(result, standard)
     for finding in made.findings:
-        print(f"{finding.severity}: {finding.subject}: {finding.message}")
+        print(f"{finding.severity}: {finding.message}")
     print(f"wrote {len(folder.manifest_of(target)['files'])} files to {target}")
 
 
@@ -220,11 +220,11 @@ def catalogue(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
 ) -> None:
     """List the products that a task can name, or one of them with the source of every value."""
-    from design.catalogue import Product, load_catalogue
+    from design.catalogue import load_catalogue
 
     products = load_catalogue()
     if name is not None:
-        product = products.get(name, Product)
+        product = products.named(name)
         print(f"{product.name} ({product.maker})")
         for field, origin in product.provenance().items():
             mark = " " if origin.verified else "?"

@@ -40,6 +40,7 @@ class Provenance(Record):
 class Product(Record):
     """Base of the catalogue records: name, maker, and the provenance of each value."""
 
+    kind: str
     name: str
     maker: str
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
@@ -151,12 +152,7 @@ class Printer(Product):
 
 
 P = TypeVar("P", Lidar, Servo, SlipRing, Printer)
-KINDS: dict[str, type[Lidar] | type[Servo] | type[SlipRing] | type[Printer]] = {
-    "lidar": Lidar,
-    "servo": Servo,
-    "slip_ring": SlipRing,
-    "printer": Printer,
-}
+KINDS: dict[str, type[Product]] = {"lidar": Lidar, "servo": Servo, "slip_ring": SlipRing, "printer": Printer}
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,8 +170,19 @@ class Catalogue:
         product = self.products.get(name)
         if not isinstance(product, kind):
             known = [other.name for other in self.products.values() if isinstance(other, kind)]
-            raise TaskError(f"'{name}' is no {_title(kind)} of the catalogue{suggest(name, known)}")
+            title = next(word for word, record in KINDS.items() if record is kind).replace("_", " ")
+            raise TaskError(f"'{name}' is no {title} of the catalogue{suggest(name, known)}")
         return product
+
+    def named(self, name: str) -> Product:
+        """The product of that name, of whatever kind.
+
+        Raises:
+            TaskError: no such product; the message suggests the nearest name.
+        """
+        if name not in self.products:
+            raise TaskError(f"'{name}' is not in the catalogue{suggest(name, self.products)}")
+        return self.products[name]
 
     def __iter__(self) -> Iterator[Product]:
         """Products in the order of their kinds, then names."""
@@ -242,7 +249,3 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 def _shipped() -> dict[str, Product]:
     products = [load_product(path) for path in sorted(SHIPPED.glob("*.toml"))]
     return {product.name: product for product in products}
-
-
-def _title(kind: type[Product]) -> str:
-    return {Lidar: "lidar", Servo: "servo", SlipRing: "slip ring", Printer: "printer"}[kind]  # type: ignore[index]

@@ -1,0 +1,121 @@
+"""`scanwright build` from end to end, and the build folder."""
+
+import hashlib
+import json
+import sys
+
+import pytest
+
+import scanwright
+from design.angles import load_angles
+from design.build import fresh_folder, is_current, rounded_to_error
+from design.errors import BuildError
+from design.task import load_task
+
+FILES = {
+    "task.toml",
+    "angles.json",
+    "search.csv",
+    "density.png",
+    "assembly.step",
+    "scanner.urdf",
+    "left_out.json",
+    "manifest.json",
+    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in ("servo_shaft", "alignment_linkage")),
+    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in ("slip_ring_adapter", "base_mount")),
+}
+
+
+def build(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["scanwright", "build", *map(str, words)])
+    with pytest.raises(SystemExit) as stop:
+        scanwright.run()
+    assert not stop.value.code
+
+
+@pytest.fixture(scope="module")
+def ceiling(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        out = tmp_path_factory.mktemp("builds")
+        build(patch, "ceiling", "--out", out)
+    return out / "ceiling"
+
+
+def test_a_build_is_complete_and_its_manifest_true(ceiling):
+    made = {path.relative_to(ceiling).as_posix() for path in ceiling.rglob("*") if path.is_file()}
+    assert made == FILES
+    manifest = json.loads((ceiling / "manifest.json").read_text())
+    assert set(manifest["files"]) == FILES - {"manifest.json"}
+    for name, facts in manifest["files"].items():
+        content = (ceiling / name).read_bytes()
+        assert (hashlib.sha256(content).hexdigest(), len(content)) == (facts["sha256"], facts["bytes"])
+    assert not list(ceiling.parent.glob(".*"))
+
+
+def test_the_angle_set_is_the_optimum_of_its_task(ceiling):
+    angles = load_angles(ceiling / "angles.json")
+    assert (angles.angles_deg.alpha_rot, angles.angles_deg.beta_rot) == (180, 0)
+    assert angles.task_sha256 == load_task(ceiling / "task.toml").sha256() == load_task(_shipped("ceiling")).sha256()
+    assert angles.J < -5.5
+    assert angles.t_world_rot_mm[2] < -80  # hangs: the deck is above the lidar's sweep
+
+
+def test_a_second_run_does_no_work_and_says_so(ceiling, monkeypatch, capsys):
+    before = {path: path.stat().st_mtime_ns for path in ceiling.rglob("*")}
+    build(monkeypatch, "ceiling", "--out", ceiling.parent)
+    assert "nothing has changed" in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in ceiling.rglob("*")} == before
+
+
+def test_the_resolved_task_builds_the_same(ceiling):
+    assert is_current(ceiling, load_task(ceiling / "task.toml"))
+
+
+def test_a_touched_file_is_no_current_build(ceiling):
+    loaded = load_task(ceiling / "task.toml")
+    table = ceiling / "search.csv"
+    kept = table.read_bytes()
+    table.write_bytes(kept + b"\n")
+    assert not is_current(ceiling, loaded)
+    table.write_bytes(kept)
+    assert is_current(ceiling, loaded)
+
+
+def test_a_build_that_fails_leaves_the_last_one_alone(tmp_path):
+    target = tmp_path / "task"
+    target.mkdir()
+    (target / "recording.mcap").write_bytes(b"mine")
+    with pytest.raises(RuntimeError), fresh_folder(target) as work:
+        (work / "angles.json").write_text("half")
+        raise RuntimeError
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["recording.mcap"]
+
+
+def test_what_the_last_build_had_and_this_one_has_not_is_removed(tmp_path):
+    target = tmp_path / "task"
+    for files in (["a.txt", "b.txt"], ["a.txt"]):
+        with fresh_folder(target) as work:
+            for name in files:
+                (work / name).write_text(name)
+            (work / "manifest.json").write_text(json.dumps({"files": {name: {} for name in files}}))
+    assert sorted(path.name for path in target.iterdir()) == ["a.txt", "manifest.json"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(BuildError, match="cannot write the build folder"), fresh_folder(tmp_path / "file" / "task"):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [(-6.128414, 5.5e-5, (-6.12841, 6e-5)), (1.0, 0.0, (1.0, 0.0)), (-5.29596, 9.96e-5, (-5.29596, 1e-4))],
+)
+def test_a_figure_is_rounded_to_its_error(value, error, expected):
+    assert rounded_to_error(value, error) == pytest.approx(expected, abs=1e-12)
+
+
+def _shipped(name):
+    from design.task import SHIPPED
+
+    return SHIPPED / f"{name}.toml"
