@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cad.deck import deck_of
-from cad.findings import Finding, LeftOut
+from cad.findings import Finding
 from cad.kernel import require_kernel
 from cad.remarks import findings_of, left_out_of
 from cad.sizing import stack_of
 from design.errors import BuildError
+from design.left_out import LeftOut
 from design.scanner import Scanner
 
 if TYPE_CHECKING:

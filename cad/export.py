@@ -22,6 +22,7 @@ UNORDERED = ("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION",)
 
 _TOKEN = re.compile(r"'(?:[^']|'')*'|#\d+")
 _COUNTER = re.compile(r"Open CASCADE STEP translator [\d.]+ [\d.]+")
+_OCCURRENCE = re.compile(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\()'\d+',('(?:[^']|'')*')")
 
 
 def step_text(assembly: cq.Assembly, title: str) -> str:
@@ -45,6 +46,8 @@ def canonical_step(text: str) -> str:
     head = re.sub(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[^']*'", f"'{TIME_STAMP}'", head)
     head = _COUNTER.sub("Open CASCADE STEP translator", head)
     bodies = _entities(_COUNTER.sub("Open CASCADE STEP translator", data))
+    # the id of an occurrence counts through the process: its name, unique in our assemblies, serves
+    bodies = {key: _OCCURRENCE.sub(r"\1\2,\2", body) for key, body in bodies.items()}
     references = {key: [int(t[1:]) for t in _TOKEN.findall(body) if t[0] == "#"] for key, body in bodies.items()}
     digest = _digests(bodies, references)
     for key, body in bodies.items():

@@ -1,4 +1,4 @@
-"""What a build says beside its files: findings for a person to read, and what was left out and why."""
+"""What a build says beside its files: findings for a person to read."""
 
 from __future__ import annotations
 
@@ -14,12 +14,3 @@ class Finding:
     severity: Literal["note", "warning"]
     subject: str
     message: str
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """Something that this scanner does not need. `saved` counts what was not made, never seconds."""
-
-    what: str
-    reason: str
-    saved: str

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cad.deck import Deck
-from cad.findings import Finding, LeftOut
+from cad.findings import Finding
 from cad.screws import SCREWS
 from cad.sizing import Stack
 from design.catalogue import Product
+from design.left_out import LeftOut
 from design.scanner import Scanner
 
 if TYPE_CHECKING:
@@ -91,9 +92,9 @@ def left_out_of(scanner: Scanner, deck: Deck) -> tuple[LeftOut, ...]:
     """Parts that this scanner does not need."""
     out = []
     if scanner.slip_ring is None:
-        out.append(LeftOut("slip_ring_adapter", "this scanner has no slip ring", "1 part"))
+        out.append(LeftOut("slip_ring_adapter", "this scanner has no slip ring", 1, "parts"))
     if deck.flat:
-        out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", "1 part"))
+        out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)
 
 
@@ -109,8 +110,8 @@ def _covered(assembly: Assembly) -> list[Finding]:
             "screw_under_hub",
             "warning",
             "alignment_linkage",
-            f"alignment_linkage: the hub covers the lidar's screw at {named} mm: use the other "
-            f"{len(assembly.linkage.holes) - len(covered)}, or a key with a ball end",
+            f"alignment_linkage: the hub covers the lidar's screw at {named} mm of its base: use the other "
+            f"{len(assembly.linkage.holes) - len(covered)}",
         )
     ]
 

@@ -17,10 +17,11 @@ import tomli_w
 
 from design.angles import STANDARD_DEG, Angles, AngleSet
 from design.errors import BuildError
+from design.families import Family
 from design.frames import Array
 from design.left_out import LeftOut
 from design.objective import Problem
-from design.search import Family, SearchResult
+from design.search import SearchResult
 from design.sphere import spiral
 from design.task import LoadedTask, Map
 

@@ -7,7 +7,7 @@ finite sum: exact, region edges included.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from design.parallel import in_chunks
 from design.task import All, Band, Cone, LoadedTask, Map
 
 ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
-EDGE = 1e-12  # edges are inclusive: a direction this close to one [rad, or cosine] lies on it
+EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,25 +58,22 @@ class Field:
 
     def on_circles(self, axis: Array, polar_rad: Array) -> tuple[Array, Array]:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
-        means = self._circles(_frame_about(axis))
-        parts = in_chunks(lambda chunk: means(polar_rad[chunk]), len(polar_rad))
-        return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+        numbers = self._numbers()
+        frame = _frames_about(axis[None])
+        parts = in_chunks(lambda chunk: _circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
+        return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
 
     def on_circles_about(self, axes: Array, polar_rad: Array) -> Array:
         """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
-        parts = in_chunks(
-            lambda chunk: np.stack([self._circles(_frame_about(axis))(polar_rad)[0] for axis in axes[chunk]]),
-            len(axes),
-            smallest=1,
-        )
+        numbers = self._numbers()
+        frames = _frames_about(axes)
+        parts = in_chunks(lambda chunk: _circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
         return np.concatenate(parts)
 
-    def _circles(self, frame: Array) -> Callable[[Array], tuple[Array, Array]]:
+    def _numbers(self) -> tuple[Array, Array, Array, Array, Array, float]:
         weight, mask = self.weight, self.mask
         planes = np.concatenate([weight.planes, mask.planes])
-        return lambda polar: _circle_means(
-            frame, polar, planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
-        )
+        return planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
 
 
 def field_of(loaded: LoadedTask) -> Field:
@@ -97,7 +94,9 @@ def _layers(regions: Sequence[All | Band | Cone | Map], maps: list[Array]) -> La
             rows.append([ALL, 0, 0, 0, 0, 0, 0, region.value])
         elif isinstance(region, Band):
             theta, phi = np.radians(region.theta_deg), np.radians(region.phi_deg)
-            rows.append([BAND, *theta, phi[0], phi[1] - phi[0], 0, 0, region.value])
+            middle, half = (phi[0] + phi[1]) / 2, (phi[1] - phi[0]) / 2
+            around = [np.cos(middle), np.sin(middle), np.cos(half)]
+            rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, region.value])
             planes.append(_edges_of_band(theta, phi))
         elif isinstance(region, Cone):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
@@ -129,12 +128,12 @@ def _edges_of_map(rows: int, columns: int) -> Array:
     return np.concatenate([across, along])
 
 
-def _frame_about(axis: Array) -> Array:
-    """Rows e1, e2, axis: right-handed, orthonormal."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    e1 = np.cross(axis, helper)
-    e1 /= np.linalg.norm(e1)
-    return np.stack([e1, np.cross(axis, e1), axis])
+def _frames_about(axes: Array) -> Array:
+    """Rows e1, e2, axis for each axis (n, 3): right-handed, orthonormal, shape (n, 3, 3)."""
+    helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
+    e1 = np.cross(axes, helper)
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    return np.stack([e1, np.cross(axes, e1), axes], axis=1)
 
 
 def _stack(tables: list[Array]) -> Array:
@@ -163,14 +162,14 @@ def _value(x: float, y: float, z: float, rows: Array, tables: Array, background:
             if x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE:
                 return row[7]
             continue
-        theta = np.arctan2(np.hypot(x, y), z)
-        phi = np.arctan2(y, x)
         if kind == BAND:
-            if row[1] - EDGE <= theta <= row[2] + EDGE:
-                beyond = (phi - row[3] + EDGE) % (2 * np.pi)
-                if beyond <= row[4] + 2 * EDGE:
+            if row[1] - EDGE <= z <= row[2] + EDGE:
+                ahead = x * row[3] + y * row[4]
+                if ahead >= row[5] * np.sqrt(x * x + y * y) - EDGE:
                     return row[7]
             continue
+        theta = np.arctan2(np.sqrt(x * x + y * y), z)
+        phi = np.arctan2(y, x)
         height, width = int(row[2]), int(row[3])
         r = min(int(theta / np.pi * height), height - 1)
         c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
@@ -187,8 +186,23 @@ def _values(directions: Array, rows: Array, tables: Array, background: float) ->
 
 
 @njit(cache=True, nogil=True)
+def _sort(values: Array, n: int) -> None:
+    """Sort the first n values in place: by insertion while they are few, as on nearly every circle."""
+    if n > 32:
+        values[:n] = np.sort(values[:n])
+        return
+    for i in range(1, n):
+        value = values[i]
+        j = i - 1
+        while j >= 0 and values[j] > value:
+            values[j + 1] = values[j]
+            j -= 1
+        values[j + 1] = value
+
+
+@njit(cache=True, nogil=True)
 def _circle_means(
-    frame: Array,
+    frames: Array,
     polar: Array,
     planes: Array,
     weight_rows: Array,
@@ -197,41 +211,48 @@ def _circle_means(
     mask_tables: Array,
     background: float,
 ) -> tuple[Array, Array]:
-    """Mean weight (0 where masked) and unmasked share on each circle, from the crossings with all edge planes."""
-    weights, shares = np.empty(len(polar)), np.empty(len(polar))
+    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles)."""
+    weights = np.empty((len(frames), len(polar)))
+    shares = np.empty((len(frames), len(polar)))
     cuts = np.empty(2 * len(planes) + 1)
-    for i in range(len(polar)):
-        st, ct = np.sin(polar[i]), np.cos(polar[i])
-        n = 0
-        for m in planes:
-            a = st * (m[0] * frame[0, 0] + m[1] * frame[0, 1] + m[2] * frame[0, 2])
-            b = st * (m[0] * frame[1, 0] + m[1] * frame[1, 1] + m[2] * frame[1, 2])
-            c = m[3] - ct * (m[0] * frame[2, 0] + m[1] * frame[2, 1] + m[2] * frame[2, 2])
-            r = np.hypot(a, b)
-            if r > abs(c):
-                middle, half = np.arctan2(b, a), np.arccos(c / r)
-                cuts[n] = (middle - half) % (2 * np.pi)
-                cuts[n + 1] = (middle + half) % (2 * np.pi)
-                n += 2
-        if n == 0:
-            cuts[0] = 0.0
-            n = 1
-        ordered = np.sort(cuts[:n])
-        weight, share = 0.0, 0.0
-        for j in range(n):
-            after = ordered[j + 1] if j + 1 < n else ordered[0] + 2 * np.pi
-            arc = after - ordered[j]
-            if arc <= 0.0:
-                continue
-            p = 0.5 * (ordered[j] + after)
-            u, v = st * np.cos(p), st * np.sin(p)
-            x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
-            y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]
-            z = u * frame[0, 2] + v * frame[1, 2] + ct * frame[2, 2]
-            if _value(x, y, z, mask_rows, mask_tables, 0.0) > 0.0:
-                continue
-            share += arc
-            weight += arc * _value(x, y, z, weight_rows, weight_tables, background)
-        weights[i] = weight / (2 * np.pi)
-        shares[i] = share / (2 * np.pi)
+    inside = np.empty((len(planes), 3))
+    for f in range(len(frames)):
+        frame = frames[f]
+        for k in range(len(planes)):
+            for axis in range(3):
+                m = planes[k]
+                inside[k, axis] = m[0] * frame[axis, 0] + m[1] * frame[axis, 1] + m[2] * frame[axis, 2]
+        for i in range(len(polar)):
+            st, ct = np.sin(polar[i]), np.cos(polar[i])
+            n = 0
+            for k in range(len(planes)):
+                a, b = st * inside[k, 0], st * inside[k, 1]
+                c = planes[k, 3] - ct * inside[k, 2]
+                r = np.sqrt(a * a + b * b)
+                if r > abs(c):
+                    middle, half = np.arctan2(b, a), np.arccos(c / r)
+                    cuts[n] = (middle - half) % (2 * np.pi)
+                    cuts[n + 1] = (middle + half) % (2 * np.pi)
+                    n += 2
+            if n == 0:
+                cuts[0] = 0.0
+                n = 1
+            _sort(cuts, n)
+            weight, share = 0.0, 0.0
+            for j in range(n):
+                after = cuts[j + 1] if j + 1 < n else cuts[0] + 2 * np.pi
+                arc = after - cuts[j]
+                if arc <= 0.0:
+                    continue
+                p = 0.5 * (cuts[j] + after)
+                u, v = st * np.cos(p), st * np.sin(p)
+                x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
+                y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]
+                z = u * frame[0, 2] + v * frame[1, 2] + ct * frame[2, 2]
+                if _value(x, y, z, mask_rows, mask_tables, 0.0) > 0.0:
+                    continue
+                share += arc
+                weight += arc * _value(x, y, z, weight_rows, weight_tables, background)
+            weights[f, i] = weight / (2 * np.pi)
+            shares[f, i] = share / (2 * np.pi)
     return weights, shares

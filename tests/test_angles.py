@@ -56,7 +56,9 @@ def written(tmp_path, value):
     return path
 
 
-@given(st.tuples(degrees, degrees, degrees, degrees), st.tuples(degrees, degrees), st.tuples(*[st.floats(-500, 500)] * 3))
+@given(
+    st.tuples(degrees, degrees, degrees, degrees), st.tuples(degrees, degrees), st.tuples(*[st.floats(-500, 500)] * 3)
+)
 def test_the_json_text_reads_back_as_the_same_record(angles, delta, lever):
     one = angle_set(angles, delta_rotvec_rot_deg=delta, t_rot_laser_mm=lever, J=-5.1, J_error=1e-4)
     assert AngleSet.model_validate_json(one.to_json()) == one

@@ -9,7 +9,7 @@ from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.scanner import scanner_of
 
-CASES = [(0, -90), (90, 0), (60, -45), (-20, -70), (45, -30), (0, 0)]
+CASES = [(0, -90), (60, -45), (0, 0)]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=str)

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cad.deck import deck_of, mount_offset_mm
@@ -73,6 +73,7 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     assert len(linkage_of(scanner, stack).clamp_azimuths) == 2
 
 
+@settings(deadline=None)
 @given(alpha=degrees, beta=degrees)
 def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     scanner = scanner_for(alpha, beta)
@@ -82,6 +83,7 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     assert stack.spigot_top > stack.hub_bottom > stack.ring_top > stack.ring_bottom > stack.horn
 
 
+@settings(deadline=None)
 @given(alpha=turns, beta=degrees, alpha_laser=degrees, beta_laser=degrees)
 def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
     scanner = scanner_for(alpha_laser, beta_laser, alpha_rot=alpha, beta_rot=beta)
@@ -147,7 +149,7 @@ def test_no_kernel_exception_reaches_the_user_bare():
 
 
 def test_a_missing_libgl_names_the_package(monkeypatch):
-    def fail(name):
+    def fail(_name):
         raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
 
     monkeypatch.setattr("cad.kernel.importlib.import_module", fail)

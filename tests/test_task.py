@@ -200,7 +200,13 @@ def test_no_weight_at_all_and_no_background_is_an_empty_region(tmp_path):
 def test_a_missing_file_a_folder_and_bytes_are_one_line(tmp_path):
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "latin.toml").write_bytes(b"\xff\xfe")
-    for path in (tmp_path / "none.toml", tmp_path / "none", tmp_path, tmp_path / "folder.toml", tmp_path / "latin.toml"):
+    for path in (
+        tmp_path / "none.toml",
+        tmp_path / "none",
+        tmp_path,
+        tmp_path / "folder.toml",
+        tmp_path / "latin.toml",
+    ):
         with pytest.raises(TaskError) as caught:
             load_task(path)
         assert str(path) in str(caught.value)
@@ -278,9 +284,7 @@ def test_the_grid_of_an_angle_holds_both_limits(tmp_path, lines, expected):
 
 
 MANY_REGIONS = (
-    ahead('catalogue = ["capsule.toml", "my ring.toml"]')
-    .replace("UH1256-02-0610-06S", "MINE")
-    .replace("18.0", "2.7")
+    ahead('catalogue = ["capsule.toml", "my ring.toml"]').replace("UH1256-02-0610-06S", "MINE").replace("18.0", "2.7")
     + """
 [angles]
 alpha_rot_deg = [-30, 33.3]
@@ -400,5 +404,5 @@ def test_a_map_has_theta_down_and_phi_to_the_right_and_its_values_in_the_cells(t
         for column, phi in enumerate((60, 180, 300)):
             for t in (theta - 40, theta, theta + 40):
                 for p in (phi - 59, phi, phi + 59, phi - 360):
-                    expected = 10 * levels[row, column] / scale
+                    expected = 10 * float(levels[row, column]) / scale
                     assert field.weight_at(direction(t, p)) == pytest.approx(expected, rel=1e-6), (t, p)

@@ -70,7 +70,7 @@ def test_meshes_are_found_beside_the_file_and_are_metres(built):
 
 
 def test_masses_add_up_and_inertias_are_those_of_bodies(built):
-    angles, folder, result = built
+    _, folder, result = built
     mass = {}
     for link in ElementTree.parse(folder / "scanner.urdf").getroot().iter("link"):
         if link.get("name") == "world":

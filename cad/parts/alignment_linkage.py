@@ -27,6 +27,7 @@ PART = "alignment_linkage"
 FAR = 200.0  # beyond any linkage
 CLAMP_SCREW = SCREWS["M3"]
 CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
+HEEL = 8.0  # how far the neck reaches below a lying plate
 RETRIES = 5
 
 
@@ -133,7 +134,8 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
         body = body.fuse(hub).cut(*lidar_room, *free)
         body = checked(body, PART, "hub", "h", f"{stack.h} mm")
     with building(PART, "holes and marks", "h", f"{stack.h} mm"):
-        holes = [solids.upright(p.screw_hole / 2, p.seat - 30.0, p.seat + 1.0, *hole).moved(laser) for hole in p.holes]
+        under = p.seat - PLATE_THICKNESS - 2.0
+        holes = [solids.upright(p.screw_hole / 2, under, p.seat + 1.0, *hole).moved(laser) for hole in p.holes]
         marks = [shape.moved(laser) for shape in _plate_marks(p)]
         body = body.cut(*holes, *marks, *_clamps(p), _index_groove(p), _bore(p)).clean()
         body = checked(body, PART, "holes and marks", "h", f"{stack.h} mm")
@@ -159,7 +161,18 @@ def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     outline = solids.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
     for z in (p.seat - 0.2, p.seat - PLATE_THICKNESS + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
+    layers.append(_heel(np.concatenate(layers[2:]), stack))
     return solids.hull(np.concatenate(layers))
+
+
+def _heel(plate: Array, stack: Stack) -> Array:
+    """The lower half of the plate's corners, moved down: else a lying plate hangs on a wedge that ends in an edge."""
+    lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
+    if len(lower) == 0:
+        return plate
+    tilt_sine = math.hypot(stack.R()[2, 0], stack.R()[2, 1])
+    room = float(lower[:, 2].min()) - stack.hub_bottom - 2.0
+    return lower - [0.0, 0.0, max(0.0, min(HEEL * tilt_sine**2, room))]
 
 
 def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
