@@ -127,6 +127,7 @@ def evaluate(
     import numpy as np
 
     from design.coverage import coverage
+    from design.gaps import gaps
     from design.objective import problem_of, score
     from design.oracle import ball_score
     from design.task import load_task
@@ -137,6 +138,7 @@ def evaluate(
     _say("closed form")
     result = score(problem, setting)
     seen = coverage(problem, setting)
+    lines = gaps(problem, setting)
     _say("ball search, 8 start phases")
     ball = ball_score(problem, setting)
     facts = {
@@ -149,6 +151,7 @@ def evaluate(
         "blind_weight_fraction": result.blind_weight,
         "masked_fraction": seen.masked_fraction,
         "min_density": result.least,
+        **asdict(lines),
     }
     if cloud is not None:
         from design.beams import simulated_scan
@@ -165,6 +168,13 @@ def evaluate(
     print(f"blind          {seen.blind_fraction:.2%} of the unmasked sphere, {result.blind_weight:.2%} of the weight")
     print(f"masked         {seen.masked_fraction:.2%} of the sphere")
     print(f"min_density    {result.least} beams per ball, lowest in the weighted region at any start phase")
+    for cone in lines.blind_cones:
+        x, y, z = cone.axis_world
+        print(f"blind cone     {cone.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})")
+    print(f"line gap       {lines.line_gap_deg:.3f} deg at the widest, {lines.line_gap_mm(10):.0f} mm at 10 m")
+    crossing = "" if lines.crossing_deg is None else f", lines crossing at {lines.crossing_deg:.0f} deg on average"
+    print(f"seen twice     {lines.seen_twice:.1%} of the weight{crossing}")
+    print(f"half a turn    misses {lines.half_turn_misses:.1%} of the weight that a full turn sees")
     if cloud is not None:
         print(f"wrote {problem.lines.count * len(problem.bearings_rad):,} points to {cloud}")
 

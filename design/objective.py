@@ -104,7 +104,7 @@ def score(problem: Problem, angles_rad: Array, nodes: int = NODES) -> Score:
     Raises:
         TaskError: no direction has a weight.
     """
-    rule, polar, azimuth = _rule(problem, angles_rad, nodes)
+    rule, polar, azimuth = rule_of(problem, angles_rad, nodes)
     total = rule.fine.sum()
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.g)
     by_segment = np.bincount(rule.segment, (rule.fine - rule.coarse) * z.mean_g)
@@ -120,13 +120,17 @@ def score(problem: Problem, angles_rad: Array, nodes: int = NODES) -> Score:
 
 def quick_J(problem: Problem, angles_rad: Array, nodes: int) -> float:
     """J alone, as `score` computes it: for searches that call it often."""
-    rule, polar, azimuth = _rule(problem, angles_rad, nodes)
+    rule, polar, azimuth = rule_of(problem, angles_rad, nodes)
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.g)
     return float(rule.fine @ z.mean_g / rule.fine.sum())
 
 
-def _rule(problem: Problem, angles_rad: Array, nodes: int) -> tuple[PolarRule, Array, Array]:
-    """Quadrature for one setting, and the polar angles and azimuths of its beams."""
+def rule_of(problem: Problem, angles_rad: Array, nodes: int) -> tuple[PolarRule, Array, Array]:
+    """Quadrature for one setting, and the polar angles and azimuths of its beams.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
     rule = _grid_rule(problem, axis) if problem.grid_step_deg else _circle_rule(problem, axis, polar, nodes)
