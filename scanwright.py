@@ -179,6 +179,73 @@ def evaluate(
         print(f"wrote {problem.lines.count * len(problem.bearings_rad):,} points to {cloud}")
 
 
+@app.command()
+def accuracy(
+    task: TaskFile,
+    stress: Annotated[bool, typer.Option("--stress", help="The table of stiff and extreme cases instead.")] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one folder of reports per task.")] = Path(
+        "out/accuracy"
+    ),
+) -> None:
+    """Report error against run time of every way to compute J, at the optimum of a task."""
+    from design import accuracy_report as report
+    from design.accuracy import measure, on_front
+    from design.objective import problem_of
+    from design.stress import stress_rows
+    from design.task import load_task
+
+    loaded = load_task(task)
+    folder = out / loaded.task.name
+    if stress:
+        _say("stiff and extreme cases")
+        rows = stress_rows(loaded, problem_of(loaded))
+        folder.mkdir(parents=True, exist_ok=True)
+        report.write_rows(folder / "stress.csv", rows)
+        for row in rows:
+            mark = "ok  " if row.passed else "FAIL"
+            print(f"{mark} {row.case:58} {row.quantity:15} expected {row.expected:.8g}, off by {row.error:.1e}")
+        failed = sum(not row.passed for row in rows)
+        print(f"{len(rows) - failed} of {len(rows)} within what is allowed; wrote {folder / 'stress.csv'}")
+        raise typer.Exit(1 if failed else 0)
+    problem, _, result = _optimise(loaded)
+    truth, points = measure(problem, result.best[0].angles_rad, _say)
+    folder.mkdir(parents=True, exist_ok=True)
+    report.write_points(folder / "work_precision.csv", points, truth)
+    report.work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {_title(loaded)}")
+    print(f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}")
+    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+        seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
+        print(f"{'*' if front else ' '} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
+    print(f"* nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}")
+
+
+@app.command()
+def compare(
+    task: TaskFile,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder that holds one folder of comparisons per task.")
+    ] = Path("out/compare"),
+    as_json: AsJson = False,
+) -> None:
+    """Put the optimum of a task beside the usual mounts and ready-made scanners: table, CSV and picture."""
+    from design import compare as comparison
+    from design.compare_picture import compare_picture
+    from design.task import load_task
+
+    loaded = load_task(task)
+    with comparison.report_folder(out / loaded.task.name) as folder:
+        problem, _, result = _optimise(loaded)
+        rows = comparison.compare(loaded, problem, result.best[0], _say)
+        comparison.write_csv(folder / "compare.csv", rows)
+        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {_title(loaded)}, and what else there is")
+    if as_json:
+        _print_json({"task": loaded.task.name, "rows": [asdict(row) for row in rows]})
+        return
+    for line in [*comparison.table(rows), *comparison.notes(loaded)]:
+        print(line)
+    print(f"wrote compare.csv and compare.png to {out / loaded.task.name}")
+
+
 @app.command("import")
 def import_(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],

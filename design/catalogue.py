@@ -1,4 +1,4 @@
-"""Products that a scanner is made of: lidars, servos, slip rings, printers.
+"""Products that a scanner is made of, lidars, servos, slip rings, printers, and ready-made ones to compare it with.
 
 One TOML file per product. Every value is written with its source and whether it was verified:
 
@@ -140,6 +140,26 @@ class SlipRing(Product):
     price_usd: float | None = Field(default=None, gt=0)
 
 
+class Multibeam(Product):
+    """A ready-made 3D lidar: layers at fixed elevations that turn about z, upright; azimuth 0 ahead, 90 to the left."""
+
+    kind: Literal["multibeam"]
+    elevations_deg: tuple[float, ...] = Field(min_length=2)
+    azimuth_deg: Pair
+    turn_rate_hz: float = Field(gt=0)
+    azimuth_step_deg: float = Field(gt=0, description="between two measurements of one layer at turn_rate_hz")
+    points_per_second: float = Field(gt=0)
+    price_usd: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _angles_rise(self) -> Multibeam:
+        if not (np.diff([-90.0, *self.elevations_deg, 90.0]) > 0).all():
+            raise ValueError("elevations_deg do not rise within -90 .. 90")
+        if not self.azimuth_step_deg <= self.azimuth_deg[1] - self.azimuth_deg[0] <= 360:
+            raise ValueError(f"azimuth_deg {list(self.azimuth_deg)} does not rise by azimuth_step_deg to 360")
+        return self
+
+
 class Printer(Product):
     """How a part is made, and what that costs in millimetres."""
 
@@ -151,8 +171,14 @@ class Printer(Product):
     density_g_cm3: float = Field(gt=0)
 
 
-P = TypeVar("P", Lidar, Servo, SlipRing, Printer)
-KINDS: dict[str, type[Product]] = {"lidar": Lidar, "servo": Servo, "slip_ring": SlipRing, "printer": Printer}
+P = TypeVar("P", Lidar, Servo, SlipRing, Printer, Multibeam)
+KINDS: dict[str, type[Product]] = {
+    "lidar": Lidar,
+    "servo": Servo,
+    "slip_ring": SlipRing,
+    "printer": Printer,
+    "multibeam": Multibeam,
+}
 
 
 @dataclass(frozen=True, slots=True)

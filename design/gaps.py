@@ -120,7 +120,11 @@ def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
 
 def _blind_cones(u: Array, beam_polar: Array) -> tuple[BlindCone, ...]:
     cones = [(u, float(beam_polar.min())), (-u, float(np.pi - beam_polar.max()))]
-    found = [BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h))) for a, h in cones if h > 1e-9]
+    found = [
+        BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h)))
+        for a, h in cones
+        if h > 1e-9
+    ]
     return tuple(sorted(found, key=lambda cone: -cone.half_angle_deg))
 
 

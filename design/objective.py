@@ -9,6 +9,7 @@ of the nodes is inside the full one, and their difference measures the error.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from design.regions import Field, field_of
 from design.sphere import equal_angle_grid
 from design.task import LoadedTask
 
+FRONT = Path(__file__).parent / "front.csv"
 NODES = 6561  # per setting, spread over the segments
 SAFETY = 3  # the full rule is at least this much nearer than its third: 7 to 25 times in benchmarks/objective.py
 ROUNDING = 1e-6  # floor of the stated error
@@ -39,6 +41,8 @@ class Problem:
     g: Array
     grid_step_deg: float | None
     """Step of the paper's equal-angle sum, or None for solid angles."""
+    nodes: int = NODES
+    """Quadrature nodes of a score, from the task's `tolerance` or `budget_s`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +99,37 @@ def problem_of(loaded: LoadedTask) -> Problem:
         field=field_of(loaded),
         g=log_density(np.arange(lines.count * len(bearings) + 1.0)),
         grid_step_deg=density.grid_step_deg if density.quadrature == "equal_angle" else None,
+        nodes=nodes_for(density.tolerance, density.budget_s),
     )
 
 
-def score(problem: Problem, angles_rad: Array, nodes: int = NODES) -> Score:
-    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+def nodes_for(tolerance: float | None, budget_s: float | None) -> int:
+    """The cheapest nodes that keep a tolerance of J, or the most that a budget pays for, from the measured front.
+
+    `design/front.csv` is the front; `benchmarks/front.py` measures it.
+
+    Raises:
+        TaskError: nothing on the front is that near, or that fast.
+    """
+    if tolerance is None and budget_s is None:
+        return NODES
+    front = np.loadtxt(FRONT, delimiter=",", skiprows=1)
+    paid = front[front[:, 2] <= (np.inf if budget_s is None else budget_s)]
+    if not len(paid):
+        raise TaskError(f"density.budget_s = {budget_s:g}: the fastest score takes {front[:, 2].min():g} s")
+    near = paid[paid[:, 1] <= (np.inf if tolerance is None else tolerance)]
+    if not len(near):
+        raise TaskError(f"density.tolerance = {tolerance:g}: the nearest that can be had is {paid[:, 1].min():g}")
+    return int(near[-1, 0] if tolerance is None else near[0, 0])
+
+
+def score(problem: Problem, angles_rad: Array, nodes: int | None = None) -> Score:
+    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], on the nodes of the problem by default.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    rule, polar, azimuth = rule_of(problem, angles_rad, nodes)
+    rule, polar, azimuth = rule_of(problem, angles_rad, problem.nodes if nodes is None else nodes)
     total = rule.fine.sum()
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.g)
     by_segment = np.bincount(rule.segment, (rule.fine - rule.coarse) * z.mean_g)
@@ -176,7 +201,7 @@ def _circle_rule(problem: Problem, axis: Array, beam_polar_rad: Array, nodes: in
 def _density_breaks(beam_polar_rad: Array, ball_rad: float) -> Array:
     """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends."""
     marks = np.array([beam_polar_rad.min(), beam_polar_rad.max(), beam_polar_rad[0], beam_polar_rad[-1]])
-    return _fold(np.concatenate([marks - ball_rad, marks, marks + ball_rad]))
+    return np.concatenate([marks - ball_rad, marks, marks + ball_rad])
 
 
 def _fold(polar_rad: Array) -> Array:
@@ -185,10 +210,15 @@ def _fold(polar_rad: Array) -> Array:
     return np.where(beyond > np.pi, 2 * np.pi - beyond, beyond)
 
 
-def _weighted_segments(field: Field, axis: Array, more_breaks: Array) -> list[tuple[float, float]]:
-    """Ranges of the polar angle between breaks, those of weight zero left out."""
+def breaks_of(field: Field, axis: Array, more_rad: Array) -> Array:
+    """Polar angles about an axis where the circle mean of the weight breaks, with some more, sorted, 0 to pi."""
     of_field = _breaks(np.concatenate([field.weight.planes, field.mask.planes]), axis)
-    breaks = np.unique(np.round(np.concatenate([of_field, more_breaks]), 12))
+    return np.unique(np.round(np.concatenate([of_field, _fold(more_rad)]), 12))
+
+
+def _weighted_segments(field: Field, axis: Array, more_rad: Array) -> list[tuple[float, float]]:
+    """Ranges of the polar angle between breaks, those of weight zero left out."""
+    breaks = breaks_of(field, axis, more_rad)
     middles = (breaks[:-1] + breaks[1:]) / 2
     means, _ = field.on_circles(axis, middles)
     return [(a, b) for a, b, m in zip(breaks[:-1], breaks[1:], means, strict=True) if m > 0 and b - a > 1e-12]

@@ -49,7 +49,7 @@ def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions
     chord = 2 * np.sin(problem.ball_rad / 2)
     estimates = []
     for i, phase in enumerate(start_phases(problem.lines.count, problem.lines.step_rad)):
-        for samples in _sample_sets(problem, directions // SETS, SETS * i):
+        for samples in sample_sets(problem, directions // SETS, SETS * i):
             turned = samples.directions @ rotvec_to_matrix(axis * phase)  # rows times R(phase): columns turned back
             counts = tree.query_ball_point(turned, chord, return_length=True, workers=-1)
             estimates.append(samples.weights @ log_density(counts) / samples.weights.sum())
@@ -65,7 +65,7 @@ def start_phases(lines: int, step_rad: float) -> Array:
     return step_rad * (np.round(i * lines / PHASES) + (i + 0.5) / PHASES)
 
 
-def _sample_sets(problem: Problem, directions: int, first: int) -> list[Samples]:
+def sample_sets(problem: Problem, directions: int, first: int) -> list[Samples]:
     """Sets of directions that share no ring of the spiral: no two shall cut the region's edges in the same way."""
     if problem.grid_step_deg:
         grid = equal_angle_grid(problem.grid_step_deg)

@@ -69,6 +69,8 @@ class DensityRules(Record):
     background: Value = 0.0
     quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
     grid_step_deg: float = Field(default=1.0, ge=0.25, le=10)
+    tolerance: float | None = Field(default=None, gt=0, description="error of J that is good enough")
+    budget_s: float | None = Field(default=None, gt=0, description="time that one J may take")
 
 
 class All(Record):
@@ -100,7 +102,7 @@ class Cone(Record):
 
     shape: Literal["cone"]
     axis: tuple[float, float, float]
-    half_angle_deg: float = Field(gt=0, le=180)
+    half_angle_deg: float = Field(ge=1e-3, le=180)
     value: Value = 1.0
 
     @field_validator("axis")

@@ -57,9 +57,7 @@ def random_pair(seed):
     weight = [random_region(rng) for _ in range(rng.integers(1, 4))]
     mask = [random_region(rng) for _ in range(rng.integers(0, 2))]
     maps = [
-        rng.random((rng.integers(1, 7), rng.integers(1, 10))).round(1)
-        for r in [*weight, *mask]
-        if r["shape"] == "map"
+        rng.random((rng.integers(1, 7), rng.integers(1, 10))).round(1) for r in [*weight, *mask] if r["shape"] == "map"
     ]
     if any(r["shape"] == "map" for r in mask):
         maps[-1] = (maps[-1] > 0.6).astype(float)
@@ -170,7 +168,7 @@ def test_equal_angle_is_the_literal_sum_of_the_paper():
             above += w * zones(t, *beams, p.lines, p.ball_rad, p.g).mean_g[0]
             below += w
     one = score(p, setting)
-    assert one.J == pytest.approx(above / below, abs=1e-9)
+    assert pytest.approx(above / below, abs=1e-9) == one.J
     assert abs(score(replace(p, grid_step_deg=None), setting).J - one.J) > 1e-3, "the poles weigh more on that grid"
 
 
@@ -178,7 +176,7 @@ def test_equal_angle_on_a_ring_of_ties_is_right():
     """One row of the grid, on the scan plane itself: 1081 beams x 720 lines x 4 deg / 360 deg at every phase."""
     row = {"shape": "band", "theta_deg": [90, 90]}
     p = problem([row], period_s=18.0, quadrature="equal_angle")
-    assert score(p, np.zeros(4)).J == pytest.approx(-log(1 + 8648), abs=1e-5)
+    assert pytest.approx(-log(1 + 8648), abs=1e-5) == score(p, np.zeros(4)).J
 
 
 @pytest.mark.parametrize("seed", [1, 2, 7, 11])
@@ -188,7 +186,7 @@ def test_the_scale_of_the_weights_does_not_matter(seed):
     rows[:, 7] *= 7.5
     field = replace(p.field, weight=replace(p.field.weight, rows=rows), background=7.5 * p.field.background)
     one, other = score(p, setting), score(replace(p, field=field), setting)
-    assert other.J == pytest.approx(one.J, abs=1e-12)
+    assert pytest.approx(one.J, abs=1e-12) == other.J
     assert other.J_error == pytest.approx(one.J_error, rel=1e-6)
 
 
@@ -202,7 +200,7 @@ def test_turning_the_task_and_the_axis_together_changes_nothing(turn_deg, settin
     alpha, beta = degrees(atan2(-axis[1], axis[2])), degrees(np.arcsin(np.clip(axis[0], -1, 1)))
     before = score(problem([ALL | {"value": 0.1}, BAND], mask=[CONE]), np.radians(setting_deg))
     after = score(problem([ALL | {"value": 0.1}, band], mask=[cone]), np.radians([alpha, beta, *setting_deg[2:]]))
-    assert after.J == pytest.approx(before.J, abs=1e-4)
+    assert pytest.approx(before.J, abs=1e-4) == after.J
 
 
 def test_masked_directions_leave_the_sum_and_the_normaliser():

@@ -66,7 +66,7 @@ def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name, monk
     J = np.array([quick_J(problem, setting, 486) for setting in np.radians(settings)])
     leaders = [score(problem, np.radians(settings[i])) for i in np.argsort(J)[:15]]
     best = min(leaders, key=lambda s: s.J)
-    assert found.best[0].score.J == pytest.approx(best.J, abs=best.J_error + found.best[0].score.J_error)
+    assert pytest.approx(best.J, abs=best.J_error + found.best[0].score.J_error) == found.best[0].score.J
     assert any(np.allclose(found.best[0].angles_deg, setting, atol=1e-9) for setting in settings)
     for family in found.best:
         again = score(problem, family.angles_rad)
@@ -75,21 +75,23 @@ def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name, monk
     # the table of scan planes: lowest J over all axes; a bound where it cannot win, right within MARGIN where it can
     by_plane = J.reshape(-1, len(found.planes)).min(axis=0)
     np.testing.assert_array_equal(found.planes[:, :2], settings[: len(found.planes), 2:])
-    assert (found.planes[:, 2] <= by_plane + landscape.MARGIN).all()
+    assert (found.planes[:, 2] - by_plane).max() <= landscape.MARGIN
     winner = np.argmin(by_plane)
     assert found.planes[winner, 2] == pytest.approx(by_plane[winner], abs=landscape.MARGIN)
     named = np.radians(found.planes[winner, [3, 4, 0, 1]])
-    assert score(problem, named).J == pytest.approx(by_plane[winner], abs=landscape.MARGIN)
+    assert pytest.approx(by_plane[winner], abs=landscape.MARGIN) == score(problem, named).J
 
 
-@pytest.mark.parametrize("name", ["all four free", "a fan without symmetry", "scan plane fixed"])
-def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(name, monkeypatch):
+@pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX"])
+def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor, monkeypatch):
+    """Every direction has a weight here and none like its mirror image, so nothing but symmetry makes J equal."""
     monkeypatch.setattr(families, "REFINE_ROUNDS", ())
-    problem, ranges = CASES[name]
-    best = search(problem, ranges).best[0]
+    uneven = {"weight": [{"shape": "all", "value": 0.2}, LEFT["weight"][0]]}
+    problem, ranges = case(uneven, {"step_deg": 45}, sensor=sensor, period_s=4.0)
+    best = search(problem, ranges).best
     J = np.array([quick_J(problem, setting, 486) for setting in np.radians(every_setting(ranges))])
-    at_best = quick_J(problem, best.angles_rad, 486)
-    assert best.members == (np.abs(J - at_best) < 1e-7).sum()
+    for family in best[:3]:
+        assert family.members == (np.abs(J - quick_J(problem, family.angles_rad, 486)) < 1e-7).sum()
 
 
 @pytest.mark.parametrize("ball_radius_deg", [0.25, 0.5, 1.0])
@@ -98,7 +100,7 @@ def test_the_coarse_J_of_the_search_is_no_further_off_than_its_margin(ball_radiu
     """`MARGIN` decides which scan planes are never looked at: small balls and fast turns included."""
     problem, ranges = case(AHEAD, {"step_deg": 30}, period_s=period_s, ball_radius_deg=ball_radius_deg)
     planes = search(problem, ranges).planes
-    lowest = planes[np.argsort(planes[:, 2])[:10]]
+    lowest = planes[planes[:, 2] <= planes[:, 2].min() + landscape.MARGIN][:40]  # all of them exact and no bound
     off = [row[2] - score(problem, np.radians(row[[3, 4, 0, 1]])).J for row in lowest]
     assert np.abs(off).max() <= landscape.MARGIN
 
@@ -108,7 +110,7 @@ def test_where_every_direction_counts_the_same_any_axis_is_as_good():
     found = search(problem, ranges)
     assert {family.word for family in found.best} == {"any axis"}
     J = [family.score.J for family in found.best]
-    assert J == sorted(J)
+    assert sorted(J) == J
     assert np.diff(J).min() > 1e-5, "one family per J"
     axes = len(ranges.grid_deg("alpha_rot")) * len(ranges.grid_deg("beta_rot"))
     assert all(family.members % axes == 0 for family in found.best)
