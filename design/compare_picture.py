@@ -49,7 +49,7 @@ def compare_picture(path: Path, rows: list[Row], title: str) -> None:
         J.text(-row.J, place, f" {-row.J + 0.0:.2f}", va="center", fontsize=8)
     J.set_yticks(range(len(names)), [f"{name}\n{_times(rows, name)}" for name in names], fontsize=8)
     J.invert_yaxis()
-    J.set_xlabel("-J: mean of ln(1 + beams per ball)\nlonger is better; hatched: one turn")
+    J.set_xlabel("-J: mean of ln(1 + beams per ball)\nlonger is better; hatched: in the shorter time")
     blind.set_xlabel("never seen, share of\nthe task's weight [%]")
     gap.set_xlabel("widest gap between\nlines or layers [deg]")
     cost.set_xlabel("lidar, servo, slip ring, or\nscanner [thousand USD]")
