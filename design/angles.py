@@ -44,7 +44,7 @@ class Spin(Record):
     """Continuous rotation at constant speed."""
 
     mode: Literal["spin"] = "spin"
-    period_s: float = Field(gt=0, le=3600, description="time of one full turn of the servo")
+    period_s: float = Field(strict=True, gt=0, le=600, description="time of one full turn of the servo")
 
 
 class AngleSet(Record):

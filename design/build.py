@@ -183,7 +183,7 @@ def standard_settings() -> dict[str, Array]:
 
 
 def _bring(folder: Path, source: Path, prefix: str) -> str:
-    name = f"{prefix}-{source.name}"
+    name = f"{prefix}{source.suffix}"
     shutil.copyfile(source, folder / name)
     return name
 

@@ -196,7 +196,7 @@ class Catalogue:
         product = self.products.get(name)
         if not isinstance(product, kind):
             known = [other.name for other in self.products.values() if isinstance(other, kind)]
-            title = next(word for word, record in KINDS.items() if record is kind).replace("_", " ")
+            title = next((word for word, record in KINDS.items() if record is kind), "product").replace("_", " ")
             raise TaskError(f"'{name}' is no {title} of the catalogue{suggest(name, known)}")
         return product
 
@@ -237,7 +237,7 @@ def load_product(path: Path) -> Product:
     """
     table = read_toml(path, "the catalogue file")
     kind = table.get("kind")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise TaskError(f"{path}: kind = {kind!r}: not a kind of product{suggest(str(kind), KINDS)}")
     values: dict[str, Any] = {}
     provenance: dict[str, Provenance] = {}
@@ -246,6 +246,8 @@ def load_product(path: Path) -> Product:
             values[key] = entry
         elif isinstance(entry, dict) and entry.keys() == {"value", "source", "verified"}:
             values[key] = entry["value"]
+            if not isinstance(entry["source"], str) or not isinstance(entry["verified"], bool):
+                raise TaskError(f"{path}: {key}: source is a text, verified is true or false")
             provenance[key] = Provenance(source=entry["source"], verified=entry["verified"])
         else:
             raise TaskError(f'{path}: {key}: write it as {{ value = ..., source = "...", verified = true }}')
@@ -267,7 +269,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
         raise TaskError(f"{path}: not a TOML file: {error}") from error
 
 

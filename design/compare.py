@@ -41,12 +41,13 @@ from design.families import Family
 from design.frames import Array
 from design.gaps import gaps
 from design.landscape import Progress
-from design.objective import NODES, SAFETY, Problem, Score, log_density, rule_of, score
+from design.objective import NODES, Problem, Score, log_density, rule_of, score, score_on
 from design.oracle import sample_sets
 from design.search import search
 from design.sphere import spiral
 from design.task import AngleRanges, LoadedTask
 
+LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations
 SEARCHED = {
     "Bonn, 45 deg": AngleRanges(alpha_rot_deg=180, beta_rot_deg=45, alpha_laser_deg=90, beta_laser_deg=(-90, -45)),
@@ -271,11 +272,8 @@ def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, flo
     elevations = np.radians(product.elevations_deg)
     counts = np.arange(lines.count * len(elevations) + 1.0)
     fan = replace(problem, bearings_rad=elevations, lines=lines, g=log_density(turns * counts))
-    judged = score(fan, UPRIGHT_RAD, NODES)
-    J, half = (
-        judged.J,
-        SAFETY * judged.J_error,
-    )  # every layer has its edges: the full rule may be no nearer than its third
+    judged = score_on(fan, UPRIGHT_RAD, NODES)
+    J, half = judged.J, LAYERED * judged.J_error
     if turns > 1:
         rule, polar, _ = rule_of(fan, UPRIGHT_RAD, NODES)
         lower = log_density(turns * mean_count(rule.polar_rad, polar, lines, problem.ball_rad))

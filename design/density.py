@@ -22,6 +22,7 @@ from design.beams import Lines
 from design.frames import Array
 from design.parallel import in_chunks
 
+TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 
 
@@ -169,6 +170,7 @@ def _zones(
                 mean[i] += count
                 continue
             mean[i] += count * half / np.pi
+            balance = 2 * half * count / turn
             for side in range(2):
                 # the window of line 0 opens at p_b - delta_b and closes at p_b + delta_b, that of line k k steps on
                 edge = (beam_azimuth[b] + (2 * side - 1) * half) % turn
@@ -176,51 +178,51 @@ def _zones(
                 gap = int(edge / step)
                 if regular:
                     at[steps], rise[steps], low[steps], high[steps] = edge - gap * step, sign, 0, 0
+                    balance -= sign * count * (1 - at[steps] / step) * (step / turn)
                     steps += 1
                     continue
-                # lines before the turn is full: gaps from that of the edge on
-                at[steps], rise[steps], low[steps], high[steps] = edge - gap * step, sign, gap, count - 1
-                steps += 1
-                # the other lines come round again: their grid is shifted by the short gap
-                passed = int(np.ceil((turn - edge) / step - 1e-12))
-                if passed < count:
-                    again = edge + passed * step - turn
-                    gap = int(again / step)
-                    in_gap = max(again - gap * step, 0.0)
-                    at[steps], rise[steps], low[steps] = in_gap, sign, gap
-                    high[steps] = gap + (count - 1 - passed)
+                # lines before the turn is full: gaps from that of the edge on; then they come round again, on a grid
+                # that is shifted by the short gap
+                passed = min(count, int(np.ceil((turn - edge) / step - 1e-12)))
+                for lines, start in ((passed, edge), (count - passed, max(edge + passed * step - turn, 0.0))):
+                    if lines == 0:
+                        continue
+                    gap = int(start / step)
+                    at[steps], rise[steps] = start - gap * step, sign
+                    low[steps], high[steps] = gap, gap + lines - 1
+                    balance -= sign * (lines * (turn - start) - step * lines * (lines - 1) / 2) / turn
                     steps += 1
-            level += _lines_open(beam_azimuth[b] - half, 2 * half, count, step)
+            # what the mean count leaves when all steps are done is open from the start, whatever ties with what
+            level += int(np.round(balance))
         order = np.argsort(at[:steps])
         lowest, highest = level, level
         total = 0.0
-        for gap_index in range(gaps):
+        gap_index = 0
+        while gap_index < gaps:
             width = step if regular else min(step, turn - gap_index * step)
-            here = 0.0
+            here, before, sum_before = 0.0, level, total
+            same_until = gaps
             for k in order:
-                if low[k] <= gap_index <= high[k] and at[k] < width:
-                    if at[k] > here:
-                        total += g[level] * (at[k] - here)
-                        here = at[k]
-                        lowest, highest = min(lowest, level), max(highest, level)
-                    level += rise[k]
+                if low[k] > gap_index:
+                    same_until = min(same_until, low[k])
+                elif high[k] >= gap_index:
+                    same_until = min(same_until, high[k] + 1)
+                    if at[k] < width:
+                        if at[k] > here:
+                            total += g[level] * (at[k] - here)
+                            if at[k] - here > TIE * step:
+                                lowest, highest = min(lowest, level), max(highest, level)
+                            here = at[k]
+                        level += rise[k]
             total += g[level] * (width - here)
-            lowest, highest = min(lowest, level), max(highest, level)
+            if width - here > TIE * step:
+                lowest, highest = min(lowest, level), max(highest, level)
+            gap_index += 1
+            # the gaps that follow with the same steps, and no more open than before, are this one again
+            again = min(same_until, gaps - 1) - gap_index
+            if level == before and again > 0:
+                total += again * (total - sum_before)
+                gap_index += again
         mean_g[i] = total / (step if regular else turn)
         least[i], most[i] = lowest, highest
     return mean_g, mean, least, most
-
-
-@njit(cache=True, nogil=True)
-def _lines_open(edge: float, width: float, count: int, step: float) -> int:
-    """Lines whose window [edge + k step, edge + k step + width) holds azimuth 0 (modulo the turn)."""
-    turn = 2 * np.pi
-    # 0 lies in the window of line k where k step lies in (-edge - width, -edge], modulo the turn
-    upper = (-edge) % turn
-    lower = upper - width
-    inside = min(int(np.floor(upper / step)), count - 1) - int(np.floor(lower / step)) if lower >= 0 else 0
-    if lower < 0:
-        inside = min(int(np.floor(upper / step)), count - 1) + 1
-        wrapped = lower + turn  # lines in (lower + turn, turn)
-        inside += max(count - 1 - int(np.floor(wrapped / step)), 0)
-    return max(inside, 0)

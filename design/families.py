@@ -146,10 +146,10 @@ def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) ->
         if not any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
             refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2])
             again = score(problem, np.radians(refined))
-            if again.J + again.J_error < grid_score.J:
-                families.append(_family(refined, again, leader))
-            else:  # the rounder angles of the grid are as good
+            if again.J + again.J_error >= grid_score.J:  # the rounder angles of the grid are as good
                 families.append(_family(leader.angles_deg, grid_score, leader))
+            elif not any(_same_valley(refined, again.J, better) for better in families):
+                families.append(_family(refined, again, leader))
     for leader in leaders:
         if len(families) == FAMILIES:
             break

@@ -84,8 +84,6 @@ def _fold(settings: Array, points: Array, mirrors: Array) -> Folded:
     straight, turned = numbers[0].min(axis=0), numbers[1].min(axis=0)
     _, first, classes = np.unique(np.minimum(straight, turned), return_index=True, return_inverse=True)
     flip = (turned < straight) != (turned < straight)[first][classes]
-    own_mirror = straight == turned  # such a point is its own turned image: it serves as both
     has = np.zeros((2, len(first)), dtype=bool)
     has[flip.astype(int), classes] = True
-    has[:, classes[own_mirror]] = True
     return Folded(settings, points, classes, flip, first, has)

@@ -19,15 +19,15 @@ from design.density import mean_count, zones
 from design.errors import TaskError
 from design.folding import Folded, Mask
 from design.frames import Array
-from design.objective import EMPTY, MANY_EDGES, Problem, log_density
+from design.objective import MANY_EDGES, Problem, log_density
 from design.parallel import in_chunks
-from design.sphere import Samples, equal_angle_grid, weighted_samples
+from design.sphere import EMPTY, Samples, equal_angle_grid, weighted_samples
 
 FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
-CIRCLES = 720, 180  # on which the weight is measured about each of few axes, of many
+MOST_NODES = 1441  # for balls below half a degree
 BATCH = 64  # planes whose exact densities are computed before the bound is asked again
 DIRECTIONS = 20_000  # that stand for a map, where circles would be slower
-MARGIN = 2e-2  # what the coarse J of the search may be off by
+MARGIN = 0.15  # what the coarse J of the search may be off by: 0.134 was seen, for a ball of 0.5 deg
 REPORT = 1000  # planes between two lines of progress
 PIECE = 128  # planes per piece of the product
 SCOUTS = 1500  # axes that tell how low a plane's bound comes, before all are visited
@@ -67,7 +67,9 @@ def landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progr
     The others keep their bound, g of the mean count: it is above the best by more than the search may be off.
     """
     few = len(axes.first) <= FEW_AXES
-    nodes, circles = (361, CIRCLES[0]) if few else (181, CIRCLES[1])
+    # caustics are as wide as the ball: a node every quarter of it, and every 0.5 deg at least
+    nodes = min(MOST_NODES, int(max(360, 4 * np.pi / problem.ball_rad)) + 1) if few else 181
+    circles = max(nodes - 1, 720 - 720 % (nodes - 1)) if few else nodes - 1
     polar = np.linspace(0, np.pi, nodes)
     weights = _weights_over_polar(problem, axes.representatives, nodes, circles)
     shown = np.radians(planes.settings_deg[planes.first])

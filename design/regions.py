@@ -18,6 +18,7 @@ from design.parallel import in_chunks
 from design.task import All, Band, Cone, LoadedTask, Map
 
 ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
+SPHERE = [0.0, 0.0, 1.0, np.pi]
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
 
@@ -27,11 +28,13 @@ class Layers:
 
     `rows`: (kind, six parameters, value) of each region, in painting order, shape (regions, 8).
     `planes`: (m, c) of each edge, shape (edges, 4). `tables`: the maps, padded to one shape, (maps, rows, columns).
+    `caps`: for each region with a value above 0 a cap that holds it, (direction, angular radius), shape (caps, 4).
     """
 
     rows: Array
     planes: Array
     tables: Array
+    caps: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +62,14 @@ class Field:
     def on_circles(self, axis: Array, polar_rad: Array) -> tuple[Array, Array]:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
         numbers = self._numbers()
-        frame = _frames_about(axis[None])
+        frame = frames_about(axis[None])
         parts = in_chunks(lambda chunk: _circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
         return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
 
     def on_circles_about(self, axes: Array, polar_rad: Array) -> Array:
         """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
         numbers = self._numbers()
-        frames = _frames_about(axes)
+        frames = frames_about(axes)
         parts = in_chunks(lambda chunk: _circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
         return np.concatenate(parts)
 
@@ -89,7 +92,9 @@ def _layers(regions: Sequence[All | Band | Cone | Map], maps: list[Array]) -> La
     rows: list[list[float]] = []
     planes = [np.empty((0, 4))]
     tables: list[Array] = []
+    caps: list[list[float]] = []
     for region in regions:
+        cap = SPHERE
         if isinstance(region, All):
             rows.append([ALL, 0, 0, 0, 0, 0, 0, region.value])
         elif isinstance(region, Band):
@@ -98,17 +103,37 @@ def _layers(regions: Sequence[All | Band | Cone | Map], maps: list[Array]) -> La
             around = [np.cos(middle), np.sin(middle), np.cos(half)]
             rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, region.value])
             planes.append(_edges_of_band(theta, phi))
+            cap = _cap_of_band(theta, middle, half)
         elif isinstance(region, Cone):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
-            half = np.cos(np.radians(region.half_angle_deg))
-            rows.append([CONE, *axis, half, 0, 0, region.value])
-            planes.append(np.array([[*axis, half]]))
+            half_angle = np.radians(region.half_angle_deg)
+            rows.append([CONE, *axis, np.cos(half_angle), 0, 0, region.value])
+            planes.append(np.array([[*axis, np.cos(half_angle)]]))
+            cap = [*axis, half_angle]
         else:
             table = maps.pop(0)
             rows.append([MAP, len(tables), *table.shape, 0, 0, 0, region.value])
             tables.append(table)
             planes.append(_edges_of_map(*table.shape))
-    return Layers(np.array(rows, dtype=float).reshape(-1, 8), np.concatenate(planes), _stack(tables))
+        if region.value > 0:
+            caps.append(cap)
+    return Layers(
+        np.array(rows, dtype=float).reshape(-1, 8),
+        np.concatenate(planes),
+        _stack(tables),
+        np.array(caps, dtype=float).reshape(-1, 4),
+    )
+
+
+def _cap_of_band(theta: Array, middle: float, half: float) -> list[float]:
+    """A cap about the middle of a band, or about a pole where the band goes more than half around."""
+    if half > np.pi / 2:
+        return [0.0, 0.0, 1.0, theta[1]] if theta[1] <= np.pi - theta[0] else [0.0, 0.0, -1.0, np.pi - theta[0]]
+    t, p = np.meshgrid(np.linspace(theta[0], theta[1], 33), np.linspace(-half, half, 33))
+    points = np.stack([np.sin(t) * np.cos(middle + p), np.sin(t) * np.sin(middle + p), np.cos(t)], axis=-1)
+    centre = points[16, 16]
+    reach = np.arctan2(np.linalg.norm(np.cross(points, centre), axis=-1), points @ centre).max()
+    return [*centre, float(min(np.pi, 1.05 * reach + 1e-9))]
 
 
 def _edges_of_band(theta: Array, phi: Array) -> Array:
@@ -128,7 +153,7 @@ def _edges_of_map(rows: int, columns: int) -> Array:
     return np.concatenate([across, along])
 
 
-def _frames_about(axes: Array) -> Array:
+def frames_about(axes: Array) -> Array:
     """Rows e1, e2, axis for each axis (n, 3): right-handed, orthonormal, shape (n, 3, 3)."""
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
     e1 = np.cross(axes, helper)

@@ -8,10 +8,11 @@ import numpy as np
 
 from design.errors import TaskError
 from design.frames import Array
-from design.regions import Field
+from design.regions import SPHERE, Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
-FIRST_LOOK = 1_000_000  # directions looked at to find the region; a region of one degree still catches 19 of them
+MOST_LOOKS = 1_000_000  # directions looked at in one cap
+EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,43 +42,38 @@ def equal_angle_grid(step_deg: float) -> Array:
 
 
 def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0) -> Samples:
-    """At least about `wanted` directions of equal solid angle that cover the weighted region.
+    """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
 
-    Directions of weight zero are left out; a small region is covered by a spiral of its own.
+    Every painted region has a cap that holds it, and gets a spiral of its own in what the caps before it leave.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    count = wanted
-    for count in (4 * wanted, FIRST_LOOK):
-        found = _hits(field, spiral(count, turn_rad))
-        share = len(found.weights) / count
-        if len(found.weights) >= wanted:
-            return found
-        if share > 1e-2:
-            return _hits(field, spiral(int(wanted / share), turn_rad))
-    if not len(found.weights):
+    caps = field.weight.caps if field.background == 0 else np.vstack([field.weight.caps, SPHERE])
+    found = [_in_cap(field, caps, i, wanted // len(caps) + 1, turn_rad) for i in range(len(caps))]
+    if not any(len(samples.weights) for samples in found):
         raise TaskError(
-            "weight: the region is empty: no direction has a weight above 0 outside the masks; "
-            "widen theta_deg, phi_deg or half_angle_deg, or set density.background"
+            f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
         )
-    centre = found.directions.mean(axis=0)
-    centre /= np.linalg.norm(centre)
-    spacing = 2 * np.sqrt(np.pi / count)
-    reach = min(np.pi, float(np.arccos(np.clip(found.directions @ centre, -1, 1)).max()) + 2 * spacing)
-    share = len(found.weights) / count * 2 / (1 - np.cos(reach))
-    return _hits(field, spiral(int(wanted / share), turn_rad, reach) @ _z_to(centre).T, (1 - np.cos(reach)) / 2)
+    return Samples(
+        np.concatenate([samples.directions for samples in found]),
+        np.concatenate([samples.weights for samples in found]),
+    )
 
 
-def _hits(field: Field, directions: Array, share: float = 1.0) -> Samples:
-    weights = field.weight_at(directions)
-    hit = weights > 0
-    return Samples(directions[hit], weights[hit] * (4 * np.pi * share / len(directions)))
-
-
-def _z_to(axis: Array) -> Array:
-    """A rotation that takes z to `axis`, shape (3, 3)."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    e1 = np.cross(helper, axis)
-    e1 /= np.linalg.norm(e1)
-    return np.stack([e1, np.cross(axis, e1), axis], axis=1)
+def _in_cap(field: Field, caps: Array, index: int, wanted: int, turn_rad: float) -> Samples:
+    """Weighted directions in one cap and in none before it; denser until there are enough, or it is given up."""
+    centre, reach = caps[index, :3], float(caps[index, 3])
+    to_centre = frames_about(centre[None])[0]
+    count = wanted
+    while True:
+        directions = spiral(count, turn_rad, reach) @ to_centre
+        new = np.ones(count, dtype=bool)
+        for before in caps[:index]:
+            new &= directions @ before[:3] < np.cos(before[3])
+        weights = np.where(new, field.weight_at(directions), 0.0)
+        hits = int((weights > 0).sum())
+        if hits >= wanted or count >= MOST_LOOKS:
+            solid_angle = 2 * np.pi * (1 - np.cos(reach)) / count
+            return Samples(directions[weights > 0], weights[weights > 0] * solid_angle)
+        count = min(MOST_LOOKS, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)

@@ -15,8 +15,9 @@ from design.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density import mean_count, zones
 from design.errors import TaskError
 from design.frames import Array
-from design.objective import EMPTY, Problem, log_density, quick_J, score
+from design.objective import Problem, log_density, quick_J, score
 from design.regions import field_of
+from design.sphere import EMPTY
 from design.task import All, LoadedTask, Task
 
 PIECE_NODES = 8

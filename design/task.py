@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, Strict, ValidationError, field_validator, model_validator
 
 from design.angles import Spin
 from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
@@ -22,13 +22,16 @@ from design.record import Record, explain
 
 SHIPPED = Path(__file__).parent / "tasks"
 
-Limits = tuple[float, float]
-Angle = float | Limits
+Number = Annotated[float, Strict()]
+"""An int or a float of the file; text and true are no numbers."""
+
+Limits = tuple[Number, Number]
+Angle = Number | Limits
 """One value fixes the angle; two are the range to search, in degrees."""
 
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
 
-Value = Annotated[float, Field(ge=0)]
+Value = Annotated[Number, Field(ge=0)]
 
 
 class AngleRanges(Record):
@@ -38,7 +41,7 @@ class AngleRanges(Record):
     beta_rot_deg: Angle = (-90.0, 90.0)
     alpha_laser_deg: Angle = (-90.0, 90.0)
     beta_laser_deg: Angle = (-90.0, 90.0)
-    step_deg: float = Field(default=5.0, ge=0.5, le=45)
+    step_deg: Number = Field(default=5.0, ge=0.5, le=45)
 
     @model_validator(mode="after")
     def _within_bounds(self) -> AngleRanges:
@@ -64,13 +67,20 @@ class AngleRanges(Record):
 class DensityRules(Record):
     """How density is counted and judged; see `design.md`, Definitions."""
 
-    ball_radius_deg: float = Field(default=2.0, ge=0.01, le=90)
+    ball_radius_deg: Number = Field(default=2.0, ge=0.01, le=90)
     objective: Literal["log"] = "log"
     background: Value = 0.0
     quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
-    grid_step_deg: float = Field(default=1.0, ge=0.25, le=10)
-    tolerance: float | None = Field(default=None, gt=0, description="error of J that is good enough")
-    budget_s: float | None = Field(default=None, gt=0, description="time that one J may take")
+    grid_step_deg: Number = Field(default=1.0, ge=0.25, le=10)
+    tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
+    budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
+
+    @field_validator("grid_step_deg")
+    @classmethod
+    def _divides_the_half_circle(cls, step: float) -> float:
+        if abs(180 / step - round(180 / step)) > 1e-9:
+            raise ValueError("the grid reaches theta = 180 only with a step that divides 180")
+        return step
 
 
 class All(Record):
@@ -101,15 +111,18 @@ class Cone(Record):
     """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
 
     shape: Literal["cone"]
-    axis: tuple[float, float, float]
-    half_angle_deg: float = Field(ge=1e-3, le=180)
+    axis: tuple[Number, Number, Number]
+    half_angle_deg: Number = Field(ge=1e-3, le=180)
     value: Value = 1.0
 
     @field_validator("axis")
     @classmethod
     def _has_a_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
-        if not np.linalg.norm(axis) > 0:
+        longest = max(abs(x) for x in axis)
+        if longest == 0:
             raise ValueError("an axis of length zero has no direction")
+        if not 1e-100 < longest < 1e100:
+            raise ValueError("an axis of such length has no direction that can be computed: scale it")
         return axis
 
 
@@ -174,7 +187,10 @@ class LoadedTask:
 
     def sha256(self) -> str:
         """Digest of all that decides the result: the task, its maps, and the records of its products."""
-        parts = [json.dumps(self.task.model_dump(mode="json", exclude={"catalogue"}), sort_keys=True)]
+        task = self.task.model_dump(mode="json", exclude={"catalogue"})
+        for region in [*task["weight"], *task["mask"]]:
+            region.pop("file", None)  # what is in it counts, not what it is called
+        parts = [json.dumps(task, sort_keys=True)]
         names = [self.task.sensor, self.task.servo, self.task.slip_ring, self.task.printer]
         parts += [self.products.products[name].model_dump_json() for name in names if name]
         digest = hashlib.sha256("\n".join(parts).encode())
@@ -209,7 +225,7 @@ def shipped_tasks() -> list[str]:
 
 
 def _find(path: Path) -> Path:
-    if path.suffix == ".toml" or path.exists():
+    if path.suffix == ".toml" or path.is_file():
         return path
     named = SHIPPED / f"{path}.toml"
     if path.parent == Path() and named.exists():
@@ -218,13 +234,17 @@ def _find(path: Path) -> Path:
 
 
 def _check_products(task: Task, products: Catalogue, source: Path) -> None:
+    field = "sensor"
     try:
         products.get(task.sensor, Lidar)
+        field = "servo"
         products.get(task.servo, Servo)
+        field = "printer"
         products.get(task.printer, Printer)
+        field = "slip_ring"
         ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
     except TaskError as error:
-        raise TaskError(f"{source}: {error}") from error
+        raise TaskError(f"{source}: {field}: {error}") from error
     if ring is None:
         raise TaskError(f"{source}: slip_ring: motion.mode = 'spin' turns without end and needs a slip ring")
     if ring.bore_mm == 0:
@@ -236,21 +256,28 @@ def _check_products(task: Task, products: Catalogue, source: Path) -> None:
 
 def _read_map(path: Path) -> Array:
     try:
-        if path.suffix == ".npy":
-            table = np.load(path, allow_pickle=False).astype(float)
-        elif path.suffix == ".csv":
-            table = np.loadtxt(path, delimiter=",", ndmin=2)
-        elif path.suffix == ".png":
-            from matplotlib.image import imread
-
-            picture = imread(path)  # 0..1 already, (rows, columns[, channels])
-            table = (picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)).astype(float)
-        else:
-            raise TaskError(f"{path}: a map is a .png, .csv or .npy file")
-    except (OSError, ValueError, SyntaxError) as error:
+        table = _map_table(path)
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
         raise TaskError(f"{path}: cannot read the map: {error}") from error
+    if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
+        raise TaskError(f"{path}: a map is one table of real numbers")
     if table.ndim != 2 or table.size == 0:
         raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
     if not np.isfinite(table).all() or (table < 0).any():
         raise TaskError(f"{path}: a map holds weights: finite and not negative")
-    return table
+    return table.astype(float)
+
+
+def _map_table(path: Path) -> Any:
+    if path.suffix == ".npy":
+        with path.open("rb") as file:  # an archive of tables would keep it open
+            return np.load(file, allow_pickle=False)
+    if path.suffix == ".csv":
+        text = path.read_text(encoding="utf-8")
+        return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
+    if path.suffix == ".png":
+        from matplotlib.image import imread
+
+        picture = imread(path)  # 0..1 already, (rows, columns[, channels])
+        return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
+    raise TaskError(f"{path}: a map is a .png, .csv or .npy file")
