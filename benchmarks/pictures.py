@@ -1,6 +1,7 @@
 """The pictures of README, made from a build and from a real recording.
 
     uv run scanwright build ground_ahead
+    uv run scanwright accuracy ground_ahead
     SCANWRIGHT_DATA=... uv run python -m benchmarks.pictures out/ground_ahead
 
 Drawing the parts needs OpenGL without a screen (Debian: libegl1).
@@ -9,6 +10,7 @@ Drawing the parts needs OpenGL without a screen (Debian: libegl1).
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -21,13 +23,16 @@ HERE = Path(__file__).parent / "pictures"
 
 
 def main() -> None:
-    """Write `scanner.png` and `room_240.png`."""
+    """Write `scanner.png`, `work_precision.png` and `room_240.png`, as far as there is what they show."""
     build = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ground_ahead")
     HERE.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         rendered = Path(folder) / "assembly.png"
         render(build, rendered)
         side_by_side(rendered, build / "density.png", HERE / "scanner.png")
+        diagram = build.parent / "accuracy" / build.name / "work_precision.png"
+        if diagram.exists():
+            shutil.copyfile(diagram, HERE / diagram.name)
         if "SCANWRIGHT_DATA" in os.environ:
             room(Path(os.environ["SCANWRIGHT_DATA"]), Path(folder), HERE / "room_240.png")
 

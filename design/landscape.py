@@ -30,6 +30,7 @@ DIRECTIONS = 20_000  # that stand for a map, where circles would be slower
 MARGIN = 0.15  # what the coarse J of the search may be off by: 0.134 was seen, for a ball of 0.5 deg
 REPORT = 1000  # planes between two lines of progress
 PIECE = 128  # planes per piece of the product
+SCOUTED = 0.05  # what a bound over the scouts may be above that over all axes: else all are visited twice
 SCOUTS = 1500  # axes that tell how low a plane's bound comes, before all are visited
 
 Progress = Callable[[str], None]
@@ -88,7 +89,7 @@ def landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progr
     best = np.inf
     while True:
         for todo in _batches(np.argsort(bounds, kind="stable")):
-            todo = todo[(bounds[todo] <= best + MARGIN) & ~exact[todo]]
+            todo = todo[(bounds[todo] <= best + MARGIN + SCOUTED) & ~exact[todo]]
             if not len(todo):
                 continue
             if exact.sum() // REPORT > (exact.sum() - BATCH) // REPORT:
