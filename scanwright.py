@@ -58,12 +58,12 @@ def build(
     if folder.is_current(target, loaded):
         print(f"{target}: nothing has changed, no work to do ({len(folder.manifest_of(target)['files'])} files)")
         return
-    problem, standard, result = _optimise(loaded)
-    best = result.best[0]
-    angles = folder.angle_set(loaded, best)
-    offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products))
-    angles = angles.model_copy(update={"t_world_rot_mm": offset})
     with folder.fresh_folder(target) as work:
+        problem, standard, result = _optimise(loaded)
+        best = result.best[0]
+        angles = folder.angle_set(loaded, best)
+        offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products))
+        angles = angles.model_copy(update={"t_world_rot_mm": offset})
         made = build_parts(scanner_of(angles, loaded.task.printer, loaded.products), work, _say)
         _say("drawing density.png")
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}

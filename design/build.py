@@ -45,6 +45,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     Raises:
         BuildError: the folder cannot be written.
     """
+    created = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
         target.mkdir(parents=True, exist_ok=True)
         work = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
@@ -64,8 +65,9 @@ def fresh_folder(target: Path) -> Iterator[Path]:
         (work / MANIFEST).replace(target / MANIFEST)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-        if target.exists() and not any(target.iterdir()):
-            target.rmdir()
+        for folder in created:
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
 
 
 def manifest_of(folder: Path) -> dict[str, Any]:

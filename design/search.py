@@ -61,7 +61,7 @@ def search(problem: Problem, ranges: AngleRanges, progress: Progress = lambda _:
         coarse_axes, coarse_planes = fold_axes(coarse), fold_planes(coarse, mirrors)
         coarse_land, _ = landscape_of(problem, coarse_planes, coarse_axes, progress)
         leaders = [best_leader(land, planes, axes), *leaders_of(coarse_land, coarse_planes, coarse_axes, mirrors)]
-    progress(f"{len(leaders)} leaders: rescoring exactly and refining")
+    progress("rescoring the leaders exactly, refining the minima")
     families = families_of(problem, ranges, leaders)
     covered = len(axes.settings_deg) * len(planes.settings_deg)
     different = _different(planes, axes)

@@ -91,6 +91,13 @@ def test_a_build_that_fails_leaves_the_last_one_alone(tmp_path):
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["recording.mcap"]
 
 
+def test_a_build_that_fails_leaves_no_folder_where_there_was_none(tmp_path):
+    with pytest.raises(RuntimeError), fresh_folder(tmp_path / "new" / "out" / "task") as work:
+        (work / "angles.json").write_text("half")
+        raise RuntimeError
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_the_last_build_had_and_this_one_has_not_is_removed(tmp_path):
     target = tmp_path / "task"
     for files in (["a.txt", "b.txt"], ["a.txt"]):
