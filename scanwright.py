@@ -46,39 +46,43 @@ def build(
     ),
 ) -> None:
     """Make everything of a task: angles, parts, assembly, frame chain, pictures, into DIR/<task>/."""
-    from cad.build import build_parts
-    from cad.deck import mount_offset_mm
-    from design import build as folder
-    from design.picture import density_picture
-    from design.scanner import scanner_of
+    from design.folder import fresh_folder, is_current, manifest_of, write_manifest
     from design.task import load_task
 
     loaded = load_task(task)
     target = out / loaded.task.name
-    if folder.is_current(target, loaded):
-        print(f"{target}: nothing has changed, no work to do ({len(folder.manifest_of(target)['files'])} files)")
+    if is_current(target, loaded):
+        print(f"{target}: nothing has changed, no work to do ({len(manifest_of(target)['files'])} files)")
         return
-    with folder.fresh_folder(target) as work:
+
+    from cad.build import build_parts
+    from cad.deck import mount_offset_mm
+    from design import build as writer
+    from design.picture import density_picture
+    from design.scanner import scanner_of
+
+    with fresh_folder(target) as work:
         problem, standard, result = _optimise(loaded)
         best = result.best[0]
-        angles = folder.angle_set(loaded, best)
+        angles = writer.angle_set(loaded, best)
         offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products))
         angles = angles.model_copy(update={"t_world_rot_mm": offset})
         made = build_parts(scanner_of(angles, loaded.task.printer, loaded.products), work, _say)
         _say("drawing density.png")
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
-        settings |= {f"{name}: J = {s.J:.3f}": folder.standard_settings()[name] for name, s in standard.items()}
+        settings |= {f"{name}: J = {s.J:.3f}": writer.standard_settings()[name] for name, s in standard.items()}
         density_picture(work / "density.png", problem, settings, _title(loaded))
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        folder.write_task(work, loaded)
-        folder.write_search(work, result)
-        left_out = [*folder.directions_left_out(problem), *result.left_out, *made.left_out]
-        folder.write_left_out(work, left_out)
-        folder.write_manifest(work, loaded, [asdict(part) for part in made.parts])
+        writer.write_task(work, loaded)
+        writer.write_search(work, result)
+        writer.write_left_out(work, [*writer.directions_left_out(problem), *result.left_out, *made.left_out])
+        write_manifest(work, loaded, [asdict(part) for part in made.parts])
     _print_optimum(result, standard)
+    for warning in loaded.warnings():
+        print(f"warning: {warning}")
     for finding in made.findings:
         print(f"{finding.severity}: {finding.message}")
-    print(f"wrote {len(folder.manifest_of(target)['files'])} files to {target}")
+    print(f"wrote {len(manifest_of(target)['files'])} files to {target}")
 
 
 @app.command()

@@ -32,12 +32,12 @@ import numpy as np
 from design.angles import STANDARD_DEG
 from design.ball_count import ball_count
 from design.beams import Lines
-from design.build import manifest_of
 from design.catalogue import Multibeam, SlipRing
 from design.coverage import coverage
 from design.density import mean_count
 from design.errors import BuildError
 from design.families import Family
+from design.folder import manifest_of
 from design.frames import Array
 from design.gaps import gaps
 from design.landscape import Progress

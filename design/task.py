@@ -185,6 +185,16 @@ class LoadedTask:
         """The servo of the task."""
         return self.products.get(self.task.servo, Servo)
 
+    def warnings(self) -> list[str]:
+        """What the task can do, but not as well as its author may think."""
+        seen_deg = self.servo.position_feedback_deg
+        if seen_deg < 360:
+            return [
+                f"{self.servo.name}: position_feedback_deg = {seen_deg:g}: in {360 - seen_deg:g} deg of every turn no "
+                "angle is read, and scans there have none; take a servo that reads all around, such as MX-64R"
+            ]
+        return []
+
     def sha256(self) -> str:
         """Digest of all that decides the result: the task, its maps, and the records of its products."""
         task = self.task.model_dump(mode="json", exclude={"catalogue"})

@@ -8,8 +8,9 @@ import pytest
 
 import scanwright
 from design.angles import load_angles
-from design.build import fresh_folder, is_current, rounded_to_error
+from design.build import rounded_to_error
 from design.errors import BuildError
+from design.folder import fresh_folder, is_current
 from design.task import load_task
 
 FILES = {

@@ -407,3 +407,9 @@ def test_a_map_has_theta_down_and_phi_to_the_right_and_its_values_in_the_cells(t
                 for p in (phi - 59, phi, phi + 59, phi - 360):
                     expected = 10 * float(levels[row, column]) / scale
                     assert field.weight_at(direction(t, p)) == pytest.approx(expected, rel=1e-6), (t, p)
+
+
+def test_a_spinning_servo_that_cannot_read_all_around_is_told(tmp_path):
+    assert load_text(tmp_path, BASE).warnings() == []
+    (warning,) = load_text(tmp_path, BASE.replace('"MX-64R"', '"AX-12A"')).warnings()
+    assert "60 deg of every turn" in warning
