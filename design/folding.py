@@ -31,6 +31,7 @@ class Folded:
         flip: whether a setting is its class turned round, shape (n,).
         first: the first setting of each class; it is never flipped.
         has: whether a class has a setting that is not flipped, and one that is, shape (2, classes).
+        own: whether a class is its own turned image: its J is the same both ways round, shape (classes,).
     """
 
     settings_deg: Array
@@ -39,6 +40,7 @@ class Folded:
     flip: Mask
     first: NDArray[np.intp]
     has: Mask
+    own: Mask
 
     @property
     def representatives(self) -> Array:
@@ -86,4 +88,4 @@ def _fold(settings: Array, points: Array, mirrors: Array) -> Folded:
     flip = (turned < straight) != (turned < straight)[first][classes]
     has = np.zeros((2, len(first)), dtype=bool)
     has[flip.astype(int), classes] = True
-    return Folded(settings, points, classes, flip, first, has)
+    return Folded(settings, points, classes, flip, first, has, (straight == turned)[first])

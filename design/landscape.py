@@ -83,8 +83,9 @@ def landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progr
         smallest=1,
     )
     g = log_density(np.stack([mean for part in means for mean in part]))
+    open_planes = planes.has | planes.own
     scouts = slice(None, None, max(1, len(weights) // SCOUTS))
-    bounds = _lowest(g, weights[scouts], planes.has, axes.has[:, scouts])[0].min(axis=0)
+    bounds = _lowest(g, weights[scouts], open_planes, axes.has[:, scouts])[0].min(axis=0)
     exact = np.zeros(len(g), dtype=bool)
     best = np.inf
     while True:
@@ -96,10 +97,10 @@ def landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progr
                 progress(f"exact densities: {exact.sum()} of at most {len(g):,} scan planes")
             g[todo] = _exact(problem, polar, [swept[i] for i in todo])
             exact[todo] = True
-            here = _lowest(g[todo], weights[scouts], planes.has[:, todo], axes.has[:, scouts])[0]
+            here = _lowest(g[todo], weights[scouts], open_planes[:, todo], axes.has[:, scouts])[0]
             best = min(best, float(here.min()))
         progress(f"all axes of all {len(g):,} scan planes")
-        by_plane, its_class, its_flip, by_axis = _lowest(g, weights, planes.has, axes.has)
+        by_plane, its_class, its_flip, by_axis = _lowest(g, weights, open_planes, axes.has)
         bounds = by_plane.min(axis=0)
         best = float(bounds[exact].min())
         if not np.any(bounds[~exact] <= best + MARGIN):
@@ -126,8 +127,15 @@ def _exact(problem: Problem, polar: Array, swept: list[tuple[Array, Array]]) -> 
 
 
 def _lowest(g: Array, weights: Array, has_plane: Mask, has_axis: Mask) -> tuple[Array, Array, Array, Array]:
-    """Lowest J of every plane (with the axis it is about) and about every axis, for the flips that the grid holds."""
-    w = np.ascontiguousarray(weights.T, dtype=np.float32)
+    """Lowest J of every plane (with the axis it is about) and about every axis, for the flips that the grid holds.
+
+    Reversing g changes the sign of its odd part only, so both ways round cost one product of the even parts and one
+    of the odd parts: J is their sum and their difference.
+    """
+    g_even, g_odd = _parts(g)
+    w_even, w_odd = (np.ascontiguousarray(part.T, dtype=np.float32) for part in _parts(weights))
+    w_even[:-1] *= 2
+    w_odd *= 2
     closed_axis = np.where(has_axis, 0, np.inf).astype(np.float32)
     closed_plane = np.where(has_plane, 0, np.inf).astype(np.float32)
     by_plane = np.empty((2, len(g)), np.float32)
@@ -137,26 +145,34 @@ def _lowest(g: Array, weights: Array, has_plane: Mask, has_axis: Mask) -> tuple[
     full = bool(has_plane.all() and has_axis.all())
     for first in range(0, len(g), PIECE):
         piece = slice(first, first + PIECE)
-        rows = g[piece].astype(np.float32)
-        J = (rows @ w, rows[:, ::-1] @ w)
-        if full:  # nothing is closed: both flips see the same
-            both = np.minimum(*J)
+        even = g_even[piece].astype(np.float32) @ w_even
+        odd = g_odd[piece].astype(np.float32) @ w_odd
+        rows = np.arange(len(even))
+        if full:  # nothing is closed: both flips see the lower of the two ways round
+            both = even - np.abs(odd)
             by_axis[:] = np.minimum(by_axis, both.min(axis=0))
             where = both.argmin(axis=1)
-            lowest = np.take_along_axis(both, where[:, None], axis=1)[:, 0]
-            way = (np.take_along_axis(J[1], where[:, None], axis=1)[:, 0] == lowest).astype(int)
+            way = (odd[rows, where] > 0).astype(int)
             for flip in (0, 1):
-                by_plane[flip, piece], its_class[flip, piece], its_flip[flip, piece] = lowest, where, flip ^ way
+                by_plane[flip, piece], its_class[flip, piece] = both[rows, where], where
+                its_flip[flip, piece] = flip ^ way
             continue
+        J = (even + odd, even - odd)
         for flip in (0, 1):
-            seen = np.stack([J[flip ^ other] + closed_axis[other] for other in (0, 1)], axis=1)
-            flat = seen.reshape(len(rows), -1)
+            flat = np.hstack([J[flip ^ other] + closed_axis[other] for other in (0, 1)])
             where = flat.argmin(axis=1)
-            by_plane[flip, piece] = np.take_along_axis(flat, where[:, None], axis=1)[:, 0] + closed_plane[flip, piece]
+            by_plane[flip, piece] = flat[rows, where] + closed_plane[flip, piece]
             its_flip[flip, piece], its_class[flip, piece] = np.divmod(where, len(weights))
             about = np.minimum(*(J[flip ^ other] + closed_plane[other, piece, None] for other in (0, 1)))
             by_axis[flip] = np.minimum(by_axis[flip], about.min(axis=0) + closed_axis[flip])
     return by_plane.astype(float), its_class, its_flip, by_axis.astype(float)
+
+
+def _parts(rows: Array) -> tuple[Array, Array]:
+    """Even part (middle node last) and odd part of rows over an odd number of polar nodes."""
+    half = rows.shape[1] // 2
+    upper, lower = rows[:, : half + 1], rows[:, ::-1][:, : half + 1]
+    return (upper + lower) / 2, ((upper - lower) / 2)[:, :half]
 
 
 def _weights_over_polar(problem: Problem, axes: Array, nodes: int, circles: int) -> Array:

@@ -78,7 +78,7 @@ def search(problem: Problem, ranges: AngleRanges, progress: Progress = lambda _:
 
 def _different(planes: Folded, axes: Folded) -> int:
     """Number of different J: every pair of classes both ways round, but once where both come in one way only."""
-    one_way = int((~planes.has.all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
+    one_way = int((~(planes.has | planes.own).all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
     return 2 * len(planes.first) * len(axes.first) - one_way
 
 
