@@ -2,14 +2,12 @@
 
 import csv
 import json
-import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import scanwright
 from design import compare as comparison
 from design.beams import beam_directions_rot, polar_and_azimuth
 from design.catalogue import Multibeam, load_catalogue
@@ -44,21 +42,6 @@ def ceiling():
 def rows(ceiling):
     loaded, problem, result = ceiling
     return compare(loaded, problem, result.best[0])
-
-
-@pytest.fixture
-def command(monkeypatch, capsys):
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["scanwright", *map(str, words)])
-        try:
-            scanwright.run()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code or 0
-        printed = capsys.readouterr()
-        return code, printed.out, [line for line in printed.err.splitlines() if not line.startswith("  ..")]
-
-    return run
 
 
 # typed from the makers' tables: see the sources in the files
