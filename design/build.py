@@ -36,7 +36,10 @@ def write_task(folder: Path, loaded: LoadedTask) -> None:
 
 
 def write_search(folder: Path, result: SearchResult) -> None:
-    """`search.csv`: for every scan-plane setting of the grid the lowest J, and the axis it was found about."""
+    """`search.csv`: for every scan-plane setting of the grid the lowest J, and the axis it was found about.
+
+    J is that of the search, on few nodes; where it cannot win it is the bound from the mean density.
+    """
     header = "alpha_laser_deg,beta_laser_deg,J,alpha_rot_deg,beta_rot_deg"
     np.savetxt(folder / "search.csv", result.planes, delimiter=",", header=header, comments="", fmt="%.5g")
 

@@ -19,7 +19,7 @@ from design.errors import BuildError
 from design.task import LoadedTask
 
 MANIFEST = "manifest.json"
-WRITERS = ("cadquery", "cadquery-ocp", "matplotlib", "numba", "numpy", "scipy", "trimesh")
+WRITERS = ("cadquery", "cadquery-ocp", "matplotlib", "numba", "numpy", "pillow", "scipy", "tomli-w", "trimesh")
 
 
 def versions() -> dict[str, str]:

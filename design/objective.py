@@ -19,12 +19,13 @@ from design.density import mean_count, zones
 from design.errors import TaskError
 from design.frames import Array, R_world_rot
 from design.regions import Field, field_of, frames_about
-from design.sphere import EMPTY, equal_angle_grid
+from design.sphere import EMPTY, equal_angle_grid, weighted_samples
 from design.task import LoadedTask
 
 FRONT = Path(__file__).parent / "front.csv"
 NODES = 6561  # per setting, spread over the segments
 MOST_NODES = 200_000
+A_FEW = 100  # directions that show that a region is not empty
 ROUNDING = 1e-6  # floor of the stated error
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) corners are not looked for: the nodes are then spread evenly
@@ -53,7 +54,7 @@ class Score:
 
     Attributes:
         J: the objective.
-        J_error: bound on its numerical error.
+        J_error: estimate of its numerical error, on the safe side; see `score_on`.
         J_lower: with g of the mean count, a lower bound of J as g is convex.
         least: lowest count in the weighted region at any start phase, beams per ball.
         blind_weight: share of the weight that is never seen, at no phase.
@@ -89,8 +90,22 @@ def log_density(counts: Array) -> Array:
 
 
 def problem_of(loaded: LoadedTask) -> Problem:
-    """The numbers that decide J."""
+    """The numbers that decide J.
+
+    Raises:
+        TaskError: no direction has a weight, or the tolerance or the budget cannot be kept.
+    """
     density = loaded.task.density
+    field = field_of(loaded)
+    step_deg = density.grid_step_deg if density.quadrature == "equal_angle" else None
+    try:
+        nodes = nodes_for(density.tolerance, density.budget_s)
+        if step_deg is None:
+            weighted_samples(field, A_FEW)
+        elif not field.weight_at(equal_angle_grid(step_deg)).any():
+            raise TaskError(EMPTY)
+    except TaskError as error:
+        raise TaskError(f"{loaded.source}: {error}") from error
     lidar = loaded.lidar
     bearings = lidar.bearings_rad()
     lines = scan_lines(loaded.task.motion.period_s, lidar.scan_rate_hz)
@@ -98,10 +113,10 @@ def problem_of(loaded: LoadedTask) -> Problem:
         bearings_rad=bearings,
         lines=lines,
         ball_rad=float(np.radians(density.ball_radius_deg)),
-        field=field_of(loaded),
+        field=field,
         g=log_density(np.arange(lines.count * len(bearings) + 1.0)),
-        grid_step_deg=density.grid_step_deg if density.quadrature == "equal_angle" else None,
-        nodes=nodes_for(density.tolerance, density.budget_s),
+        grid_step_deg=step_deg,
+        nodes=nodes,
         tolerance=density.tolerance or (np.inf if density.budget_s else 1e-3),
     )
 

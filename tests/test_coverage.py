@@ -1,5 +1,6 @@
 """Blind and masked shares in closed form, and against a ball search on random directions."""
 
+from dataclasses import replace
 from math import acos, cos, radians, sin, sqrt
 from pathlib import Path
 
@@ -63,7 +64,9 @@ def test_a_cone_hides_its_solid_angle(half_deg):
 
 
 def test_a_sphere_that_is_all_masked_is_not_blind():
-    seen = coverage(problem([{"shape": "all"}]), np.zeros(4))
+    plain = problem([])
+    everything = replace(plain, field=replace(plain.field, mask=plain.field.weight))  # no task is read with such a mask
+    seen = coverage(everything, np.zeros(4))
     assert (seen.masked_fraction, seen.blind_fraction) == (1.0, 0.0)
 
 

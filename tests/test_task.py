@@ -380,7 +380,8 @@ def test_a_file_of_ones_own_replaces_a_shipped_product_in_a_task(tmp_path):
     )
     loaded = load_text(tmp_path, ahead('catalogue = ["fast.toml"]'))
     assert loaded.lidar.scan_rate_hz == 80
-    assert problem_of(loaded).lines.count == 1440
+    weighed = load_text(tmp_path, ahead('catalogue = ["fast.toml"]') + '\n[[weight]]\nshape = "all"\n')
+    assert problem_of(weighed).lines.count == 1440
     assert loaded.sha256() != load_text(tmp_path, BASE).sha256()
 
 
