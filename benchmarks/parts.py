@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 import time
 
-import manifold3d  # type: ignore[import-not-found]
+import manifold3d
 import numpy as np
 
 from cad import bought, solids
