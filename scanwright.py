@@ -6,17 +6,25 @@ A command imports its room only when it is called, so that `--help` answers at o
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from design.objective import Problem, Score
+    from cad.findings import Finding
+    from design.objective import Score
+    from design.problem import Problem
     from design.search import SearchResult
+    from design.shadowed import Chosen
     from design.task import LoadedTask
 
 app = typer.Typer(
@@ -31,11 +39,29 @@ TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or th
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
 
 
+BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
+
+
+class StampAt(Enum):
+    """Which moment of a turn the stamps of a sensor mean."""
+
+    step_0 = "step_0"
+    rear = "rear"
+
+
 class AngleUnit(Enum):
     """Unit of an angle in somebody's recording."""
 
     deg = "deg"
     rad = "rad"
+
+
+class Per(Enum):
+    """What makes one cloud."""
+
+    recording = "recording"
+    turn = "turn"
+    half = "half"
 
 
 @app.command()
@@ -44,56 +70,137 @@ def build(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
         "out"
     ),
+    check: Annotated[
+        bool, typer.Option("--check", help="TASK is a build folder: build it again elsewhere, compare every file.")
+    ] = False,
 ) -> None:
-    """Make everything of a task: angles, parts, assembly, frame chain, pictures, into DIR/<task>/."""
-    from design.folder import fresh_folder, is_current, manifest_of, write_manifest
+    """Make everything of a task: angles, parts, drawings, parts list, frame chain, pictures, into DIR/<task>/."""
+    from design.folder import is_current, manifest_of
     from design.task import load_task
 
+    if check:
+        _check_build(task)
+        return
     loaded = load_task(task)
     target = out / loaded.task.name
     if is_current(target, loaded):
         print(f"{target}: nothing has changed, no work to do ({len(manifest_of(target)['files'])} files)")
         return
+    result, standard, chosen, findings = _build(loaded, target)
+    _print_optimum(result, standard)
+    _print_chosen(chosen)
+    for warning in loaded.warnings():
+        print(f"warning: {warning}")
+    for finding in findings:
+        print(f"{finding.severity}: {finding.message}")
+    print(f"wrote {len(manifest_of(target)['files'])} files to {target}")
 
+
+def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Score], Chosen, tuple[Finding, ...]]:
+    """Make the build folder of a task."""
     from cad.build import build_parts
     from cad.deck import mount_offset_mm
+    from cad.kernel import require_kernel
     from design import build as writer
+    from design.folder import fresh_folder, write_manifest
     from design.picture import density_picture
     from design.scanner import scanner_of
+    from design.shadowed import choose
 
+    asked = loaded  # with `period_s = "shortest"` the search changes the motion, and a rebuild must ask for it again
     with fresh_folder(target) as work:
-        problem, standard, result = _optimise(loaded)
-        best = result.best[0]
-        angles = writer.angle_set(loaded, best)
+        loaded, problem, standard, result = _optimise(asked)
+        require_kernel()
+        from cad.checks.run import check_parts
+        from cad.exports import export_scanner
+        from cad.shadow import PartsWorkshop
+
+        product = scanner_of(writer.angle_set(loaded, result.best[0]), loaded.task.printer, loaded.products)
+        chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, PartsWorkshop(product), _say)
+        best = chosen.family
+        angles = writer.angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
         offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products))
         angles = angles.model_copy(update={"t_world_rot_mm": offset})
-        made = build_parts(scanner_of(angles, loaded.task.printer, loaded.products), work, _say)
+        scanner = scanner_of(angles, loaded.task.printer, loaded.products)
+        made = build_parts(scanner, work, _say)
+        exported = export_scanner(scanner, made, work, _say)
+        check_parts(scanner, made, work, _say)
         _say("drawing density.png")
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {s.J:.3f}": writer.standard_settings()[name] for name, s in standard.items()}
         density_picture(work / "density.png", problem, settings, _title(loaded))
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        writer.write_task(work, loaded)
+        writer.write_task(work, asked)
         writer.write_search(work, result)
-        writer.write_left_out(work, [*writer.directions_left_out(problem), *result.left_out, *made.left_out])
-        write_manifest(work, loaded, [asdict(part) for part in made.parts])
-    _print_optimum(result, standard)
-    for warning in loaded.warnings():
-        print(f"warning: {warning}")
-    for finding in made.findings:
-        print(f"{finding.severity}: {finding.message}")
-    print(f"wrote {len(manifest_of(target)['files'])} files to {target}")
+        left_out = [*result.left_out, *made.left_out, *exported.left_out]
+        writer.write_left_out(work, [*writer.directions_left_out(problem), *left_out])
+        write_manifest(work, asked, [asdict(part) for part in made.parts])
+    return result, standard, chosen, made.findings
+
+
+def _check_build(folder: Path) -> None:
+    """Build the task of a build folder again, elsewhere; exit 1 where a file differs."""
+    import tempfile
+
+    from design.folder import first_difference, manifest_of
+    from design.task import load_task
+
+    loaded = load_task(folder / "task.toml")
+    with tempfile.TemporaryDirectory() as elsewhere:
+        again = Path(elsewhere) / loaded.task.name
+        _build(loaded, again)
+        difference = first_difference(folder, again)
+    if difference is not None:
+        print(f"{folder}: {difference}")
+        raise typer.Exit(1)
+    print(f"{folder}: built again, all {len(manifest_of(folder)['files'])} files are the same")
 
 
 @app.command()
-def optimise(task: TaskFile, as_json: AsJson = False) -> None:
+def check(out: BuildFolder, as_json: AsJson = False) -> None:
+    """Check the parts of a build folder: room, beams, loads, print. Exit 1 where one fails."""
+    from design.angles import load_angles
+    from design.scanner import scanner_of
+    from design.task import load_task
+
+    loaded = load_task(out / "task.toml")
+    scanner = scanner_of(load_angles(out / "angles.json"), loaded.task.printer, loaded.products)
+    from cad.kernel import require_kernel
+
+    require_kernel()
+    from cad.checks.run import check_scanner
+
+    checks = check_scanner(scanner, _say)
+    failed = [entry for entry in checks if entry.severity == "error"]
+    if as_json:
+        _print_json({"task": loaded.task.name, "checks": [asdict(entry) for entry in checks]})
+    else:
+        for entry in checks:
+            print(f"{entry.severity:7} {entry.message}")
+        print(f"{len(checks) - len(failed)} of {len(checks)} without a failure")
+    raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def optimise(
+    task: TaskFile,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the lowest J over scan planes and over axes.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
     """Search all mounting angles of a task and print the best ten families of settings."""
     from design.build import directions_left_out
     from design.task import NAMES, load_task
 
     loaded = load_task(task)
-    problem, standard, result = _optimise(loaded)
+    shortest = ", the shortest found that keeps the limits" if loaded.task.motion.mode == "shortest" else ""
+    loaded, problem, standard, result = _optimise(loaded)
     left_out = [*directions_left_out(problem), *result.left_out]
+    if picture is not None:
+        from design.landscape_picture import landscape_picture
+
+        landscape_picture(picture, result, f"{loaded.task.name}: {_title(loaded)}{shortest}")
     if as_json:
         best = [
             {f"{name}_deg": angle for name, angle in zip(NAMES, family.angles_deg, strict=True)}
@@ -103,6 +210,7 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
         _print_json(
             {
                 "task": loaded.task.name,
+                "duration_s": loaded.task.motion.duration_s,
                 "best": best,
                 "standard": {name: {"J": s.J, "J_error": s.J_error} for name, s in standard.items()},
                 "covered": result.covered,
@@ -113,6 +221,7 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
         )
         return
     _print_optimum(result, standard)
+    print(f"{_title(loaded)}{shortest}")
     print(f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s")
     for entry in left_out:
         print(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})")
@@ -125,26 +234,37 @@ def evaluate(
     cloud: Annotated[
         Path | None, typer.Option(metavar="FILE.ply", help="Write the simulated beams as points on the unit sphere.")
     ] = None,
+    pole: Annotated[
+        str | None,
+        typer.Option(metavar="WIDTH_MM,HEIGHT_MM,RANGE_M", help="Tell the chance to hit a thin upright pole."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
     import numpy as np
 
-    from design.coverage import coverage
+    from design.coverage import coverage, on_surfaces
     from design.gaps import gaps
-    from design.objective import problem_of, score
+    from design.objective import score
     from design.oracle import ball_score
+    from design.poles import pole_chances, pole_of
+    from design.problem import problem_of
+    from design.robust import sensitivity
     from design.task import load_task
 
     loaded = load_task(task)
     setting = np.radians(_four_angles(angles))
+    asked = None if pole is None else pole_of(pole, loaded.lidar)
     problem = problem_of(loaded)
     _say("closed form")
     result = score(problem, setting)
     seen = coverage(problem, setting)
     lines = gaps(problem, setting)
+    suffers = sensitivity(problem, setting, np.radians(1.0))
+    surfaces = None if loaded.surface is None else on_surfaces(problem, setting, loaded.surface)
     _say("ball search, 8 start phases")
     ball = ball_score(problem, setting)
+    hit = None if asked is None else pole_chances(problem, setting, asked)
     facts = {
         "J": result.J,
         "J_error": result.J_error,
@@ -156,13 +276,17 @@ def evaluate(
         "masked_fraction": seen.masked_fraction,
         "min_density": result.least,
         **asdict(lines),
+        "J_rises_1_deg_off": suffers,
+        **({} if hit is None else {"pole": asdict(hit)}),
     }
     if cloud is not None:
-        from design.beams import simulated_scan
+        from design.beams import scan_at
         from firmware_io.cloud import write_points
 
         note = f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"
-        write_points(cloud, simulated_scan(problem.bearings_rad, problem.lines, setting), [note])
+        joint = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+        points = scan_at(problem.bearings_rad, joint, setting)
+        write_points(cloud, points, [note])
     if as_json:
         _print_json({"task": loaded.task.name, "angles_deg": np.degrees(setting).round(6).tolist(), **facts})
         return
@@ -178,9 +302,20 @@ def evaluate(
     print(f"line gap       {lines.line_gap_deg:.3f} deg at the widest, {lines.line_gap_mm(10):.0f} mm at 10 m")
     crossing = "" if lines.crossing_deg is None else f", lines crossing at {lines.crossing_deg:.0f} deg on average"
     print(f"seen twice     {lines.seen_twice:.1%} of the weight{crossing}")
-    print(f"half a turn    misses {lines.half_turn_misses:.1%} of the weight that a full turn sees")
+    if lines.half_turn_misses is not None:
+        print(f"half a turn    misses {lines.half_turn_misses:.1%} of the weight that a full turn sees")
+    if hit is not None:
+        for found in hit.chances:
+            beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
+            print(
+                f"pole           {found.chance:.2%} +- {found.error:.2%} get at least {beams} ({hit.stands} azimuths)"
+            )
+    if surfaces is not None:
+        low, middle = surfaces["lowest_points_per_m2"], surfaces["median_points_per_m2"]
+        print(f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest")
+    print("1 deg off      J rises by " + ", ".join(f"{rise:.4f} ({name})" for name, rise in suffers.items()))
     if cloud is not None:
-        print(f"wrote {problem.lines.count * len(problem.bearings_rad):,} points to {cloud}")
+        print(f"wrote {len(points):,} points to {cloud}")
 
 
 @app.command()
@@ -194,7 +329,7 @@ def accuracy(
     """Report error against run time of every way to compute J, at the optimum of a task."""
     from design import accuracy_report as report
     from design.accuracy import measure, on_front
-    from design.objective import problem_of
+    from design.problem import problem_of
     from design.stress import stress_rows
     from design.task import load_task
 
@@ -211,7 +346,7 @@ def accuracy(
         failed = sum(not row.passed for row in rows)
         print(f"{len(rows) - failed} of {len(rows)} within what is allowed; wrote {folder / 'stress.csv'}")
         raise typer.Exit(1 if failed else 0)
-    problem, _, result = _optimise(loaded)
+    loaded, problem, _, result = _optimise(loaded)
     truth, points = measure(problem, result.best[0].angles_rad, _say)
     folder.mkdir(parents=True, exist_ok=True)
     report.write_points(folder / "work_precision.csv", points, truth)
@@ -238,7 +373,7 @@ def compare(
 
     loaded = load_task(task)
     with comparison.report_folder(out / loaded.task.name) as folder:
-        problem, _, result = _optimise(loaded)
+        loaded, problem, _, result = _optimise(loaded)
         rows = comparison.compare(loaded, problem, result.best[0], _say)
         comparison.write_csv(folder / "compare.csv", rows)
         compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {_title(loaded)}, and what else there is")
@@ -284,16 +419,263 @@ def assemble(
         bool, typer.Option("--flat", help="Only points that exist; default keeps beam i in column i.")
     ] = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
+    per: Annotated[
+        Per, typer.Option(help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ...")
+    ] = Per.recording,
+    poses: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|TOPIC",
+            help="Where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).",
+        ),
+    ] = None,
+    straight: Annotated[
+        bool, typer.Option("--straight", help="Take the angle straight between its samples, steps not smoothed.")
+    ] = False,
+    columns: Annotated[
+        str, typer.Option(help="What to write of each point beside x,y,z.")
+    ] = "intensity,time_s,joint_rad,ring",
 ) -> None:
-    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set."""
+    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
+
+    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    """
     from design.angles import load_angles
     from firmware_io.assemble import assemble_recording
+    from firmware_io.own_body import own_body_beside
+    from firmware_io.pose_files import load_trajectory
 
-    summary = assemble_recording(recording, load_angles(angles), out, flat=flat, lag_s=lag_s)
+    summary = assemble_recording(
+        recording,
+        load_angles(angles),
+        out,
+        flat=flat,
+        lag_s=lag_s,
+        per=per.value,
+        poses=None if poses is None else load_trajectory(poses, recording),
+        own_body=own_body_beside(angles),
+        smooth=not straight,
+        columns=[name.strip() for name in columns.split(",") if name.strip()],
+    )
+    for line in summary.said:
+        print(line)
     for reason, count in summary.left_out.items():
         print(f"left out {count:,} beams: {reason.replace('_', ' ')}")
     form = f"organised, {summary.height:,} scans x {summary.width:,} beams" if summary.width else "flat"
-    print(f"wrote {summary.points:,} points of {summary.beams:,} beams ({form}) to {summary.out}")
+    where = f"{summary.out}" if per is Per.recording else f"{len(summary.clouds)} clouds, {summary.clouds[0]} and on"
+    print(f"wrote {summary.points:,} points of {summary.beams:,} beams ({form}) to {where}")
+
+
+@app.command()
+def emulate(
+    out: BuildFolder,
+    scene: Annotated[
+        Path | None, typer.Option(metavar="MESH", help="STL, PLY, OBJ, DAE or GLB; default is a furnished room.")
+    ] = None,
+    unit_m: Annotated[float, typer.Option(metavar="M", help="Length of one unit of the mesh, 0.001 for mm.")] = 1.0,
+    at: Annotated[
+        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where the scanner stands in the mesh, metres.")
+    ] = (0.0, 0.0, 0.0),
+    noise_mm: Annotated[float | None, typer.Option(help="Range noise; default is the data sheet's.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+) -> None:
+    """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
+    from threading import Event
+
+    from design.angles import load_angles
+    from firmware_io.ports import announced
+    from firmware_io.twins.head import load_of
+    from firmware_io.twins.scanner import emulated_scanner, room
+
+    angles = load_angles(out / "angles.json")
+    place = room(scene, unit_m, at)
+    with (
+        _on_duty(),
+        emulated_scanner(angles, place, load=load_of(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
+        announced(out, twins.ports),
+    ):
+        print(f"lidar {angles.sensor} at {twins.ports.lidar} and {twins.lidar.address}")
+        print(f"servo {angles.servo} at {twins.ports.servo}")
+        print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
+        with suppress(KeyboardInterrupt):
+            Event().wait()
+
+
+@app.command()
+def scan(
+    out: BuildFolder,
+    turns: Annotated[int, typer.Option(help="Full scans.")] = 1,
+    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
+    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    recording: Annotated[
+        Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
+    ] = None,
+    intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+    stamp_at: Annotated[
+        StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
+    ] = StampAt.step_0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and stop.")] = False,
+) -> None:
+    """Turn the scanner, record, and assemble the cloud beside the recording."""
+    from firmware_io.acquire import acquire
+    from firmware_io.assemble import assemble_recording
+    from firmware_io.plan import plan_scan
+
+    plan = plan_scan(
+        out,
+        turns=turns,
+        lidar=lidar,
+        servo=servo,
+        recording=recording,
+        intensity=intensity,
+        stamp_at=stamp_at.value,
+    )
+    for line in plan.lines():
+        print(line)
+    if dry_run:
+        return
+    try:
+        with _on_duty():
+            summary = acquire(plan, _say)
+    except KeyboardInterrupt:
+        kept = f"; what was recorded is in {plan.recording}" if plan.recording.exists() else ""
+        print(f"scanwright: stopped, both devices stand still{kept}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    for reason, count in summary.left_out.items():
+        print(f"left out {count:,}: {reason}")
+    if summary.reconnects:
+        print(f"the lidar was away {summary.reconnects} times")
+    if summary.speed_deg_s:
+        print(f"servo turned at {summary.speed_deg_s:.2f} deg/s, ripple {summary.ripple_deg:.3f} deg")
+    print(f"beams are timed to {summary.clock_ns / 1e6:.2f} ms")
+    print(
+        f"recorded {summary.scans:,} scans and {summary.joint_samples:,} angles, {summary.duration_s:.1f} s, "
+        f"to {summary.recording}"
+    )
+    cloud = assemble_recording(plan.recording, plan.angles, plan.recording.with_suffix(".ply"))
+    for reason, count in cloud.left_out.items():
+        print(f"left out {count:,} beams: {reason.replace('_', ' ')}")
+    for sentence in cloud.said:
+        print(sentence)
+    print(f"wrote {cloud.points:,} points of {cloud.beams:,} beams to {', '.join(map(str, cloud.clouds))}")
+
+
+@app.command()
+def doctor(
+    out: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Build folder of the scanner.")] = None,
+    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
+    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+) -> None:
+    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. Nothing turns."""
+    from firmware_io.doctor import examine
+
+    wrong = False
+    for finding in examine(out, lidar, servo):
+        print(f"{finding.verdict:8} {finding.says}", flush=True)
+        wrong |= finding.verdict == "wrong"
+    raise typer.Exit(1 if wrong else 0)
+
+
+@app.command()
+def repair(
+    recording: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that was cut off.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE.mcap", help="Write there and leave FILE as it is.")
+    ] = None,
+) -> None:
+    """Close a recording that was cut off by a crash, a full disk or a pulled plug: all that is whole is kept."""
+    from firmware_io.repair import repair as mend
+
+    summary = mend(recording, out or recording)
+    first_ns, last_ns = summary.times_ns
+    kept = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(summary.messages.items()))
+    print(f"{recording}: {kept}, {(last_ns - first_ns) / 1e9:.1f} s")
+    if summary.whole:
+        print("it is whole: nothing to repair, nothing written")
+        return
+    chunks = f"{summary.damaged_chunks} damaged chunks, {summary.lost_messages:,} messages known to be lost"
+    print(f"left out {summary.lost_bytes:,} bytes that are not whole ({chunks})")
+    print(f"wrote {out or recording}")
+
+
+@app.command()
+def register(
+    clouds: Annotated[list[Path], typer.Argument(metavar="CLOUD...", help="Clouds of one place, two or more.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Map to write.")],
+    poses: Annotated[
+        Path | None, typer.Option(metavar="FILE.tum", help="Poses to write; beside the map by default.")
+    ] = None,
+    start: Annotated[
+        Path | None, typer.Option(metavar="FILE.tum", help="Start poses, a line for each cloud; found if not given.")
+    ] = None,
+    spacing_m: Annotated[float, typer.Option(help="Distance of the points that are registered.")] = 0.1,
+    map_spacing_m: Annotated[float, typer.Option(help="Distance of the points of the map.")] = 0.02,
+) -> None:
+    """Find where clouds stand to each other, from no start if need be, and merge them into one map."""
+    import numpy as np
+
+    from firmware_io.registration.session import register_files
+
+    tum = poses or out.with_suffix(".tum")
+    session = register_files(clouds, out, tum, start, spacing_m, map_spacing_m, _say)
+    for line in session.said:
+        print(f"note: {line}")
+    for pair in session.found.pairs:
+        if not pair.why_not:
+            print(f"{pair.a} - {pair.b}: {pair.overlap:.0%} overlap, {pair.contradiction:.1%} contradicted")
+    for pair in session.refused:
+        print(f"{pair.a} - {pair.b}: not used: {'; '.join(pair.why_not)}")
+    if not session.found.complete:
+        lost = [name for name, T in zip(session.names, session.found.T_world, strict=True) if np.isnan(T[0, 0])]
+        print(f"no place was found for {', '.join(lost)}: nothing is written")
+        raise typer.Exit(1)
+    for name, T, covariance in zip(session.names, session.found.T_world, session.found.covariance, strict=True):
+        x, y, z = T[:3, 3]
+        sigma_mm, sigma_deg = 1e3 * np.sqrt(covariance[3:, 3:].trace()), np.degrees(np.sqrt(covariance[:3, :3].trace()))
+        print(f"{name}: at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {sigma_mm:.2f} mm and {sigma_deg:.4f} deg")
+    print(f"wrote {session.points:,} points to {', '.join(str(path) for path in session.wrote)}")
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write.")],
+) -> None:
+    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold."""
+    from firmware_io.cloud_files import read_clouds, write_clouds
+
+    clouds, unread = read_clouds(source)
+    wrote, lost = write_clouds(target, clouds)
+    for line in [*unread, *lost]:
+        print(f"note: {line}")
+    points = sum(len(cloud.points_m) for cloud in clouds)
+    print(f"wrote {points:,} rows to {', '.join(str(path) for path in wrote)}")
+
+
+@app.command()
+def calibrate(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings of scenes that stand still.")
+    ],
+    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner, as designed.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.json", help="Calibrated angle set to write.")],
+    one_place: Annotated[
+        bool, typer.Option("--one-place", help="The scanner stood still from the first recording to the last.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed."""
+    from design.angles import load_angles
+    from firmware_io.calibrate import calibrate_recordings, report_path
+    from firmware_io.calibration.report import lines
+
+    record = calibrate_recordings(recordings, load_angles(angles), out, one_place=one_place, say=_say)
+    if as_json:
+        _print_json(record)
+        return
+    for line in lines(record):
+        print(line)
+    print(f"wrote {out} and {report_path(out).name}")
 
 
 @app.command()
@@ -337,16 +719,23 @@ def run() -> None:
         sys.exit(2)
 
 
-def _optimise(loaded: LoadedTask) -> tuple[Problem, dict[str, Score], SearchResult]:
-    """The task as numbers, the score of the standard alignments, and the search."""
+def _optimise(loaded: LoadedTask) -> tuple[LoadedTask, Problem, dict[str, Score], SearchResult]:
+    """The task, its period found if it asks for the shortest, its numbers, the standard alignments, the search."""
     from design.build import standard_settings
-    from design.objective import problem_of, score
+    from design.fastest import fastest
+    from design.motion import Shortest
+    from design.objective import score
+    from design.problem import problem_of
     from design.search import search
 
     _say("reading the task (the first run compiles the numerics: some 20 s)")
-    problem = problem_of(loaded)
-    standard = {name: score(problem, setting) for name, setting in standard_settings().items()}
-    return problem, standard, search(problem, loaded.task.angles, _say)
+    if isinstance(loaded.task.motion, Shortest):
+        loaded, problem, result = fastest(loaded, _say)
+        _say(f"one turn in {loaded.task.motion.duration_s:g} s: the shortest found that keeps the limits")
+    else:
+        problem = problem_of(loaded)
+        result = search(problem, loaded.task.angles, _say, loaded.task.limits)
+    return loaded, problem, {name: score(problem, setting) for name, setting in standard_settings().items()}, result
 
 
 def _print_optimum(result: SearchResult, standard: dict[str, Score]) -> None:
@@ -364,9 +753,23 @@ def _print_optimum(result: SearchResult, standard: dict[str, Score]) -> None:
         print(f"beams per ball over the weighted region: {math.exp(other.J - best.J):.2f} x {name} (J = {other.J:.4f})")
 
 
+def _print_chosen(chosen: Chosen) -> None:
+    setting = ", ".join(f"{angle:g}" for angle in chosen.family.angles_deg)
+    print(
+        f"built ({setting}): J = {chosen.family.score.J:.4f} with its parts, which hide {chosen.hidden:.1%} of the "
+        f"beams ({chosen.bare.J:.4f} without); of {chosen.bounded} settings bounded, {chosen.built} made, "
+        f"{len(chosen.refused)} refused"
+    )
+    for reason in chosen.refused:
+        print(f"refused {reason}")
+    if chosen.open:
+        print(f"{chosen.open} more families might be better with their parts: not made")
+
+
 def _title(loaded: LoadedTask) -> str:
     task = loaded.task
-    return f"{task.sensor}, one turn in {task.motion.period_s:g} s"
+    verb = "out and back" if task.motion.mode == "sweep" else "one turn"
+    return f"{task.sensor}, {verb} in {task.motion.duration_s:g} s"
 
 
 def _four_angles(text: str) -> list[float]:
@@ -379,6 +782,23 @@ def _four_angles(text: str) -> list[float]:
     if len(angles) != 4 or not all(abs(angle) <= 360 for angle in angles):
         raise TaskError(f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling")
     return angles
+
+
+@contextmanager
+def _on_duty() -> Iterator[None]:
+    """Go first where the system allows it (times get blurred on a busy computer), and end well on every signal."""
+    with suppress(PermissionError):
+        os.nice(-10)
+
+    def interrupt(number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt(signal.Signals(number).name)
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _say(line: str) -> None:

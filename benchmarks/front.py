@@ -17,7 +17,8 @@ import numpy as np
 
 from design.accuracy import reference
 from design.beams import scan_lines
-from design.objective import FRONT, Problem, log_density, problem_of, quick_J
+from design.objective import quick_J
+from design.problem import FRONT, Problem, problem_of
 from design.task import load_task, shipped_tasks
 
 NODES = (243, 729, 2187, 6561, 19683, 59049, 177147)
@@ -32,8 +33,8 @@ def main() -> None:
         plain = problem_of(load_task(Path(name)))
         for _ in range(SETTINGS):
             lines = scan_lines(float(rng.choice([2.0, 18.0])), 40.0)
-            g = log_density(np.arange(lines.count * len(plain.bearings_rad) + 1.0))
-            problem = replace(plain, lines=lines, g=g, ball_rad=float(np.radians(rng.choice([1.0, 2.0]))))
+            ball_rad = float(np.radians(rng.choice([1.0, 2.0])))
+            problem = replace(plain.with_beams(plain.bearings_rad, lines), ball_rad=ball_rad)
             angles = np.radians(rng.uniform([-180, -90, -90, -90], [180, 90, 90, 90]))
             cases.append((problem, angles, reference(problem, angles).J))
     rows = []

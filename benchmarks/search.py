@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from design.objective import log_density, problem_of, score
+from design.objective import score
+from design.objectives import log_density
 from design.oracle import scan_tree
+from design.problem import problem_of
 from design.search import search
 from design.sphere import equal_angle_grid, weighted_samples
 from design.task import load_task

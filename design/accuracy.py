@@ -19,7 +19,10 @@ from design.beams import beam_directions_rot, polar_and_azimuth, simulated_scan
 from design.density import ball_search, mean_count, zones
 from design.errors import ScanwrightError
 from design.frames import Array, R_world_rot
-from design.objective import Problem, breaks_of, log_density, quick_J, rule_of
+from design.objective import quick_J
+from design.objectives import log_density
+from design.problem import Problem
+from design.quadrature import breaks_of, rule_of
 from design.sphere import equal_angle_grid
 
 REPEATS = 5
@@ -82,7 +85,7 @@ def reference(problem: Problem, angles_rad: Array) -> Reference:
         width = ((b - a) * np.sin(s) * w * np.pi / 4).ravel()
         weight = width * np.sin(t) * problem.field.on_circles(axis, t)[0]
         seen = weight > 0
-        g = zones(t[seen], polar, azimuth, problem.lines, problem.ball_rad, problem.g).mean_g
+        g = zones(t[seen], polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
         J.append(float(weight[seen] @ g / weight[seen].sum()))
     return Reference(J[1], abs(J[1] - J[0]))
 
@@ -225,7 +228,7 @@ def _minimum(x: Array, y: list[float]) -> float:
 
 def _zonal(problem: Problem, angles_rad: Array, t: Array) -> Array:
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
-    return zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.g).mean_g
+    return zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
 
 
 def _from_rings(problem: Problem, angles_rad: Array, t: Array, width: Array) -> float:

@@ -23,6 +23,7 @@ from pydantic import Field, ValidationError
 from design import frames
 from design.errors import TaskError
 from design.frames import Array
+from design.motion import Motion
 from design.record import Record, explain
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
@@ -40,13 +41,6 @@ class Angles(Record):
     gamma_laser: float = 0.0
 
 
-class Spin(Record):
-    """Continuous rotation at constant speed."""
-
-    mode: Literal["spin"] = "spin"
-    period_s: float = Field(strict=True, gt=0, le=600, description="time of one full turn of the servo")
-
-
 class AngleSet(Record):
     """One scanner's angles, as designed or as calibrated. `angles.json` is this record."""
 
@@ -61,7 +55,7 @@ class AngleSet(Record):
     sensor: str
     servo: str
     slip_ring: str | None = None
-    motion: Spin | None = None
+    motion: Motion | None = None
     J: float | None = None
     J_error: float | None = None
     covariance: tuple[tuple[float, float, float, float], ...] | None = Field(default=None, min_length=4, max_length=4)

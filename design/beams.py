@@ -16,10 +16,12 @@ class Lines:
     """The scan lines of one full turn: line k stands at `k * step_rad`, k = 0 .. count - 1.
 
     `T f` is not rounded: where it is no integer the gap behind the last line is shorter than `step_rad`.
+    Where the servo stops, each line is measured `repeats` times.
     """
 
     count: int
     step_rad: float
+    repeats: int = 1
 
     @property
     def angles_rad(self) -> Array:
@@ -42,6 +44,13 @@ def beam_directions_rot(bearings_rad: Array, alpha_laser_rad: float, beta_laser_
     return in_laser @ frames.R_rot_laser(alpha_laser_rad, beta_laser_rad).T
 
 
+def polar_of_planes(bearings_rad: Array, planes_rad: Array) -> Array:
+    """Polar angles of all beams for many scan planes (alpha_laser, beta_laser) (n, 2), shape (n, beams)."""
+    R = frames.R_rot_laser(*planes_rad.T)[:, :, :2]
+    x, y, z = np.einsum("nij,jb->inb", R, np.stack([np.cos(bearings_rad), np.sin(bearings_rad)]))
+    return np.arctan2(np.hypot(x, y), z)
+
+
 def polar_and_azimuth(directions: Array) -> tuple[Array, Array]:
     """Angle from z and angle about z of unit vectors, (n, 3) -> (n,), (n,) [rad]; accurate close to the poles."""
     x, y, z = directions.T
@@ -57,7 +66,12 @@ def simulated_scan(bearings_rad: Array, lines: Lines, angles_rad: ArrayLike, sta
         angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
         start_phase_rad: axis angle of the first line.
     """
+    return scan_at(bearings_rad, lines.angles_rad + start_phase_rad, angles_rad)
+
+
+def scan_at(bearings_rad: Array, joint_rad: Array, angles_rad: ArrayLike) -> Array:
+    """Directions in the world of all beams at each joint angle, shape (joint angles * beams, 3), line after line."""
     alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
     beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser)
-    R = frames.R_world_rot(alpha_rot, beta_rot, lines.angles_rad + start_phase_rad)
+    R = frames.R_world_rot(alpha_rot, beta_rot, joint_rad)
     return np.einsum("kij,bj->kbi", R, beams).reshape(-1, 3)

@@ -14,10 +14,12 @@ from design.families import Family
 from design.folder import write_json
 from design.frames import Array
 from design.left_out import LeftOut
-from design.objective import Problem
+from design.motion import Shortest, Sweep
+from design.problem import Problem
 from design.search import SearchResult
+from design.shapes import Map, Mesh
 from design.sphere import spiral
-from design.task import LoadedTask, Map
+from design.task import LoadedTask
 
 SQUARE_DEGREES = 41_253  # on the whole sphere
 
@@ -27,8 +29,10 @@ def write_task(folder: Path, loaded: LoadedTask) -> None:
     table = loaded.task.model_dump(mode="json", exclude_none=True)
     for key in ("weight", "mask"):
         for i, region in enumerate(getattr(loaded.task, key)):
-            if isinstance(region, Map):
+            if isinstance(region, Map | Mesh):
                 table[key][i]["file"] = _bring(folder, loaded.source.parent / region.file, f"{key}-{i}")
+    if loaded.task.scene is not None:
+        table["scene"]["file"] = _bring(folder, loaded.source.parent / loaded.task.scene.file, "scene")
     table["catalogue"] = [
         _bring(folder, loaded.source.parent / extra, f"catalogue-{i}") for i, extra in enumerate(loaded.task.catalogue)
     ]
@@ -53,6 +57,7 @@ def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
 def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
     """The designed angle set of a family; J is rounded to its error."""
     task = loaded.task
+    assert not isinstance(task.motion, Shortest)  # the search has put the period that it found
     alpha_rot, beta_rot, alpha_laser, beta_laser = family.angles_deg
     J, J_error = rounded_to_error(family.score.J, family.score.J_error)
     return AngleSet(
@@ -61,7 +66,7 @@ def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha_laser, beta_laser=beta_laser),
         sensor=task.sensor,
         servo=task.servo,
-        slip_ring=task.slip_ring,
+        slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
         motion=task.motion,
         J=J,
         J_error=J_error,

@@ -1,4 +1,4 @@
-"""Products that a scanner is made of, lidars, servos, slip rings, printers, and ready-made ones to compare it with.
+"""Products that a scanner is made of: lidars, servos, slip rings, bearings, printers; and ready-made ones beside it.
 
 One TOML file per product. Every value is written with its source and whether it was verified:
 
@@ -65,6 +65,7 @@ class Lidar(Product):
     scan_rate_hz: float = Field(gt=0)
     range_min_mm: float = Field(gt=0)
     range_max_mm: float = Field(gt=0)
+    range_practical_mm: float | None = Field(default=None, gt=0, description="what users really get")
     range_sigma_mm: float = Field(gt=0)
     mass_g: float = Field(gt=0)
     price_usd: float | None = Field(default=None, gt=0)
@@ -140,6 +141,24 @@ class SlipRing(Product):
     price_usd: float | None = Field(default=None, gt=0)
 
 
+class Bearing(Product):
+    """A ball bearing, sealed on both sides."""
+
+    kind: Literal["bearing"]
+    bore_mm: float = Field(gt=0)
+    outer_mm: float = Field(gt=0)
+    width_mm: float = Field(gt=0)
+    mass_g: float = Field(gt=0)
+    static_load_n: float = Field(gt=0)
+    price_usd: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _rings_have_walls(self) -> Bearing:
+        if self.outer_mm < self.bore_mm + 8.0:
+            raise ValueError(f"outer_mm {self.outer_mm:g} leaves no ring around bore_mm {self.bore_mm:g}")
+        return self
+
+
 class Multibeam(Product):
     """A ready-made 3D lidar: layers at fixed elevations that turn about z, upright; azimuth 0 ahead, 90 to the left."""
 
@@ -171,11 +190,12 @@ class Printer(Product):
     density_g_cm3: float = Field(gt=0)
 
 
-P = TypeVar("P", Lidar, Servo, SlipRing, Printer, Multibeam)
+P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Printer, Multibeam)
 KINDS: dict[str, type[Product]] = {
     "lidar": Lidar,
     "servo": Servo,
     "slip_ring": SlipRing,
+    "bearing": Bearing,
     "printer": Printer,
     "multibeam": Multibeam,
 }
@@ -199,6 +219,11 @@ class Catalogue:
             title = next((word for word, record in KINDS.items() if record is kind), "product").replace("_", " ")
             raise TaskError(f"'{name}' is no {title} of the catalogue{suggest(name, known)}")
         return product
+
+    def bearings(self) -> tuple[Bearing, ...]:
+        """All bearings, smallest bore first."""
+        found = [product for product in self.products.values() if isinstance(product, Bearing)]
+        return tuple(sorted(found, key=lambda bearing: (bearing.bore_mm, bearing.outer_mm, bearing.name)))
 
     def named(self, name: str) -> Product:
         """The product of that name, of whatever kind.

@@ -34,17 +34,17 @@ from design.ball_count import ball_count
 from design.beams import Lines
 from design.catalogue import Multibeam, SlipRing
 from design.coverage import coverage
-from design.density import mean_count
 from design.errors import BuildError
 from design.families import Family
 from design.folder import manifest_of
 from design.frames import Array
 from design.gaps import gaps
 from design.landscape import Progress
-from design.objective import NODES, Problem, Score, log_density, rule_of, score, score_on
-from design.oracle import sample_sets
+from design.objective import Score, score, score_on
+from design.oracle import SETS
+from design.problem import NODES, Problem
 from design.search import search
-from design.sphere import spiral
+from design.sphere import sample_set, spiral
 from design.task import AngleRanges, LoadedTask
 
 LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
@@ -113,7 +113,7 @@ def compare(loaded: LoadedTask, problem: Problem, best: Family, progress: Progre
     for product in loaded.products:
         if isinstance(product, Multibeam):
             progress(product.name)
-            whole = max(1, int(np.floor(loaded.task.motion.period_s * product.turn_rate_hz + 1e-9)))
+            whole = max(1, int(np.floor(loaded.task.motion.duration_s * product.turn_rate_hz + 1e-9)))
             rows += [ready_made(problem, product, turns) for turns in sorted({1, whole})]
     return rows
 
@@ -167,12 +167,22 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
         return np.stack([ball_count(scan, directions, problem.ball_rad) for scan in scans])
 
     uppers, lowers, blind = [], [], []
-    for samples in sample_sets(problem, DIRECTIONS, 0):
-        found = counts(samples.directions)
-        share = samples.weights / samples.weights.sum()
-        uppers.append(float(log_density(turns * found).mean(axis=0) @ share))
-        lowers.append(float(log_density(turns * found.mean(axis=0)) @ share) if turns > 1 else uppers[-1])
-        blind.append(float((found.max(axis=0) == 0) @ share))
+    for index in range(SETS):
+        upper, lower = [], []
+        for moment in problem.objective.moments:
+            samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
+            found = turns * counts(samples.directions)
+            share = samples.weights / samples.weights.sum()
+            if moment.gathered == "highest":
+                upper.append(moment.g(found).max())
+                lower.append(moment.g(found.mean(axis=0)).max())
+            else:
+                upper.append(moment.g(found).mean(axis=0) @ share)
+                lower.append(moment.g(found.mean(axis=0)) @ share)
+            if moment is problem.objective.moments[0]:
+                blind.append(float((found.max(axis=0) == 0) @ share))
+        uppers.append(float(problem.objective.join(np.array(upper))))
+        lowers.append(float(problem.objective.join(np.array(lower))) if turns > 1 else uppers[-1])
     sphere = spiral(BLIND_DIRECTIONS)
     unseen = counts(sphere[~problem.field.masked_at(sphere)]).max(axis=0) == 0
     middles = (np.array(uppers) + lowers) / 2
@@ -253,7 +263,7 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Array
     return Row(
         name=name,
         setting="(" + ", ".join(f"{angle:g}" for angle in np.degrees(angles_rad).round(2) + 0.0) + ")",
-        time_s=loaded.task.motion.period_s,
+        time_s=loaded.task.motion.duration_s,
         turns=1,
         J=judged.J,
         J_error=judged.J_error,
@@ -269,15 +279,10 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Array
 def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
     """J, J_error, blind share of the sphere and of the weight, of layers that run all around."""
     lines = lines_of(product)
-    elevations = np.radians(product.elevations_deg)
-    counts = np.arange(lines.count * len(elevations) + 1.0)
-    fan = replace(problem, bearings_rad=elevations, lines=lines, g=log_density(turns * counts))
+    fan = problem.with_beams(np.radians(product.elevations_deg), replace(lines, repeats=turns))
     judged = score_on(fan, UPRIGHT_RAD, NODES)
     J, half = judged.J, LAYERED * judged.J_error
     if turns > 1:
-        rule, polar, _ = rule_of(fan, UPRIGHT_RAD, NODES)
-        lower = log_density(turns * mean_count(rule.polar_rad, polar, lines, problem.ball_rad))
-        least = float(rule.fine @ lower / rule.fine.sum())
-        J, half = (judged.J + least) / 2, half + (judged.J - least) / 2
+        J, half = (judged.J + judged.J_lower) / 2, half + (judged.J - judged.J_lower) / 2
     whole = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # -ln(1 + d) moves by less than d does
     return J, half + whole, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight

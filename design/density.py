@@ -47,7 +47,7 @@ def mean_count(polar_rad: Array, beam_polar_rad: Array, lines: Lines, ball_rad: 
     """Mean over the start phase of the beams within a ball at polar angles t, in closed form, shape (len(t),)."""
     beams = np.sort(beam_polar_rad)
     parts = in_chunks(lambda chunk: _mean_counts(polar_rad[chunk], beams, ball_rad), len(polar_rad))
-    return lines.count * np.concatenate(parts)
+    return lines.repeats * lines.count * np.concatenate(parts)
 
 
 def zones(
@@ -64,7 +64,7 @@ def zones(
         beam_azimuth_rad: azimuth of each beam in the rotation frame, shape (beams,).
         lines: scan lines of the turn.
         ball_rad: ball radius.
-        g: value of g for every count 0, 1, .. lines * beams.
+        g: value of g for every number of measured lines 0, 1, .. lines * beams, each with all its repeats.
     """
     order = np.argsort(beam_polar_rad, kind="stable")
     polar_b, azimuth_b = beam_polar_rad[order], beam_azimuth_rad[order] % (2 * np.pi)
@@ -74,7 +74,7 @@ def zones(
         smallest=16,
     )
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
-    return Zones(mean_g, mean, least, most)
+    return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
 
 
 def count_at(
@@ -109,11 +109,11 @@ def ball_search(beams: Array, directions: Array, ball_rad: float) -> Array:
 
 def _half_widths(t: float, beam_polar: Array, ball_rad: float) -> Array:
     """delta_b at polar angle t; -1 where the ball never meets the beam."""
-    return np.array([_half_width(t, b, ball_rad) for b in beam_polar])
+    return np.array([half_width(t, b, ball_rad) for b in beam_polar])
 
 
 @njit(cache=True, nogil=True)
-def _half_width(t: float, t_b: float, ball: float) -> float:
+def half_width(t: float, t_b: float, ball: float) -> float:
     """Azimuth half-width of the ball about polar angle t on the circle t_b; pi is all of it, -1 none of it.
 
     The haversine form keeps full precision where t is close to t_b and where both are close to a pole.
@@ -135,7 +135,7 @@ def _mean_counts(polar: Array, beam_polar: Array, ball: float) -> Array:
         for b in range(first, len(beam_polar)):
             if beam_polar[b] > polar[i] + ball + 1e-9:
                 break
-            half = _half_width(polar[i], beam_polar[b], ball)
+            half = half_width(polar[i], beam_polar[b], ball)
             if half > 0.0:
                 out[i] += half / np.pi
     return out
@@ -162,7 +162,7 @@ def _zones(
         for b in range(first, len(beam_polar)):
             if beam_polar[b] > t + ball + 1e-9:
                 break
-            half = _half_width(t, beam_polar[b], ball)
+            half = half_width(t, beam_polar[b], ball)
             if half < 0.0:
                 continue
             if half >= np.pi:

@@ -4,6 +4,11 @@
      +-- TaskError             a task file or a catalogue file is missing, malformed or inconsistent
      +-- BuildError            a part, a drawing or a build folder cannot be made as asked
      +-- RecordingError        a recording is unreadable, or lacks what the command needs
+     +-- SceneError            a mesh is unreadable, or holds nothing that a beam can hit
+     +-- DeviceError           a device is absent, or did not do what it was asked
+          +-- DeviceTimeoutError  ... because nothing came in time
+          +-- ProtocolError    ... because what came is no valid packet
+          +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
 
 A command prints one of these as one line and exits with 2; anything else is a bug and gets its traceback.
 Each line names file, field, value, bound and a suggestion, as far as they apply.
@@ -29,6 +34,26 @@ class BuildError(ScanwrightError):
 
 class RecordingError(ScanwrightError):
     """A recording is unreadable, or lacks what the command needs."""
+
+
+class SceneError(ScanwrightError):
+    """A mesh is unreadable, or holds nothing that a beam can hit."""
+
+
+class DeviceError(ScanwrightError):
+    """A device is absent, or did not do what it was asked. The message names port, device and what to do."""
+
+
+class DeviceTimeoutError(DeviceError):
+    """Nothing came from a device in time: unplugged, without power, or at another speed."""
+
+
+class ProtocolError(DeviceError):
+    """What came from a device is no valid packet: a bad checksum, a wrong length, another command's answer."""
+
+
+class DeviceFaultError(DeviceError):
+    """A device reports a fault of its own: overload, heat, voltage, stall. What moved has been stopped."""
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

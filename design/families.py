@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -10,7 +10,9 @@ from scipy.optimize import minimize
 from design.folding import Folded, Mask
 from design.frames import Array, R_world_rot
 from design.landscape import Landscape
-from design.objective import Problem, Score, quick_J, score
+from design.objective import Score, quick_J, score
+from design.problem import NODES, Problem
+from design.robust import worst_within
 from design.task import NAMES, AngleRanges
 
 FAMILIES = 10
@@ -146,7 +148,8 @@ def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) ->
         if not any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
             refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2])
             again = score(problem, np.radians(refined))
-            if again.J + again.J_error >= grid_score.J:  # the rounder angles of the grid are as good
+            # the rounder angles of the grid are as good
+            if again.J + again.J_error >= grid_score.J and not ranges.tolerance_deg:
                 families.append(_family(leader.angles_deg, grid_score, leader))
             elif not any(_same_valley(refined, again.J, better) for better in families):
                 families.append(_family(refined, again, leader))
@@ -155,7 +158,18 @@ def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) ->
             break
         if not leader.minimum and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
             families.append(_family(leader.angles_deg, score(problem, np.radians(leader.angles_deg)), leader))
+    if ranges.tolerance_deg:
+        return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
+    """Families in the order of their highest J when one angle is off by the tolerance of the mounting."""
+    worst = [worst_within(problem, family.angles_rad, off_rad, NODES) for family in families]
+    order = np.argsort(worst, kind="stable")
+    told = [f"J <= {J:.4f} within {np.degrees(off_rad):g} deg" for J in worst]
+    words = [", ".join(filter(None, [family.word, more])) for family, more in zip(families, told, strict=True)]
+    return tuple(replace(families[i], word=words[i]) for i in order)
 
 
 def _family(angles_deg: Array, exact: Score, leader: Leader) -> Family:
@@ -184,6 +198,8 @@ def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tupl
         def J(moved: Array, nodes: int = nodes) -> float:
             setting = angles.copy()
             setting[free] = moved
+            if ranges.tolerance_deg:
+                return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
             return quick_J(problem, np.radians(setting), nodes)
 
         start, step = angles[free], reach * ranges.step_deg

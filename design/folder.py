@@ -19,7 +19,19 @@ from design.errors import BuildError
 from design.task import LoadedTask
 
 MANIFEST = "manifest.json"
-WRITERS = ("cadquery", "cadquery-ocp", "matplotlib", "numba", "numpy", "pillow", "scipy", "tomli-w", "trimesh")
+WRITERS = (
+    "cadquery",
+    "cadquery-ocp",
+    "ezdxf",
+    "matplotlib",
+    "numba",
+    "numpy",
+    "pillow",
+    "reportlab",
+    "scipy",
+    "tomli-w",
+    "trimesh",
+)
 
 
 def versions() -> dict[str, str]:
@@ -78,6 +90,29 @@ def is_current(folder: Path, loaded: LoadedTask) -> bool:
         return False
     files: dict[str, dict[str, Any]] = manifest["files"]
     return all((folder / name).is_file() and _sha256(folder / name) == facts["sha256"] for name, facts in files.items())
+
+
+def first_difference(folder: Path, again: Path) -> str | None:
+    """What tells a build folder from a second build of its task, in words; None where every byte is the same.
+
+    Raises:
+        BuildError: the first one is no finished build.
+    """
+    built = manifest_of(folder).get("files")
+    if built is None:
+        raise BuildError(f"{folder / MANIFEST}: missing or unreadable: not a finished build; build it first")
+    rebuilt = manifest_of(again)["files"]
+    for name in sorted({*built, *rebuilt}):
+        if name not in rebuilt:
+            return f"{name}: the second build has no such file"
+        if not (folder / name).is_file():
+            return f"{name}: missing"
+        digests = _sha256(folder / name), _sha256(again / name)
+        if digests[0] != digests[1]:
+            return f"{name}: sha256 {digests[0][:12]}, built again {digests[1][:12]}"
+    if (folder / MANIFEST).read_bytes() != (again / MANIFEST).read_bytes():
+        return f"{MANIFEST}: differs, though no file does: other versions"
+    return None
 
 
 def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:

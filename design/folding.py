@@ -66,6 +66,13 @@ def fold_planes(ranges: AngleRanges, mirrors: Array) -> Folded:
     return _fold(settings, plane_key(np.radians(settings)), mirrors)
 
 
+def unfolded(ranges: AngleRanges) -> tuple[Folded, Folded]:
+    """Axes and scan planes of the grid, each setting a class of its own: for a sweep, where nothing is equivalent."""
+    axes = _grid(ranges, "alpha_rot", "beta_rot")
+    planes = _grid(ranges, "alpha_laser", "beta_laser")
+    return _apart(axes, R_world_rot(*np.radians(axes.T))[:, :, 2]), _apart(planes, plane_key(np.radians(planes)))
+
+
 def plane_key(plane_rad: Array) -> Array:
     """(q0, q1) of scan planes (alpha_laser, beta_laser) (n, 2): beam polar angles are acos(q0 cos b + q1 sin b)."""
     alpha, beta = plane_rad.T
@@ -75,6 +82,12 @@ def plane_key(plane_rad: Array) -> Array:
 def _grid(ranges: AngleRanges, first: str, second: str) -> Array:
     a, b = np.meshgrid(ranges.grid_deg(first), ranges.grid_deg(second), indexing="ij")
     return np.stack([a.ravel(), b.ravel()], axis=1)
+
+
+def _apart(settings: Array, points: Array) -> Folded:
+    each = np.arange(len(settings))
+    no = np.zeros(len(settings), dtype=bool)
+    return Folded(settings, points, each, no, each, np.stack([~no, no]), no)
 
 
 def _fold(settings: Array, points: Array, mirrors: Array) -> Folded:

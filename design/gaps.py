@@ -11,13 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.beams import Lines, beam_directions_rot
+from design.beams import Lines, beam_directions_rot, polar_and_azimuth
 from design.density import zones
 from design.errors import TaskError
 from design.frames import Array, R_rot_laser, R_world_rot
-from design.objective import NODES, Problem, rule_of
+from design.problem import NODES, Problem
+from design.quadrature import rule_of
+from design.sphere import weighted_samples
 
 MOST_LINES = 200_000
+SWEPT_DIRECTIONS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +40,15 @@ class Gaps:
         line_gap_deg: widest distance between neighbouring scan lines of one family, across the lines.
         seen_twice: where both families of lines come.
         crossing_deg: mean angle at which they cross there, 0 to 90; None where nothing is seen twice.
-        half_turn_misses: what half a turn does not see of what a full turn sees, in the mean over its start.
+        half_turn_misses: what half a turn does not see of what a full turn sees, in the mean over its start; None for
+            a sweep.
     """
 
     blind_cones: tuple[BlindCone, ...]
     line_gap_deg: float
     seen_twice: float
     crossing_deg: float | None
-    half_turn_misses: float
+    half_turn_misses: float | None
 
     def line_gap_mm(self, range_m: float) -> float:
         """Widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
@@ -61,21 +65,20 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
     beams = beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3])
     normal = R_rot_laser(angles_rad[2], angles_rad[3])[:, 2]
     across = np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal)
-    rule, polar, _ = rule_of(problem, angles_rad, NODES)
-    families = _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)
+    polar_rad, weights, families = (_around if problem.sweep is None else _within_limits)(problem, angles_rad)
     seen = families.any(axis=0)
     twice = families.all(axis=0)
-    apart, crossing = _between_families(normal, rule.polar_rad)
-    total = float(rule.fine.sum())
-    weight_twice = float(rule.fine @ twice)
+    apart, crossing = _between_families(normal, polar_rad)
+    total = float(weights.sum())
+    weight_twice = float(weights @ twice)
     # half a turn sees half of what one family sees, and more by how far the second one is ahead or behind
     misses = np.where(twice, 0.5 - apart / (2 * np.pi), 0.5) * seen
     return Gaps(
-        blind_cones=_blind_cones(u, polar),
+        blind_cones=_blind_cones(u, polar_and_azimuth(beams)[0]),
         line_gap_deg=float(np.degrees(problem.lines.step_rad * across.max())),
         seen_twice=weight_twice / total,
-        crossing_deg=float(np.degrees(rule.fine @ (crossing * twice) / weight_twice)) if weight_twice > 0 else None,
-        half_turn_misses=float(rule.fine @ misses / total),
+        crossing_deg=float(np.degrees(weights @ (crossing * twice) / weight_twice)) if weight_twice > 0 else None,
+        half_turn_misses=float(weights @ misses / total) if problem.sweep is None else None,
     )
 
 
@@ -128,20 +131,38 @@ def _blind_cones(u: Array, beam_polar: Array) -> tuple[BlindCone, ...]:
     return tuple(sorted(found, key=lambda cone: -cone.half_angle_deg))
 
 
-def _families(bearings_rad: Array, plane_rad: Array, polar_rad: Array) -> Array:
-    """Whether each of the two bearings of a polar angle lies in the field of view, shape (2, n)."""
+def _around(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+    """Polar angles, their weights, and the families that come there, where the axis turns all around."""
+    rule, _, _ = rule_of(problem, angles_rad, NODES)
+    return rule.polar_rad, rule.fine, _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)[0]
+
+
+def _within_limits(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+    """The same at directions, for a sweep: a family comes where the joint angle it needs lies within the limits."""
+    assert problem.sweep is not None
+    samples = weighted_samples(problem.field, SWEPT_DIRECTIONS)
+    polar, azimuth = polar_and_azimuth(samples.directions @ R_world_rot(angles_rad[0], angles_rad[1]))
+    families, bearings = _families(problem.bearings_rad, angles_rad[2:], polar)
+    beam_azimuth = np.stack([polar_and_azimuth(beam_directions_rot(b, *angles_rad[2:]))[1] for b in bearings])
+    lower, upper = np.radians(problem.sweep.motion.limits_deg)
+    return polar, samples.weights, families & ((azimuth - beam_azimuth - lower) % (2 * np.pi) <= upper - lower)
+
+
+def _families(bearings_rad: Array, plane_rad: Array, polar_rad: Array) -> tuple[Array, Array]:
+    """Whether each of the two bearings of a polar angle lies in the field of view, and the bearings, (2, n) both."""
     alpha, beta = plane_rad
     q = np.array([-np.sin(beta), np.cos(beta) * np.sin(alpha)])
     slope = np.hypot(*q)  # sin(gamma)
     nearest = np.arctan2(q[1], q[0])  # the bearing that comes closest to the axis
     if slope < 1e-12:
-        return np.zeros((2, len(polar_rad)), dtype=bool)
+        return np.zeros((2, len(polar_rad)), dtype=bool), np.zeros((2, len(polar_rad)))
     ratio = np.cos(polar_rad) / slope
     met = np.abs(ratio) <= 1
     sigma = np.arccos(np.clip(ratio, -1, 1))
     step = np.diff(bearings_rad).max() / 2
     low, high = bearings_rad.min() - step, bearings_rad.max() + step
-    return np.stack([met & ((nearest + s - low) % (2 * np.pi) <= high - low) for s in (sigma, -sigma)])
+    both = np.stack([nearest + sigma, nearest - sigma])
+    return met & ((both - low) % (2 * np.pi) <= high - low), both
 
 
 def _between_families(normal: Array, polar_rad: Array) -> tuple[Array, Array]:

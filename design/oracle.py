@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from design.beams import simulated_scan
+from design.beams import scan_at, simulated_scan
 from design.frames import Array, R_world_rot, rotvec_to_matrix
-from design.objective import Problem, log_density
-from design.sphere import Samples, equal_angle_grid, weighted_samples
+from design.problem import Problem
+from design.sphere import sample_set
 
 PHASES = 8
 SETS = 4  # of directions for every phase: 32 estimates of J, so that their spread is known well enough
@@ -31,32 +31,28 @@ def ball_score(problem: Problem, angles_rad: Array, directions: int = DIRECTIONS
     Raises:
         TaskError: no direction has a weight.
     """
+    if problem.sweep is not None:
+        return _swept_score(problem, angles_rad, directions)
     return ball_score_on(scan_tree(problem, angles_rad), problem, angles_rad, directions)
 
 
 def scan_tree(problem: Problem, angles_rad: Array) -> cKDTree:
     """The simulated full scan of a setting, ready to be searched; it depends on beams and lines only."""
-    scan = simulated_scan(problem.bearings_rad, problem.lines, angles_rad)
-    return cKDTree(scan, balanced_tree=False, compact_nodes=False)
+    return _tree(simulated_scan(problem.bearings_rad, problem.lines, angles_rad))
 
 
 def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
-    """As `ball_score`, for a scan that is there already.
+    """As `ball_score`, for a scan of a full turn that is there already.
 
     Another start phase is the same scan turned about the axis, so the directions are turned back instead.
     """
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    chord = 2 * np.sin(problem.ball_rad / 2)
     estimates = []
     for i, phase in enumerate(start_phases(problem.lines.count, problem.lines.step_rad)):
-        for samples in sample_sets(problem, directions // SETS, SETS * i):
-            turned = samples.directions @ rotvec_to_matrix(axis * phase)  # rows times R(phase): columns turned back
-            counts = tree.query_ball_point(turned, chord, return_length=True, workers=-1)
-            estimates.append(samples.weights @ log_density(counts) / samples.weights.sum())
-    return BallScore(
-        J=float(np.mean(estimates)),
-        J_error=float(4 * np.std(estimates, ddof=1) / np.sqrt(len(estimates))),
-    )
+        back = rotvec_to_matrix(axis * phase)  # rows times R(phase): columns turned back
+        for k in range(SETS):
+            estimates.append(_estimate(tree, problem, back, directions // SETS, SETS * i + k))
+    return _score(problem, estimates)
 
 
 def start_phases(lines: int, step_rad: float) -> Array:
@@ -65,10 +61,40 @@ def start_phases(lines: int, step_rad: float) -> Array:
     return step_rad * (np.round(i * lines / PHASES) + (i + 0.5) / PHASES)
 
 
-def sample_sets(problem: Problem, directions: int, first: int) -> list[Samples]:
-    """Sets of directions that share no ring of the spiral: no two shall cut the region's edges in the same way."""
-    if problem.grid_step_deg:
-        grid = equal_angle_grid(problem.grid_step_deg)
-        weights = problem.field.weight_at(grid)
-        return [Samples(grid[weights > 0], weights[weights > 0])]
-    return [weighted_samples(problem.field, directions + 17 * (first + k), turn_rad=first + k) for k in range(SETS)]
+def _swept_score(problem: Problem, angles_rad: Array, directions: int) -> BallScore:
+    assert problem.sweep is not None
+    estimates = []
+    for i in range(PHASES):
+        joint = problem.sweep.angles_rad((i + 0.5) / PHASES)
+        tree = _tree(scan_at(problem.bearings_rad, joint, angles_rad))
+        for k in range(SETS):
+            estimates.append(_estimate(tree, problem, np.eye(3), directions // SETS, SETS * i + k))
+    return _score(problem, estimates)
+
+
+def _tree(scan: Array) -> cKDTree:
+    return cKDTree(scan, balanced_tree=False, compact_nodes=False)
+
+
+def _estimate(tree: cKDTree, problem: Problem, back: Array, wanted: int, index: int) -> Array:
+    """Each moment over one set of directions, at one start phase, shape (moments,)."""
+    chord = 2 * np.sin(problem.ball_rad / 2)
+    values = []
+    for moment in problem.objective.moments:
+        samples = sample_set(moment.field, problem.grid_step_deg, wanted, index)
+        counts = tree.query_ball_point(samples.directions @ back, chord, return_length=True, workers=-1)
+        g = moment.g(problem.lines.repeats * counts)
+        highest = moment.gathered == "highest"
+        values.append(g.max() if highest else samples.weights @ g / samples.weights.sum())
+    return np.array(values)
+
+
+def _score(problem: Problem, estimates: list[Array]) -> BallScore:
+    moments = np.array(estimates).T
+    each = problem.objective.join(moments)
+    highest = [moment.gathered == "highest" for moment in problem.objective.moments]
+    gathered = np.where(highest, moments.max(axis=1), moments.mean(axis=1))
+    return BallScore(
+        J=float(problem.objective.join(gathered)),
+        J_error=float(4 * np.std(each, ddof=1) / np.sqrt(len(each))),
+    )

@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from design.beams import beam_directions_rot, polar_and_azimuth
-from design.density import mean_count
-from design.frames import Array, R_world_rot
-from design.objective import Problem
+from design.coverage import mean_density_at
+from design.frames import Array
+from design.problem import Problem
 
 STEP_DEG = 0.5
 INK = "#111111"
@@ -33,7 +32,7 @@ def density_picture(path: Path, problem: Problem, settings: dict[str, Array], ti
     directions = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3)
     weight = problem.field.weight_at(directions).reshape(t.shape)
     masked = problem.field.masked_at(directions).reshape(t.shape)
-    maps = {name: _mean_density(problem, angles, directions).reshape(t.shape) for name, angles in settings.items()}
+    maps = {name: mean_density_at(problem, angles, directions).reshape(t.shape) for name, angles in settings.items()}
     highest = max(float(m.max()) for m in maps.values())
     norm = LogNorm(vmin=max(1.0, highest / 300), vmax=highest, clip=True)
 
@@ -61,12 +60,3 @@ def density_picture(path: Path, problem: Problem, settings: dict[str, Array], ti
         figure.colorbar(image, ax=axes, label=f"mean beams within {ball:g} deg (white: never seen)", shrink=0.9)
     figure.suptitle(title, fontsize=11)
     figure.savefig(path, dpi=110, metadata={"Software": None})
-
-
-def _mean_density(problem: Problem, angles_rad: Array, directions: Array) -> Array:
-    """Mean count at unit vectors (n, 3), from a table over the polar angle."""
-    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    polar, _ = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
-    table = np.linspace(0, np.pi, 3601)
-    counts = mean_count(table, polar, problem.lines, problem.ball_rad)
-    return np.interp(np.arccos(np.clip(directions @ axis, -1, 1)), table, counts)

@@ -34,6 +34,10 @@ def explain(error: ValidationError, source: Path | str, model: type[BaseModel]) 
         return f"{source}: {where}: this key is required{more}"
     if fault["type"] == "json_invalid":
         return f"{source}: not a JSON file: {fault['msg'].removeprefix('Invalid JSON: ')}"
+    if fault["type"] == "union_tag_invalid":
+        key, tag, known = (fault["ctx"][name] for name in ("discriminator", "tag", "expected_tags"))
+        near = suggest(tag, known.replace("'", "").split(", "))
+        return f"{source}: {where}.{key.strip(chr(39))} = {tag!r}: not one of {known}{near}{more}"
     shown = repr(fault["input"])
     value = f" = {shown}" if len(shown) < 80 else ""
     return f"{source}: {where}{value}: {fault['msg'].removeprefix('Value error, ')}{more}"

@@ -7,15 +7,18 @@ finite sum: exact, region edges included.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 from design.frames import Array
 from design.parallel import in_chunks
-from design.task import All, Band, Cone, LoadedTask, Map
+from design.shapes import All, Band, Box, Cone, Map, MaskRegion, Region
+from design.surface import Surface
+from design.task import LoadedTask
 
 ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
 SPHERE = [0.0, 0.0, 1.0, np.pi]
@@ -79,43 +82,76 @@ class Field:
         return planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
 
 
-def field_of(loaded: LoadedTask) -> Field:
-    """The weights and masks of a task."""
+def value_of(region: Region | MaskRegion) -> float:
+    """What a region is painted with."""
+    return region.value
+
+
+def field_of(loaded: LoadedTask, weight_of: Callable[[Region], float] = value_of) -> Field:
+    """The weights and masks of a task; `weight_of` tells what each region is painted with.
+
+    With a scene both become tables on its grid of rays: directions without a surface in range are masked, and what
+    lies in a box weighs by its area.
+    """
     maps = list(loaded.maps)
-    weight = _layers(loaded.task.weight, maps)
-    mask = _layers(loaded.task.mask, maps)
+    if loaded.surface is not None:
+        return _on_surface(loaded, loaded.surface, maps, weight_of)
+    weight = _layers(loaded.task.weight, maps, weight_of)
+    mask = _layers(loaded.task.mask, maps, value_of)
     return Field(weight, mask, loaded.task.density.background)
 
 
-def _layers(regions: Sequence[All | Band | Cone | Map], maps: list[Array]) -> Layers:
+def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_of: Callable[[Region], float]) -> Field:
+    shape = surface.range_m.shape
+    flat = surface.directions.reshape(-1, 3)
+    area = surface.area_per_sr()
+    painted = np.full(shape, loaded.task.density.background)
+    for region in loaded.task.weight:
+        if isinstance(region, Box):
+            inside = ((surface.points_m >= region.min_m) & (surface.points_m <= region.max_m)).all(axis=2)
+            painted = np.where(inside, weight_of(region) * area, painted)
+            continue
+        one = _layers([region], maps, lambda _: 1.0)
+        here = _paint(one, flat, -1.0).reshape(shape)
+        painted = np.where(here >= 0, weight_of(region) * np.maximum(here, 0.0), painted)
+    robot = _paint(_layers(loaded.task.mask, maps, value_of), flat, 0.0).reshape(shape) > 0
+    lidar = loaded.lidar
+    seen = surface.within(lidar.range_min_mm / 1000, (lidar.range_practical_mm or lidar.range_max_mm) / 1000)
+    hidden = Map(shape="map", file="")
+    weight = _layers([hidden], [np.where(robot | ~seen, 0.0, painted)], value_of)
+    return Field(weight, _layers([hidden], [(robot | ~seen).astype(float)], value_of), 0.0)
+
+
+def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of: Callable[[Any], float]) -> Layers:
     """Turn regions into numbers; takes as many tables off the front of `maps` as there are map regions."""
     rows: list[list[float]] = []
     planes = [np.empty((0, 4))]
     tables: list[Array] = []
     caps: list[list[float]] = []
     for region in regions:
+        value = weight_of(region)
         cap = SPHERE
         if isinstance(region, All):
-            rows.append([ALL, 0, 0, 0, 0, 0, 0, region.value])
+            rows.append([ALL, 0, 0, 0, 0, 0, 0, value])
         elif isinstance(region, Band):
             theta, phi = np.radians(region.theta_deg), np.radians(region.phi_deg)
             middle, half = (phi[0] + phi[1]) / 2, (phi[1] - phi[0]) / 2
             around = [np.cos(middle), np.sin(middle), np.cos(half)]
-            rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, region.value])
+            rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, value])
             planes.append(_edges_of_band(theta, phi))
             cap = _cap_of_band(theta, middle, half)
         elif isinstance(region, Cone):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
             half_angle = np.radians(region.half_angle_deg)
-            rows.append([CONE, *axis, np.cos(half_angle), 0, 0, region.value])
+            rows.append([CONE, *axis, np.cos(half_angle), 0, 0, value])
             planes.append(np.array([[*axis, np.cos(half_angle)]]))
             cap = [*axis, half_angle]
         else:
             table = maps.pop(0)
-            rows.append([MAP, len(tables), *table.shape, 0, 0, 0, region.value])
+            rows.append([MAP, len(tables), *table.shape, 0, 0, 0, value])
             tables.append(table)
             planes.append(_edges_of_map(*table.shape))
-        if region.value > 0:
+        if value > 0:
             caps.append(cap)
     return Layers(
         np.array(rows, dtype=float).reshape(-1, 8),

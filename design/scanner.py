@@ -5,18 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from design.angles import AngleSet
-from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing
+from design.catalogue import Bearing, Catalogue, Lidar, Printer, Servo, SlipRing
 
 
 @dataclass(frozen=True, slots=True)
 class Scanner:
-    """Angles with their products; `slip_ring` is None where the motion needs none."""
+    """Angles with their products; `slip_ring` is None where the motion needs none.
+
+    Attributes:
+        bearings: those that a tilted axis may choose from, smallest bore first.
+    """
 
     angles: AngleSet
     lidar: Lidar
     servo: Servo
     slip_ring: SlipRing | None
     printer: Printer
+    bearings: tuple[Bearing, ...]
 
 
 def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue) -> Scanner:
@@ -31,4 +36,5 @@ def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue) -> Scanner:
         servo=catalogue.get(angles.servo, Servo),
         slip_ring=None if angles.slip_ring is None else catalogue.get(angles.slip_ring, SlipRing),
         printer=catalogue.get(printer, Printer),
+        bearings=catalogue.bearings(),
     )

@@ -7,15 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.errors import TaskError
 from design.families import Family, best_leader, families_of, leaders_of
-from design.folding import Folded, fold_axes, fold_planes, mirrors_of
+from design.folding import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.frames import Array
 from design.landscape import Landscape, Progress, landscape_of
 from design.left_out import LeftOut
-from design.objective import Problem
-from design.task import NAMES, AngleRanges
+from design.limits import allowed_planes, keeps, line_gaps_deg
+from design.problem import Problem
+from design.swept_landscape import swept_landscape_of
+from design.task import NAMES, AngleRanges, Limits
 
 LEADERS_STEP_DEG = 5.0
+NONE = Limits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,27 +46,37 @@ class SearchResult:
     axes: Array
 
 
-def search(problem: Problem, ranges: AngleRanges, progress: Progress = lambda _: None) -> SearchResult:
-    """Find the best families of settings in the ranges of a task.
+def search(
+    problem: Problem,
+    ranges: AngleRanges,
+    progress: Progress = lambda _: None,
+    limits: Limits = NONE,
+) -> SearchResult:
+    """Find the best families of settings in the ranges of a task that keep its limits.
 
     Raises:
-        TaskError: no direction has a weight.
+        TaskError: no direction has a weight, or no setting keeps the limits.
     """
     start = time.perf_counter()
     mirrors = mirrors_of(problem.bearings_rad)
-    axes = fold_axes(ranges)
-    planes = fold_planes(ranges, mirrors)
-    progress(f"{len(planes.first):,} different scan planes x {len(axes.first):,} axes, both ways round")
-    land, exact = landscape_of(problem, planes, axes, progress)
-    if ranges.step_deg >= LEADERS_STEP_DEG:
+    if problem.sweep is None:
+        axes, planes = fold_axes(ranges), allowed_planes(problem, fold_planes(ranges, mirrors), limits)
+        progress(f"{len(planes.first):,} different scan planes x {len(axes.first):,} axes, both ways round")
+        land, exact = landscape_of(problem, planes, axes, progress)
+    else:
+        mirrors, (axes, planes) = mirrors[:1], unfolded(ranges)
+        planes = allowed_planes(problem, planes, limits)
+        progress(f"{len(planes.first):,} scan planes x {len(axes.first):,} mountings of the servo")
+        land, exact = swept_landscape_of(problem, planes, axes, progress)
+    if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
         leaders = leaders_of(land, planes, axes, mirrors)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG})
-        coarse_axes, coarse_planes = fold_axes(coarse), fold_planes(coarse, mirrors)
+        coarse_axes, coarse_planes = fold_axes(coarse), allowed_planes(problem, fold_planes(coarse, mirrors), limits)
         coarse_land, _ = landscape_of(problem, coarse_planes, coarse_axes, progress)
         leaders = [best_leader(land, planes, axes), *leaders_of(coarse_land, coarse_planes, coarse_axes, mirrors)]
     progress("rescoring the leaders exactly, refining the minima")
-    families = families_of(problem, ranges, leaders)
+    families = _kept(families_of(problem, ranges, leaders), problem, limits)
     covered = len(axes.settings_deg) * len(planes.settings_deg)
     different = _different(planes, axes)
     return SearchResult(
@@ -74,6 +88,25 @@ def search(problem: Problem, ranges: AngleRanges, progress: Progress = lambda _:
         planes=_plane_table(planes, axes, land),
         axes=np.column_stack([axes.settings_deg, land.by_axis[axes.flip.astype(int), axes.classes]]),
     )
+
+
+def _kept(families: tuple[Family, ...], problem: Problem, limits: Limits) -> tuple[Family, ...]:
+    """The families that keep the limits; a refined setting may have left those of the grid.
+
+    Raises:
+        TaskError: none does.
+    """
+    gaps = line_gaps_deg(problem, np.array([family.angles_rad[2:] for family in families]))
+    within = gaps <= (limits.max_line_gap_deg or np.inf) * (1 + 1e-9)
+    kept = tuple(f for f, near in zip(families, within, strict=True) if near and keeps(f.score, limits))
+    if not kept:
+        least = max(family.score.least for family in families)
+        blind = min(family.score.blind_weight for family in families)
+        raise TaskError(
+            f"limits: none of the {len(families)} best families keeps them: min_density reaches {least}, "
+            f"max_blind_weight {blind:.2g}, max_line_gap_deg {gaps.min():.3g}; a longer period helps"
+        )
+    return kept
 
 
 def _different(planes: Folded, axes: Folded) -> int:

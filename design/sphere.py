@@ -61,6 +61,21 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0) -> Sample
     )
 
 
+def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
+    """The set of that number: sets share no ring of the spiral, so no two cut a region's edges alike.
+
+    With a grid step it is the paper's grid, the same for every number.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    if grid_step_deg:
+        grid = equal_angle_grid(grid_step_deg)
+        weights = field.weight_at(grid)
+        return Samples(grid[weights > 0], weights[weights > 0])
+    return weighted_samples(field, wanted + 17 * index, turn_rad=float(index))
+
+
 def _in_cap(field: Field, caps: Array, index: int, wanted: int, turn_rad: float) -> Samples:
     """Weighted directions in one cap and in none before it; denser until there are enough, or it is given up."""
     centre, reach = caps[index, :3], float(caps[index, 3])

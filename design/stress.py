@@ -15,10 +15,13 @@ from design.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density import mean_count, zones
 from design.errors import TaskError
 from design.frames import Array
-from design.objective import Problem, log_density, quick_J, score
+from design.objective import quick_J, score
+from design.objectives import log
+from design.problem import Problem
 from design.regions import field_of
+from design.shapes import All
 from design.sphere import EMPTY
-from design.task import All, LoadedTask, Task
+from design.task import LoadedTask, Task
 
 PIECE_NODES = 8
 HALF_TURN = np.pi
@@ -172,7 +175,7 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[Row]:
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
     at = np.radians([60.0])
-    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, problem.g).mean_g[0])
+    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g[0])
     axis = [float(np.sin(at[0])), 0.0, float(np.cos(at[0]))]
     return [
         _row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)
@@ -187,7 +190,13 @@ def _refusals(loaded: LoadedTask, problem: Problem) -> list[Row]:
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
     rows = [_row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
     rows.append(
-        _row("everything masked", "refused", 1, _refused(lambda: replace(problem, field=field_of(hidden)), angles), 0)
+        _row(
+            "everything masked",
+            "refused",
+            1,
+            _refused(lambda: problem.with_objective(log(field_of(hidden))), angles),
+            0,
+        )
     )
     try:
         All.model_validate({"shape": "all", "value": float("nan")})
@@ -217,9 +226,8 @@ def _task(loaded: LoadedTask, weight: list[dict[str, object]], mask: list[dict[s
 
 def _with(loaded: LoadedTask, problem: Problem, weight: list[dict[str, object]]) -> Problem:
     changed = replace(loaded, task=_task(loaded, weight, []), maps=())
-    return replace(problem, field=field_of(changed), grid_step_deg=None)
+    return replace(problem.with_objective(log(field_of(changed))), grid_step_deg=None)
 
 
 def _with_turns(problem: Problem, turns: float) -> Problem:
-    lines = scan_lines(turns, 1.0)
-    return replace(problem, lines=lines, g=log_density(np.arange(lines.count * len(problem.bearings_rad) + 1.0)))
+    return problem.with_beams(problem.bearings_rad, scan_lines(turns, 1.0))

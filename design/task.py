@@ -12,26 +12,22 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, Strict, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from design.angles import Spin
 from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
 from design.errors import TaskError
 from design.frames import Array
+from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record, explain
+from design.shapes import Box, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
+from design.surface import Surface, surface_of
 
 SHIPPED = Path(__file__).parent / "tasks"
 
-Number = Annotated[float, Strict()]
-"""An int or a float of the file; text and true are no numbers."""
-
-Limits = tuple[Number, Number]
-Angle = Number | Limits
+Angle = Number | Span
 """One value fixes the angle; two are the range to search, in degrees."""
 
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
-
-Value = Annotated[Number, Field(ge=0)]
 
 
 class AngleRanges(Record):
@@ -42,6 +38,7 @@ class AngleRanges(Record):
     alpha_laser_deg: Angle = (-90.0, 90.0)
     beta_laser_deg: Angle = (-90.0, 90.0)
     step_deg: Number = Field(default=5.0, ge=0.5, le=45)
+    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
 
     @model_validator(mode="after")
     def _within_bounds(self) -> AngleRanges:
@@ -51,7 +48,7 @@ class AngleRanges(Record):
                 raise ValueError(f"{name}_deg = {[lower, upper]} does not rise within -{bound} .. {bound}")
         return self
 
-    def limits(self, name: str) -> Limits:
+    def limits(self, name: str) -> Span:
         """Range of one angle in degrees; both ends are equal where it is fixed."""
         angle: Angle = getattr(self, f"{name}_deg")
         return angle if isinstance(angle, tuple) else (angle, angle)
@@ -68,7 +65,8 @@ class DensityRules(Record):
     """How density is counted and judged; see `design.md`, Definitions."""
 
     ball_radius_deg: Number = Field(default=2.0, ge=0.01, le=90)
-    objective: Literal["log"] = "log"
+    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = "log"
+    required: Required = None
     background: Value = 0.0
     quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
     grid_step_deg: Number = Field(default=1.0, ge=0.25, le=10)
@@ -83,61 +81,14 @@ class DensityRules(Record):
         return step
 
 
-class All(Record):
-    """Every direction."""
+class Limits(Record):
+    """What every reported setting must keep, whatever its J."""
 
-    shape: Literal["all"]
-    value: Value = 1.0
-
-
-class Band(Record):
-    """theta from the world's z axis, phi from its x axis; edges inclusive, phi wraps."""
-
-    shape: Literal["band"]
-    theta_deg: Limits = (0.0, 180.0)
-    phi_deg: Limits = (-180.0, 180.0)
-    value: Value = 1.0
-
-    @model_validator(mode="after")
-    def _edges_rise(self) -> Band:
-        if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
-            raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
-        if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
-            raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
-        return self
-
-
-class Cone(Record):
-    """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
-
-    shape: Literal["cone"]
-    axis: tuple[Number, Number, Number]
-    half_angle_deg: Number = Field(ge=1e-3, le=180)
-    value: Value = 1.0
-
-    @field_validator("axis")
-    @classmethod
-    def _has_a_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
-        longest = max(abs(x) for x in axis)
-        if longest == 0:
-            raise ValueError("an axis of length zero has no direction")
-        if not 1e-100 < longest < 1e100:
-            raise ValueError("an axis of such length has no direction that can be computed: scale it")
-        return axis
-
-
-class Map(Record):
-    """A picture or table of weights: rows theta 0..180, columns phi 0..360, cell centres; PNG value / 255 (grey).
-
-    A .npy or .csv table is taken as it is. `value` scales it.
-    """
-
-    shape: Literal["map"]
-    file: str
-    value: Value = 1.0
-
-
-Region = Annotated[All | Band | Cone | Map, Field(discriminator="shape")]
+    min_density: Number | None = Field(default=None, ge=1, description="beams per ball, anywhere in the region")
+    max_line_gap_deg: Number | None = Field(default=None, gt=0, le=360, description="between neighbouring scan lines")
+    max_blind_cone_deg: Number | None = Field(default=None, ge=0, le=90, description="half angle, about the axis")
+    max_blocked: Number | None = Field(default=None, gt=0, le=1, description="share of the beams that parts may hide")
+    max_blind_weight: Number | None = Field(default=None, ge=0, le=1, description="share of the weight never seen")
 
 
 class Task(Record):
@@ -149,11 +100,28 @@ class Task(Record):
     slip_ring: str | None = None
     printer: str = "fdm-0.4"
     catalogue: tuple[str, ...] = ()
-    motion: Spin
+    motion: Annotated[Motion | Shortest, Field(discriminator="mode")]
     angles: AngleRanges = AngleRanges()
     density: DensityRules = DensityRules()
+    limits: Limits = Limits()
     weight: tuple[Region, ...] = ()
-    mask: tuple[Region, ...] = ()
+    mask: tuple[MaskRegion, ...] = ()
+    scene: Placed | None = None
+
+    @model_validator(mode="after")
+    def _boxes_stand_in_a_scene(self) -> Task:
+        if self.scene is None and any(isinstance(region, Box) for region in self.weight):
+            raise ValueError("a weight of shape = 'box' needs a [scene] that it stands in")
+        return self
+
+    @field_validator("motion", mode="before")
+    @classmethod
+    def _spins_if_not_told(cls, motion: Any) -> Any:
+        if not isinstance(motion, dict):
+            return motion
+        if motion.get("period_s") == "shortest" and motion.get("mode", "spin") == "spin":
+            return {key: value for key, value in motion.items() if key != "period_s"} | {"mode": "shortest"}
+        return {"mode": "spin"} | motion
 
     @field_validator("name", mode="before")
     @classmethod
@@ -167,13 +135,15 @@ class Task(Record):
 class LoadedTask:
     """A task, the file it came from, the products it names, and its maps.
 
-    `maps` holds the tables of the `map` regions, weights first, then masks, in their order; (rows, columns) each.
+    `maps` holds the tables of the `map` and `mesh` regions, weights first, then masks, in their order; (rows, columns)
+    each. `surface` is what the rays into the scene hit.
     """
 
     task: Task
     source: Path
     products: Catalogue
     maps: tuple[Array, ...]
+    surface: Surface | None = None
 
     @property
     def lidar(self) -> Lidar:
@@ -188,7 +158,7 @@ class LoadedTask:
     def warnings(self) -> list[str]:
         """What the task can do, but not as well as its author may think."""
         seen_deg = self.servo.position_feedback_deg
-        if seen_deg < 360:
+        if seen_deg < 360 and not isinstance(self.task.motion, Sweep):
             return [
                 f"{self.servo.name}: position_feedback_deg = {seen_deg:g}: in {360 - seen_deg:g} deg of every turn no "
                 "angle is read, and scans there have none; take a servo that reads all around, such as MX-64R"
@@ -200,12 +170,16 @@ class LoadedTask:
         task = self.task.model_dump(mode="json", exclude={"catalogue"})
         for region in [*task["weight"], *task["mask"]]:
             region.pop("file", None)  # what is in it counts, not what it is called
+        if task["scene"]:
+            task["scene"].pop("file")
         parts = [json.dumps(task, sort_keys=True)]
         names = [self.task.sensor, self.task.servo, self.task.slip_ring, self.task.printer]
         parts += [self.products.products[name].model_dump_json() for name in names if name]
         digest = hashlib.sha256("\n".join(parts).encode())
         for table in self.maps:
             digest.update(np.ascontiguousarray(table).tobytes())
+        if self.surface is not None:
+            digest.update(self.surface.range_m.tobytes())
         return digest.hexdigest()
 
 
@@ -224,9 +198,16 @@ def load_task(path: Path) -> LoadedTask:
         raise TaskError(explain(error, source, Task)) from error
     products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
     _check_products(task, products, source)
+    limits = task.limits
+    if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
+        raise TaskError(
+            f"{source}: motion.period_s = 'shortest': shortest for what? Set limits.min_density or "
+            "limits.max_line_gap_deg"
+        )
     regions = [*task.weight, *task.mask]
-    maps = tuple(_read_map(source.parent / region.file) for region in regions if isinstance(region, Map))
-    return LoadedTask(task=task, source=source, products=products, maps=maps)
+    maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, Map | Mesh))
+    surface = None if task.scene is None else surface_of(task.scene, source.parent)
+    return LoadedTask(task=task, source=source, products=products, maps=maps, surface=surface)
 
 
 def shipped_tasks() -> list[str]:
@@ -255,13 +236,29 @@ def _check_products(task: Task, products: Catalogue, source: Path) -> None:
         ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
     except TaskError as error:
         raise TaskError(f"{source}: {field}: {error}") from error
+    if isinstance(task.motion, Sweep):
+        reach = products.get(task.servo, Servo).angular_range_deg / 2
+        if max(-task.motion.limits_deg[0], task.motion.limits_deg[1]) > reach:
+            raise TaskError(
+                f"{source}: motion.limits_deg = {list(task.motion.limits_deg)}: the {task.servo} reaches "
+                f"-{reach:g} .. {reach:g}"
+            )
+        return
     if ring is None:
-        raise TaskError(f"{source}: slip_ring: motion.mode = 'spin' turns without end and needs a slip ring")
+        word = "turns without end" if isinstance(task.motion, Spin | Shortest) else "goes all around"
+        raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
     if ring.bore_mm == 0:
         raise TaskError(
             f"{source}: slip_ring = '{ring.name}': bore_mm = 0: a capsule ring lets no shaft through, so in "
             "direct drive the servo cannot reach the lidar past the ring's stator; take a through-bore ring (12.7 mm)"
         )
+
+
+def _table(region: Map | Mesh, folder: Path) -> Array:
+    """Weights of a map, or 1 where a mesh is hit and 0 where not."""
+    if isinstance(region, Map):
+        return _read_map(folder / region.file)
+    return np.isfinite(surface_of(region, folder).range_m).astype(float)
 
 
 def _read_map(path: Path) -> Array:

@@ -14,7 +14,8 @@ from design.accuracy import METHODS, Point, by_ball_count, by_ball_search, on_fr
 from design.beams import beam_directions_rot, polar_and_azimuth
 from design.density import zones
 from design.errors import TaskError
-from design.objective import FRONT, NODES, nodes_for, problem_of, score
+from design.objective import score
+from design.problem import FRONT, NODES, nodes_for, problem_of
 from design.stress import stress_rows
 from design.task import load_task
 
@@ -46,7 +47,7 @@ def test_the_reference_is_right_without_any_of_our_quadrature(ground):
     problem = problem_of(replace(task, task=narrow))
 
     t = np.linspace(*band, 400_001)
-    g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.g).mean_g
+    g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
     total = simpson(g * np.sin(t), x=t)
     expected = total / (np.cos(band[0]) - np.cos(band[1]))
     truth = reference(problem, ANGLES)

@@ -33,8 +33,8 @@ def write(tmp_path, text, name="mine.toml"):
 
 def test_all_products_of_the_issue_are_there(shipped):
     by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
-    assert by_kind[Lidar] == {"UTM-30LX", "URG-04LX", "UST-10LX"}
-    assert by_kind[Servo] == {"MX-64R", "AX-12A"}
+    assert by_kind[Lidar] == {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX", "LMS 200"}
+    assert by_kind[Servo] == {"MX-64R", "MX-28", "XM430-W350", "AX-12A"}
     assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210"}
     assert by_kind[Printer] == {"fdm-0.4", "sla", "cnc"}
 

@@ -16,10 +16,12 @@ from design.compare_picture import compare_picture
 from design.density import ball_search, count_at
 from design.errors import BuildError
 from design.frames import R_rot_laser, R_world_rot
-from design.objective import log_density, problem_of, score
-from design.oracle import sample_sets
+from design.objective import score
+from design.objectives import log_density
+from design.oracle import SETS
+from design.problem import problem_of
 from design.search import search
-from design.sphere import spiral
+from design.sphere import sample_set, spiral
 from design.task import load_task
 
 FULL = ("VLP-16", "HDL-32E", "HDL-64E")
@@ -104,7 +106,7 @@ def test_turns_may_repeat_or_interlace_and_stay_within_the_stated_error(ceiling,
     scans = np.concatenate([multibeam_scan(product, start) for start in starts])
     J = [
         log_density(ball_search(scans, samples.directions, problem.ball_rad)) @ samples.weights / samples.weights.sum()
-        for samples in sample_sets(problem, 10_000, 0)
+        for samples in (sample_set(problem.field, problem.grid_step_deg, 10_000, k) for k in range(SETS))
     ]
     assert abs(np.mean(J) - row.J) <= row.J_error + 4 * np.std(J, ddof=1) / 2
 

@@ -10,8 +10,9 @@ import pytest
 from design.catalogue import load_catalogue
 from design.coverage import blind_zones, coverage
 from design.frames import R_world_rot
-from design.objective import problem_of
+from design.objectives import log
 from design.oracle import scan_tree
+from design.problem import problem_of
 from design.task import LoadedTask, Task
 
 CONE = {"shape": "cone", "axis": [-1.0, 0.0, -0.5], "half_angle_deg": 25}
@@ -65,7 +66,9 @@ def test_a_cone_hides_its_solid_angle(half_deg):
 
 def test_a_sphere_that_is_all_masked_is_not_blind():
     plain = problem([])
-    everything = replace(plain, field=replace(plain.field, mask=plain.field.weight))  # no task is read with such a mask
+    everything = plain.with_objective(
+        log(replace(plain.field, mask=plain.field.weight))
+    )  # no task is read with such a mask
     seen = coverage(everything, np.zeros(4))
     assert (seen.masked_fraction, seen.blind_fraction) == (1.0, 0.0)
 

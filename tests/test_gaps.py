@@ -12,7 +12,7 @@ from design.beams import Lines, beam_directions_rot, scan_lines, simulated_scan
 from design.errors import TaskError
 from design.frames import R_world_rot
 from design.gaps import gaps, interlaced_period_s, shortest_period_s
-from design.objective import problem_of
+from design.problem import problem_of
 from design.sphere import spiral
 from design.task import load_task
 
@@ -85,7 +85,7 @@ def test_lines_cross_at_twice_the_tilt_on_the_equator(uniform):
     task = load_task(Path("uniform"))
     region = [{"shape": "band", "theta_deg": [89.5, 90.5]}]
     narrow = task.task.model_validate(task.task.model_dump() | {"weight": region})
-    problem = replace(uniform, field=problem_of(replace(task, task=narrow)).field)
+    problem = uniform.with_objective(problem_of(replace(task, task=narrow)).objective)
     assert gaps(problem, np.radians((0, 0, 0, -40))).crossing_deg == pytest.approx(80, abs=0.1)
     assert gaps(problem, np.radians((0, 0, 0, 70))).crossing_deg == pytest.approx(40, abs=0.1)
 

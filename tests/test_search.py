@@ -9,7 +9,8 @@ import pytest
 from design import families, landscape, parallel
 from design.catalogue import load_catalogue
 from design.frames import R_world_rot
-from design.objective import problem_of, quick_J, score
+from design.objective import quick_J, score
+from design.problem import problem_of
 from design.search import search
 from design.task import NAMES, LoadedTask, Task, load_task, shipped_tasks
 

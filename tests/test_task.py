@@ -7,7 +7,8 @@ from matplotlib.image import imsave
 from design.build import write_task
 from design.catalogue import SHIPPED as PRODUCTS
 from design.errors import TaskError
-from design.objective import problem_of, score
+from design.objective import score
+from design.problem import problem_of
 from design.regions import field_of
 from design.task import load_task, shipped_tasks
 
@@ -214,7 +215,7 @@ def test_a_missing_file_a_folder_and_bytes_are_one_line(tmp_path):
 
 
 def test_an_unknown_task_name_lists_the_shipped_ones(tmp_path):
-    with pytest.raises(TaskError, match="ceiling, ground_ahead, pitching, rolling, uniform"):
+    with pytest.raises(TaskError, match="ceiling, ground_ahead, indoor_urg, pitching, rolling, uniform"):
         load_task(tmp_path.relative_to(tmp_path.parent) / "ground")
 
 
@@ -241,7 +242,7 @@ def load_text(tmp_path, text):
 
 
 def test_all_shipped_tasks_load_under_their_own_name(load_shipped):
-    assert set(load_shipped) == {"ceiling", "ground_ahead", "pitching", "rolling", "uniform"}
+    assert set(load_shipped) == {"ceiling", "ground_ahead", "indoor_urg", "pitching", "rolling", "uniform"}
     assert all(loaded.task.name == name for name, loaded in load_shipped.items())
     assert len({loaded.sha256() for loaded in load_shipped.values()}) == 5
     ahead = load_shipped["ground_ahead"].task

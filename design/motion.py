@@ -1,0 +1,123 @@
+"""How the servo moves during one full scan: it spins, sweeps to and fro, or stops and goes.
+
+The task names one of these records, the angle set carries it, and the program that drives the servo obeys it.
+Joint angles are those of `spin_joint`, 0 where the index marks meet.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
+
+from design.frames import Array
+from design.record import Record
+
+LONGEST_S = 600.0
+
+
+class Spin(Record):
+    """Continuous rotation at constant speed."""
+
+    mode: Literal["spin"] = "spin"
+    period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of one full turn of the servo")
+
+    @property
+    def duration_s(self) -> float:
+        """Time of one full scan."""
+        return self.period_s
+
+
+class Shortest(Record):
+    """Spin as fast as the limits of the task allow, `period_s = "shortest"` in its file: the search finds how fast."""
+
+    mode: Literal["shortest"] = "shortest"
+    longest_s: float = Field(default=60.0, strict=True, gt=0, le=LONGEST_S, description="beyond which it gives up")
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the slowest full scan there may be."""
+        return self.longest_s
+
+
+class Sweep(Record):
+    """From one limit to the other and back: accelerate, cruise, brake; both ways alike."""
+
+    mode: Literal["sweep"] = "sweep"
+    limits_deg: tuple[float, float]
+    period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time out and back")
+    profile: Literal["trapezoid"] = "trapezoid"
+    accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="while it speeds up and brakes")
+
+    @model_validator(mode="after")
+    def _can_be_done(self) -> Sweep:
+        lower, upper = self.limits_deg
+        if not -180 <= lower <= upper <= 180:
+            raise ValueError(f"limits_deg = {[lower, upper]} does not rise within -180 .. 180")
+        least = 2 * np.sqrt((upper - lower) / self.accel_deg_s2)
+        if self.period_s / 2 < least * (1 - 1e-12):
+            raise ValueError(
+                f"period_s = {self.period_s:g}: {upper - lower:g} deg out and back at accel_deg_s2 = "
+                f"{self.accel_deg_s2:g} take {2 * least:.3g} s at least"
+            )
+        return self
+
+    @property
+    def duration_s(self) -> float:
+        """Time of one full scan."""
+        return self.period_s
+
+    @property
+    def cruise_deg_s(self) -> float:
+        """Speed between speeding up and braking: `v (T / 2 - v / a) = range`."""
+        half, a = self.period_s / 2, self.accel_deg_s2
+        span = self.limits_deg[1] - self.limits_deg[0]
+        # the smaller root, written so that a short range in a long time does not cancel
+        return float(2 * span / (half + np.sqrt(max(half * half - 4 * span / a, 0.0))))
+
+    @property
+    def ramp_s(self) -> float:
+        """Time to speed up, and to brake."""
+        return self.cruise_deg_s / self.accel_deg_s2
+
+    def angle_rad(self, time_s: ArrayLike) -> Array:
+        """Joint angle at times since the start at the lower limit; it repeats after `period_s`."""
+        half = self.period_s / 2
+        phase = np.mod(np.asarray(time_s, dtype=float), self.period_s)
+        t = np.where(phase <= half, phase, self.period_s - phase)
+        v, a, ramp = self.cruise_deg_s, self.accel_deg_s2, self.ramp_s
+        lower, upper = self.limits_deg
+        cruising = lower + v * (t - ramp / 2)
+        degrees = np.where(t < ramp, lower + a * t * t / 2, cruising)
+        return np.radians(np.where(t > half - ramp, upper - a * (half - t) ** 2 / 2, degrees))
+
+    def time_s(self, angle_rad: ArrayLike) -> Array:
+        """Time at which the way out passes joint angles; those outside the limits count as the nearer limit."""
+        half = self.period_s / 2
+        v, a, ramp = self.cruise_deg_s, self.accel_deg_s2, self.ramp_s
+        lower, upper = self.limits_deg
+        degrees = np.clip(np.degrees(np.asarray(angle_rad, dtype=float)), lower, upper)
+        done, left = degrees - lower, upper - degrees
+        slow = a * ramp * ramp / 2
+        cruising = ramp / 2 + done / v if v > 0 else np.full_like(degrees, half / 2)
+        times = np.where(done < slow, np.sqrt(2 * done / a), cruising)
+        return np.where(left < slow, half - np.sqrt(2 * left / a), times)
+
+
+class StopAndGo(Record):
+    """Stop at evenly spread angles of a full turn, measure for a while, go on: no de-skew needed."""
+
+    mode: Literal["stop_and_go"] = "stop_and_go"
+    stops: int = Field(strict=True, ge=1, le=100_000, description="in one full turn")
+    dwell_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of measuring at each stop")
+    move_s: float = Field(default=0.2, strict=True, gt=0, le=LONGEST_S, description="from one stop to the next")
+
+    @property
+    def duration_s(self) -> float:
+        """Time of one full scan."""
+        return self.stops * (self.dwell_s + self.move_s)
+
+
+Motion = Annotated[Spin | Sweep | StopAndGo, Field(discriminator="mode")]

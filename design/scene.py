@@ -1,0 +1,151 @@
+"""The one ray caster: meshes of a room, a robot or a scanner, and what a beam hits first.
+
+Embree finds the triangle in single precision; the range is then taken from that triangle's plane in double
+precision, so that it is as exact as the mesh. Only a beam within float32 of an edge (some 1e-6 m in a room) may be
+given to the neighbour of the triangle that it truly hits.
+
+trimesh and embree are imported where they are used: most commands never cast a ray.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from design import frames
+from design.errors import SceneError
+from design.frames import Array
+
+SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
+
+_AS_IT_IS = np.eye(4)
+_BATCH = 1 << 17  # rays; bounds what one cast holds beside its result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Triangles, ready to be hit from either side.
+
+    Attributes:
+        triangles_m: corners, shape (t, 3, 3).
+        normals: unit normals by the right-hand rule, shape (t, 3).
+        origin_m: middle of the scene, shape (3,); embree sees the scene from there, where float32 is finest.
+        embree: the search structure.
+    """
+
+    triangles_m: Array
+    normals: Array
+    origin_m: Array
+    embree: Any
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hits:
+    """What each ray hits first; row i is ray i.
+
+    Attributes:
+        range_m: shape (n,), inf where there is nothing.
+        incidence_rad: angle between ray and surface normal, 0 .. pi/2, shape (n,), NaN where there is nothing.
+        triangle: row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 where there is nothing.
+    """
+
+    range_m: Array
+    incidence_rad: Array
+    triangle: NDArray[np.int32]
+
+
+def load_scene(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Scene:
+    """Scene of one mesh file; arguments and errors as for `load_triangles`."""
+    return scene_of(load_triangles(path, unit_m, T_world_mesh), str(path))
+
+
+def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Array:
+    """Corners of a mesh in the world [m], shape (t, 3, 3). The file's axes are taken as they are written.
+
+    Args:
+        path: STL, PLY, OBJ, DAE or GLB.
+        unit_m: length of one unit of the file.
+        T_world_mesh: pose of the mesh [m].
+
+    Raises:
+        SceneError: the file is missing, is no mesh, holds no triangle, or says that its unit is another one.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise SceneError(f"{path}: not a mesh by its name; a mesh is one of {', '.join(SUFFIXES)}")
+    if not path.is_file():
+        raise SceneError(f"{path}: {'this is a folder, not a mesh' if path.is_dir() else 'no such file'}")
+    if not 0 < unit_m < np.inf:
+        raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
+    import trimesh
+
+    try:
+        loaded = trimesh.load_scene(path, process=False)
+        triangles = np.asarray(loaded.to_mesh().triangles, dtype=float).reshape(-1, 3, 3)
+        said_m = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else unit_m
+    except Exception as error:  # readers of a dozen formats fail with as many types
+        raise SceneError(f"{path}: not a readable {path.suffix[1:].upper()} mesh: {type(error).__name__}") from error
+    if not np.isclose(said_m, unit_m):
+        raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file says that one unit is {said_m:g} m")
+    return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
+
+
+def scene_of(triangles_m: Array, name: str = "scene") -> Scene:
+    """Scene of triangles, shape (t, 3, 3); `name` is what an error calls it.
+
+    Raises:
+        SceneError: no triangle has an area, or a corner is not a number.
+    """
+    if not np.isfinite(triangles_m).all():
+        bad = int((~np.isfinite(triangles_m)).any(axis=(1, 2)).sum())
+        raise SceneError(f"{name}: {bad} of {len(triangles_m)} triangles have a corner that is not a finite number")
+    across = np.cross(triangles_m[:, 1] - triangles_m[:, 0], triangles_m[:, 2] - triangles_m[:, 0])
+    twice_area = np.linalg.norm(across, axis=1)
+    solid = twice_area > 0  # a triangle without area is hit by no ray and has no normal
+    if not solid.any():
+        raise SceneError(f"{name}: no triangle: it is empty, a point cloud, or cut off")
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    triangles = np.ascontiguousarray(triangles_m[solid])
+    origin = (triangles.min(axis=(0, 1)) + triangles.max(axis=(0, 1))) / 2
+    embree = EmbreeScene(robust=True)  # no ray slips through between two triangles that share an edge
+    corners = (triangles - origin).astype(np.float32).reshape(-1, 3)
+    TriangleMesh(embree, corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+    return Scene(triangles, across[solid] / twice_area[solid, None], origin, embree)
+
+
+def cast(scene: Scene, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
+    """The nearest surface along each ray.
+
+    Args:
+        scene: what can be hit.
+        origins_m: where the rays start, shape (n, 3), or (3,) for all.
+        directions: unit vectors, shape (n, 3).
+    """
+    directions = np.asarray(directions, dtype=float)
+    origins = np.broadcast_to(np.asarray(origins_m, dtype=float), directions.shape)
+    hits = Hits(
+        np.full(len(directions), np.inf), np.full(len(directions), np.nan), np.full(len(directions), -1, np.int32)
+    )
+    for start in range(0, len(directions), _BATCH):
+        _cast_batch(scene, origins, directions, slice(start, start + _BATCH), hits)
+    return hits
+
+
+def _cast_batch(scene: Scene, origins: Array, directions: Array, rows: slice, hits: Hits) -> None:
+    origin, direction = origins[rows] - scene.origin_m, directions[rows]
+    found = scene.embree.run(origin.astype(np.float32), direction.astype(np.float32), output=True)
+    triangle = found["primID"]
+    hit = triangle >= 0
+    normal, corner = scene.normals[triangle], scene.triangles_m[triangle, 0] - scene.origin_m
+    along = np.einsum("ij,ij->i", normal, direction)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exact = np.einsum("ij,ij->i", normal, corner - origin) / along
+    # Seen exactly edge on, a plane gives no range: there embree's own is the best there is.
+    hits.range_m[rows] = np.where(hit, np.where(np.isfinite(exact), exact, found["tfar"]), np.inf)
+    hits.incidence_rad[rows] = np.where(hit, np.arccos(np.minimum(np.abs(along), 1.0)), np.nan)
+    hits.triangle[rows] = triangle

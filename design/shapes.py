@@ -1,0 +1,122 @@
+"""Regions of the sphere, and of a scene, as a task file paints them.
+
+Files speak degrees, and metres where a mesh does; every key that has a unit ends in it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, field_validator, model_validator
+
+from design.record import Record
+
+Number = Annotated[float, Strict()]
+"""An int or a float of the file; text and true are no numbers."""
+
+Span = tuple[Number, Number]
+Triple = tuple[Number, Number, Number]
+Value = Annotated[Number, Field(ge=0)]
+Required = Annotated[Number | None, Field(gt=0, description="beams per ball, for objective = 'required'")]
+
+
+class All(Record):
+    """Every direction."""
+
+    shape: Literal["all"]
+    value: Value = 1.0
+    required: Required = None
+
+
+class Band(Record):
+    """theta from the world's z axis, phi from its x axis; edges inclusive, phi wraps."""
+
+    shape: Literal["band"]
+    theta_deg: Span = (0.0, 180.0)
+    phi_deg: Span = (-180.0, 180.0)
+    value: Value = 1.0
+    required: Required = None
+
+    @model_validator(mode="after")
+    def _edges_rise(self) -> Band:
+        if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
+            raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
+        if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
+            raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
+        return self
+
+
+class Cone(Record):
+    """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
+
+    shape: Literal["cone"]
+    axis: tuple[Number, Number, Number]
+    half_angle_deg: Number = Field(ge=1e-3, le=180)
+    value: Value = 1.0
+    required: Required = None
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        longest = max(abs(x) for x in axis)
+        if longest == 0:
+            raise ValueError("an axis of length zero has no direction")
+        if not 1e-100 < longest < 1e100:
+            raise ValueError("an axis of such length has no direction that can be computed: scale it")
+        return axis
+
+
+class Map(Record):
+    """A picture or table of weights: rows theta 0..180, columns phi 0..360, cell centres; PNG value / 255 (grey).
+
+    A .npy or .csv table is taken as it is. `value` scales it.
+    """
+
+    shape: Literal["map"]
+    file: str
+    value: Value = 1.0
+    required: Required = None
+
+
+class Placed(Record):
+    """A mesh, and where the scanner's optical centre and the world's axes are in it (roll, pitch, yaw; z last)."""
+
+    file: str
+    unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
+    sensor_m: Triple = (0.0, 0.0, 0.0)
+    rpy_deg: Triple = (0.0, 0.0, 0.0)
+    step_deg: Number = Field(default=2.0, ge=0.25, le=10, description="between the rays that are cast at it")
+
+    @field_validator("step_deg")
+    @classmethod
+    def _divides_the_half_circle(cls, step: float) -> float:
+        if abs(180 / step - round(180 / step)) > 1e-9:
+            raise ValueError("rows of rays reach theta = 180 only with a step that divides 180")
+        return step
+
+
+class Mesh(Placed):
+    """What a mesh hides, such as the robot: every direction in which it is hit."""
+
+    shape: Literal["mesh"]
+    value: Value = 1.0
+
+
+class Box(Record):
+    """Surfaces of the scene within a box of its frame. Every square metre of them counts the same."""
+
+    shape: Literal["box"]
+    min_m: Triple
+    max_m: Triple
+    value: Value = 1.0
+    required: Required = None
+
+    @model_validator(mode="after")
+    def _edges_rise(self) -> Box:
+        if not all(low < high for low, high in zip(self.min_m, self.max_m, strict=True)):
+            raise ValueError(f"min_m = {list(self.min_m)} is not below max_m = {list(self.max_m)}")
+        return self
+
+
+Region = Annotated[All | Band | Cone | Map | Box, Field(discriminator="shape")]
+MaskRegion = Annotated[All | Band | Cone | Map | Mesh, Field(discriminator="shape")]
