@@ -1,0 +1,329 @@
+"""SCIP 2.0, the language of Hokuyo lidars (specification C-42-03320B), as pure functions of bytes; no port, no clock.
+
+    request   VV LF      GD 0044 0725 01 LF      MD 0000 1080 01 0 00 LF
+    reply     echo LF  status sum LF  [line sum LF] ...  LF
+
+Text lines (VV, PP, II) are `KEY:text;` and their sum leaves out the semicolon; data lines are 64 characters of
+0x30..0x6F, the last one shorter, and may hold semicolons: which of the two a reply has, its echo says. The sum is six
+bits wide, and blind to the upper two of each byte, so lengths and characters are checked as strictly as it is.
+The echo has no sum at all: who asked compares it with what he asked.
+
+A sensor that wakes up in SCIP 1.1 answers with a status of one character and no sums; `SCIP_2` steps it up.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import ProtocolError
+
+Integers = NDArray[np.int32]
+
+SCIP_2 = b"SCIP2.0"
+STAMP_WRAP_MS = 1 << 24  # p. 12
+LINE_CHARACTERS = 64
+_LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 2161 steps
+_REQUEST = rb"(?:VV|PP|II|BM|QT|R[STB]|TM\d|SS\d{6}|CR\d\d|HS\d|DB\d\d|SCIP2\.0|%S[LT]|[GH][DSE]\d{10}|[MN][DSE]\d{13})"
+_ECHO = re.compile(_REQUEST + rb"(?:;[\w .+@]{0,16})?")
+_ECHO_LINE = re.compile(rb"^(?:" + _ECHO.pattern + rb")$", re.MULTILINE)
+_SCAN_ECHO = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?(?:;.*)?")
+
+STATUS = {
+    "0A": "the sensor has an internal fault",
+    "0B": "the request came twice, or its buffer is full",
+    "0C": "the request lacks parameters",
+    "0D": "the request is unknown",
+    "0E": "the request is unknown, or the sensor is adjusting its time",
+    "0F": "the request lacks parameters",
+    "0G": "the request's text is too long",
+    "0H": "the request's text has a letter that is not allowed",
+    "0I": "the sensor is waiting for a firmware update",
+    "0L": "the sensor is in an abnormal state",
+    "0M": "the sensor is unstable",
+    "10": "the laser is off",
+    "98": "the sensor went on after checking itself",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """One checked reply.
+
+    Attributes:
+        echo: the request it answers; in a scan, the last two digits count down.
+        status: two characters, one in SCIP 1.1.
+        lines: text without semicolon and sum, or data without sum.
+    """
+
+    echo: bytes
+    status: str
+    lines: tuple[bytes, ...]
+
+    @property
+    def command(self) -> bytes:
+        """The two letters that say what it is."""
+        return self.echo[:2]
+
+    def told(self) -> str:
+        """The status in words."""
+        if self.status.isdigit() and 21 <= int(self.status) <= 49:
+            return "the sensor stopped to check itself"
+        if self.status.isdigit() and 50 <= int(self.status) <= 97:
+            return "the sensor has a hardware fault; switch it off and on"
+        return STATUS.get(self.status, "refused")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """Which steps to measure and how to send them.
+
+    Attributes:
+        first_step: the first one.
+        last_step: the last one, included.
+        cluster: steps that share one value, the least range among them.
+        characters: 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm).
+        intensity: a second value after each range.
+    """
+
+    first_step: int
+    last_step: int
+    cluster: int = 1
+    characters: int = 3
+    intensity: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.first_step <= self.last_step <= 9999:
+            raise ProtocolError(f"steps {self.first_step}..{self.last_step}: not within 0..9999 in this order")
+        if not 1 <= self.cluster <= 99:
+            raise ProtocolError(f"cluster = {self.cluster}: not within 1..99")
+        if self.characters not in (2, 3) or (self.intensity and self.characters == 2):
+            raise ProtocolError(f"{self.characters} characters per value: 3, or 2 without intensity")
+
+    @property
+    def size(self) -> int:
+        """Number of ranges."""
+        return (self.last_step - self.first_step) // self.cluster + 1
+
+    @property
+    def letter(self) -> str:
+        """Second letter of the command."""
+        return "E" if self.intensity else "S" if self.characters == 2 else "D"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """What a scan reply carries.
+
+    Attributes:
+        window: which steps.
+        remaining: scans still to come; 0 for the last one and where there is no end.
+        stamp_ms: the sensor's clock, 24 bit.
+        value: shape (n,), millimetres or error codes.
+        intensity: shape (n,) or (0,).
+    """
+
+    window: Window
+    remaining: int
+    stamp_ms: int
+    value: Integers
+    intensity: Integers
+
+
+def checksum(text: bytes) -> int:
+    """The character that follows a text."""
+    return (sum(text) & 0x3F) + 0x30
+
+
+def summed(text: bytes) -> bytes:
+    """A text with its sum."""
+    return text + bytes([checksum(text)])
+
+
+def encode(values: Iterable[int], characters: int) -> bytes:
+    """Numbers of 6 bits a character, the upper bits first."""
+    column = np.fromiter(values, np.int64)[:, None] >> (6 * np.arange(characters - 1, -1, -1))
+    return ((column & 0x3F) + 0x30).astype(np.uint8).tobytes()
+
+
+def decode(text: bytes, characters: int) -> Integers:
+    """Numbers of a text that was written by `encode`.
+
+    Raises:
+        ProtocolError: the text has a character outside 0x30..0x6F, or does not divide into numbers.
+    """
+    sixes = np.frombuffer(text, np.uint8).astype(np.int32) - 0x30
+    if len(text) % characters:
+        raise ProtocolError(f"{len(text)} characters are no numbers of {characters}")
+    if sixes.size and not (sixes.min() >= 0 and sixes.max() <= 0x3F):
+        raise ProtocolError("data with a character outside 0x30..0x6F")
+    return (sixes.reshape(-1, characters) << (6 * np.arange(characters - 1, -1, -1, dtype=np.int32))).sum(
+        axis=1, dtype=np.int32
+    )
+
+
+def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:
+    """The request (without LF) for scan after scan; `skip` are left out between two; count 0 has no end."""
+    if not (0 <= skip <= 9 and 0 <= count <= 99):
+        raise ProtocolError(f"skip = {skip}, count = {count}: not within 0..9 and 0..99")
+    return f"M{window.letter}{_steps(window)}{skip}{count:02d}".encode()
+
+
+def snapshot(window: Window) -> bytes:
+    """The request (without LF) for the latest scan."""
+    return f"G{window.letter}{_steps(window)}".encode()
+
+
+def reply(echo: bytes, status: str, lines: Sequence[bytes] = ()) -> bytes:
+    """The bytes of a reply whose lines are complete."""
+    return b"\n".join([echo, summed(status.encode()), *lines, b"", b""])
+
+
+def text_lines(pairs: Iterable[tuple[str, str]]) -> list[bytes]:
+    """Lines of VV, PP and II."""
+    texts = [f"{key}:{text}".encode() for key, text in pairs]
+    return [text + b";" + bytes([checksum(text)]) for text in texts]
+
+
+def data_lines(stamp_ms: int, payload: bytes) -> list[bytes]:
+    """Lines of a scan."""
+    cuts = range(0, len(payload), LINE_CHARACTERS)
+    return [summed(encode([stamp_ms], 4)), *(summed(payload[cut : cut + LINE_CHARACTERS]) for cut in cuts)]
+
+
+def parse(block: bytes) -> Reply:
+    """Check and split one reply, without the two LF at its end.
+
+    Raises:
+        ProtocolError: a sum, a length or a character is wrong.
+    """
+    echo, _, after = block.partition(b"\n")
+    status, *rest = after.split(b"\n")
+    if not _ECHO.fullmatch(echo):
+        raise ProtocolError(f"no reply: {_shown(block)}")
+    if len(status) == 1 and not rest and status.isalnum():  # SCIP 1.1
+        return Reply(echo, status.decode(), ())
+    if len(status) != 3:
+        raise ProtocolError(f"{echo.decode()}: not a status: {_shown(status)}")
+    code = _unsummed(status, echo)
+    if not code.isalnum():
+        raise ProtocolError(f"{echo.decode()}: not a status: {_shown(status)}")
+    if echo[:2] in (b"VV", b"PP", b"II"):
+        return Reply(echo, code.decode(), tuple(_text(line, echo) for line in rest))
+    return Reply(echo, code.decode(), tuple(_unsummed(line, echo) for line in rest))
+
+
+class Splitter:
+    """Cuts a stream into replies, and finds the next one after garbage, cut lines and merged lines.
+
+    Attributes:
+        bad: replies that were thrown away.
+    """
+
+    def __init__(self) -> None:
+        self.bad = 0
+        self._pending = b""
+
+    def feed(self, received: bytes) -> list[Reply]:
+        """The replies that end in `received`, in order."""
+        *blocks, self._pending = (self._pending + received).split(b"\n\n")
+        if len(self._pending) > _LONGEST_REPLY:
+            self.bad += 1
+            self._pending = b""
+        return [told for block in blocks for told in self._parsed(block.strip(b"\n"))]
+
+    def _parsed(self, block: bytes) -> list[Reply]:
+        if not block:
+            return []
+        # What stands before the last echo is a reply whose own end was lost.
+        echo = max((match.start() for match in _ECHO_LINE.finditer(block)), default=0)
+        self.bad += echo > 0
+        try:
+            return [parse(block[echo:])]
+        except ProtocolError:
+            self.bad += 1
+            return []
+
+
+def information(told: Reply) -> dict[str, str]:
+    """Keys and texts of a VV, PP or II reply.
+
+    Raises:
+        ProtocolError: the sensor refused, or a line is not `KEY:text`.
+    """
+    if told.status != "00":
+        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
+    pairs = [line.decode("ascii", "replace").partition(":") for line in told.lines]
+    if not all(colon for _, colon, _ in pairs):
+        raise ProtocolError(f"{told.echo.decode()}: a line without a key")
+    return {key: text for key, _, text in pairs}
+
+
+def is_scan(told: Reply) -> bool:
+    """Whether a reply carries a scan, and is not the word that scans will come or will not."""
+    return (told.echo[:1] == b"M" and told.status == "99") or (told.echo[:1] == b"G" and told.status == "00")
+
+
+def measurement(told: Reply) -> Measurement:
+    """The numbers of a scan reply.
+
+    Raises:
+        ProtocolError: it is none, or lines or numbers are missing, or too many.
+    """
+    match = _SCAN_ECHO.fullmatch(told.echo)
+    if match is None or not is_scan(told):
+        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
+    _, letter, first, last, cluster, _, remaining = match.groups()
+    window = Window(
+        first_step=int(first),
+        last_step=int(last),
+        cluster=max(int(cluster), 1),
+        characters=2 if letter == b"S" else 3,
+        intensity=letter == b"E",
+    )
+    stamp, *data = told.lines or (b"",)
+    if len(stamp) != 4 or any(len(line) != LINE_CHARACTERS for line in data[:-1]):
+        raise ProtocolError(f"{told.echo.decode()}: a line was cut")
+    numbers = decode(b"".join(data), window.characters)
+    if numbers.size != window.size * (2 if window.intensity else 1):
+        raise ProtocolError(f"{told.echo.decode()}: {numbers.size} numbers for {window.size} steps")
+    value, intensity = (numbers[::2], numbers[1::2]) if window.intensity else (numbers, numbers[:0])
+    return Measurement(window, int(remaining or 0), int(decode(stamp, 4)[0]), value, intensity)
+
+
+def stamp(told: Reply) -> int:
+    """The sensor's clock [ms, 24 bit] from a TM1 reply.
+
+    Raises:
+        ProtocolError: it is none.
+    """
+    if told.echo[:3] != b"TM1" or told.status != "00" or len(told.lines) != 1 or len(told.lines[0]) != 4:
+        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
+    return int(decode(told.lines[0], 4)[0])
+
+
+def _steps(window: Window) -> str:
+    return f"{window.first_step:04d}{window.last_step:04d}{window.cluster:02d}"
+
+
+def _unsummed(line: bytes, echo: bytes) -> bytes:
+    if len(line) < 2 or line[-1] != checksum(line[:-1]):
+        raise ProtocolError(f"{echo.decode()}: wrong sum: {_shown(line)}")
+    return line[:-1]
+
+
+def _text(line: bytes, echo: bytes) -> bytes:
+    text, semicolon, total = line[:-2], line[-2:-1], line[-1:]
+    # Some firmware of the UTM-30LX leaves what follows "<-" out of the sum, and other sensors take the semicolon in.
+    sums = {checksum(text), checksum(text + b";"), checksum(text.partition(b"<-")[0])}
+    if semicolon != b";" or total[0] not in sums:
+        raise ProtocolError(f"{echo.decode()}: wrong sum: {_shown(line)}")
+    return text
+
+
+def _shown(text: bytes) -> str:
+    return repr(text[:40])[1:]

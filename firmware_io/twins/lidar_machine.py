@@ -1,0 +1,383 @@
+"""What a Hokuyo lidar does: requests in, replies out, turn after turn, at times that somebody else tells.
+
+Texts and statuses are those of captured sensors, except where an entry says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from firmware_io import scip
+from firmware_io.hokuyo import Parameters, StampAt
+from firmware_io.samples import Floats, Times
+
+Look = Callable[[Times], tuple[Floats, Floats]]
+
+_SCAN = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?")
+_BOOT_NS = 1_000_000_000
+_NEVER_NS = 1 << 62
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """What tells one model from another.
+
+    Attributes:
+        parameters: its PP reply.
+        product: PROD of VV.
+        firmware: FIRM of VV.
+        serial_number: SERI of VV.
+        speed: SCSP of II.
+        mode: MESM of II.
+        line: SBPS of II.
+        speed_request: status of a CR request that changes nothing.
+        no_return: number that stands for a beam that does not come back.
+        too_near: number that stands for something in front of the least range.
+        intensity: whether it measures intensities.
+    """
+
+    parameters: Parameters
+    product: str
+    firmware: str
+    serial_number: str
+    speed: str
+    mode: str = "CLASSIC"
+    line: str = "USB Full Speed"
+    speed_request: str = "04"
+    no_return: int
+    too_near: int
+    intensity: bool = True
+
+
+def _field(model: str, range_mm: tuple[int, int], ares: int, steps: tuple[int, int, int], rpm: int) -> Parameters:
+    return Parameters(
+        model=model,
+        range_min_mm=range_mm[0],
+        range_max_mm=range_mm[1],
+        steps_per_turn=ares,
+        first_step=steps[0],
+        front_step=steps[1],
+        last_step=steps[2],
+        rpm=rpm,
+    )
+
+
+IDENTITIES = {
+    known.parameters.model: known
+    for known in (
+        Identity(
+            parameters=_field("URG-04LX", (20, 5600), 1024, (44, 384, 725), 600),
+            product="SOKUIKI Sensor URG-04LX",
+            firmware="3.1.04(02/Aug./2007)",
+            serial_number="H0706400",
+            speed="Initial(600[rpm])<-Default setting by user",
+            line="19200[bps]<-Default setting by user",
+            speed_request="03",
+            no_return=0,
+            too_near=6,
+            intensity=False,
+        ),
+        Identity(
+            parameters=_field("UTM-30LX", (23, 60000), 1440, (0, 540, 1080), 2400),
+            product="SOKUIKI Sensor TOP-URG UTM-30LX",
+            firmware="P.1.05(17/Apr./2009)",
+            serial_number="00903971",
+            speed="Initial(2400[rpm])<-Default setting by user",
+            no_return=1,
+            too_near=2,
+        ),
+        Identity(
+            parameters=_field("UXM-30LX-E", (100, 100000), 1440, (0, 380, 760), 1200),
+            product="SOKUIKI Sensor Tough-URG UXM-30LX-E",
+            firmware="0.3.01(11/Mar./2010)",
+            serial_number="H0909106",
+            speed="Initial(1200[rpm])",
+            mode="STANDARD(max:100000[mm])",
+            no_return=0,
+            too_near=0,
+        ),
+        Identity(  # no capture: product, serial number and mode are made up
+            parameters=_field("UST-10LX", (20, 30000), 1440, (0, 540, 1080), 2400),
+            product="SOKUIKI Sensor UST-10LX",
+            firmware="4.0.2-A",
+            serial_number="H1300001",
+            speed="2400",
+            mode="Measuring by Normal Mode",
+            line="Ethernet 100 [Mbps]",
+            no_return=65533,
+            too_near=65533,
+        ),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Quartz:
+    """A sensor's clock: it showed `clock_ms` at `began_ns` and runs `rate_error` fast."""
+
+    began_ns: int
+    clock_ms: int
+    rate_error: float
+
+    def ms(self, time_ns: int) -> int:
+        """What it shows, 24 bit."""
+        shown_ms = self.clock_ms + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e6)
+        return shown_ms % scip.STAMP_WRAP_MS
+
+
+@dataclass(slots=True)
+class Scanning:
+    """Scans that somebody asked for: the echo without its last two digits and text, and what is left to do."""
+
+    window: scip.Window
+    echo: bytes
+    text: bytes
+    skip: int
+    remaining: int
+    endless: bool
+    turn: int
+    skipped: int = 0
+
+
+@dataclass
+class LidarMachine:
+    """The state of one sensor; times are true ones, `time.monotonic_ns()` or made up.
+
+    Attributes:
+        identity: which model.
+        look: true times of all beams of a turn -> ranges and intensities.
+        quartz: the sensor's clock.
+        motor_error: turns take this part longer than the sensor says.
+        stamp_at: which moment of a turn the stamps mean.
+        scip_1: it talks SCIP 1.1 until it is told otherwise.
+        laser: whether it is on.
+        scanning: what it scans for; None where nobody asked.
+    """
+
+    identity: Identity
+    look: Look
+    quartz: Quartz
+    motor_error: float = 0.0
+    stamp_at: StampAt = "step_0"
+    scip_1: bool = False
+    laser: bool = False
+    scanning: Scanning | None = None
+    _adjusting: bool = False
+    _rebooting: bool = False
+    _silent_until_ns: int = 0
+    _zero_ns: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._zero_ns = self.quartz.began_ns
+
+    @property
+    def period_ns(self) -> float:
+        """True duration of a turn."""
+        return self.identity.parameters.scan_period_s * (1 + self.motor_error) * 1e9
+
+    @property
+    def arc_ns(self) -> int:
+        """From the moment that a stamp means to the end of the last step: a scan cannot arrive earlier."""
+        parameters = self.identity.parameters
+        return round(parameters.since_stamp_s(parameters.last_step + 1, self.stamp_at) * (1 + self.motor_error) * 1e9)
+
+    def turn_ns(self, turn: int) -> int:
+        """True time at which a turn passes step 0."""
+        return self._zero_ns + round(turn * self.period_ns)
+
+    def next_ns(self) -> int:
+        """When the next turn is measured to its end; never where nobody waits for one."""
+        return self._measured_ns(self.scanning.turn) if self.scanning else _NEVER_NS
+
+    def power_cycle(self, now_ns: int) -> None:
+        """Begin anew, as after a brown-out: clock at 0, laser off, no answer for a second."""
+        self._reset(now_ns)
+        self._silent_until_ns = now_ns + _BOOT_NS
+
+    def leave_out(self, until_ns: int) -> None:
+        """Forget the turns that were over before a time and that nobody has measured."""
+        if self.scanning is not None:
+            behind = math.floor((until_ns - self.next_ns()) / self.period_ns)
+            self.scanning.turn += max(behind, 0)
+
+    def next_scan(self) -> bytes:
+        """Measure the next turn; empty where it is one to skip."""
+        scanning = self.scanning
+        if scanning is None:
+            return b""
+        turn, scanning.turn = scanning.turn, scanning.turn + 1
+        scanning.skipped += 1
+        if scanning.skipped <= scanning.skip:
+            return b""
+        scanning.skipped = 0
+        if not scanning.endless:
+            scanning.remaining -= 1
+            if not scanning.remaining:
+                self.scanning, self.laser = None, False
+        echo = scanning.echo + b"%02d" % scanning.remaining + scanning.text
+        return scip.reply(echo, "99", self._lines(scanning.window, turn))
+
+    def answer(self, request: bytes, now_ns: int) -> bytes:
+        """The reply to one request, without its LF; empty while it boots."""
+        if now_ns < self._silent_until_ns or not request:
+            return b""
+        body, _, text = request.partition(b";")
+        if self.scip_1:
+            self.scip_1 = body != scip.SCIP_2
+            return request + (b"\nE\n\n" if self.scip_1 else b"\n0\n\n")
+        if len(text) > 16:
+            return scip.reply(request, "0G")
+        if body == b"TM1" and self._adjusting:
+            return scip.reply(request, "00", [scip.summed(scip.encode([self.quartz.ms(now_ns)], 4))])
+        if body[:2] == b"TM":
+            return scip.reply(request, self._adjust(body))
+        if self._adjusting:
+            return scip.reply(request, "0E")
+        if match := _SCAN.fullmatch(body):
+            return self._scan_request(request, match, now_ns)
+        information = {b"VV": self._version, b"PP": self._parameters, b"II": self._state}.get(body)
+        if information is not None:
+            return scip.reply(request, "00", scip.text_lines(information(now_ns)))
+        if body == b"%ST":
+            state = b"004" if self.scanning else b"003" if self.laser else b"000"
+            return scip.reply(request, "00", [scip.summed(state)])
+        return scip.reply(request, self._command(body, now_ns))
+
+    def _command(self, body: bytes, now_ns: int) -> str:
+        """Status of the requests that have no other answer."""
+        rebooting, self._rebooting = self._rebooting, body == b"RB"
+        if body == b"BM":
+            was_on, self.laser = self.laser, True
+            return "02" if was_on else "00"
+        if body in (b"QT", b"%SL"):
+            self.scanning, self.laser = None, False
+            return "00"
+        if body in (b"RS", b"RT"):
+            self._reset(now_ns)
+            return "00"
+        if body == b"RB":
+            if rebooting:
+                self.power_cycle(now_ns)
+            return "00" if rebooting else "01"
+        if re.fullmatch(rb"CR(0\d|10|99)", body):
+            return self.identity.speed_request
+        if re.fullmatch(rb"SS\d{6}", body):
+            return "00"
+        return "0E"
+
+    def _adjust(self, body: bytes) -> str:
+        if body == b"TM0":
+            was, self._adjusting = self._adjusting, True
+            self.scanning, self.laser = None, False
+            return "02" if was else "00"
+        if body == b"TM2":
+            was, self._adjusting = self._adjusting, False
+            return "00" if was else "03"
+        return "04" if body == b"TM1" else "01"
+
+    def _scan_request(self, request: bytes, match: re.Match[bytes], now_ns: int) -> bytes:
+        kind, letter, first, last, cluster, skip, count = match.groups()
+        if (kind == b"M") != (count is not None):
+            return scip.reply(request, "0C" if kind == b"M" else "0D")
+        if letter == b"E" and not self.identity.intensity:
+            return scip.reply(request, "0E")
+        if int(last) > self.identity.parameters.last_step:
+            return scip.reply(request, "04")
+        if int(last) < int(first) or int(first) < self.identity.parameters.first_step:
+            return scip.reply(request, "05")
+        if kind == b"G" and not self.laser:
+            return scip.reply(request, "10")
+        window = scip.Window(
+            first_step=int(first),
+            last_step=int(last),
+            cluster=max(int(cluster), 1),
+            characters=2 if letter == b"S" else 3,
+            intensity=letter == b"E",
+        )
+        began = (now_ns - self._zero_ns) / self.period_ns
+        if kind == b"G":
+            return scip.reply(request, "00", self._lines(window, math.floor(began - self.arc_ns / self.period_ns)))
+        self.laser = True
+        body, semicolon, text = request.partition(b";")
+        remaining = int(count)
+        self.scanning = Scanning(
+            window, body[:-2], semicolon + text, int(skip), remaining, remaining == 0, math.ceil(began)
+        )
+        return scip.reply(request, "00")
+
+    def _lines(self, window: scip.Window, turn: int) -> list[bytes]:
+        """Measure a turn and write it down."""
+        parameters = self.identity.parameters
+        steps = np.arange(parameters.first_step, parameters.last_step + 1)
+        step_ns = self.period_ns / parameters.steps_per_turn
+        range_m, intensity = self.look(self.turn_ns(turn) + np.rint(steps * step_ns).astype(np.int64))
+        begin, end = window.first_step - parameters.first_step, window.last_step - parameters.first_step + 1
+        value = clustered(self._numbers(range_m[begin:end]), window.cluster, parameters.range_min_mm)
+        if window.characters == 2:
+            value = np.minimum(value, 4095)
+        if window.intensity:
+            shown = np.clip(np.nan_to_num(intensity[begin : end : window.cluster]), 0, (1 << 18) - 1)
+            value = np.stack([value, np.rint(shown).astype(np.int64)], axis=1).ravel()
+        stamp_ns = self.turn_ns(turn) - round(parameters.since_stamp_s(0, self.stamp_at) * (1 + self.motor_error) * 1e9)
+        return scip.data_lines(self.quartz.ms(stamp_ns), scip.encode(value.tolist(), window.characters))
+
+    def _numbers(self, range_m: Floats) -> Times:
+        """Whole millimetres, and the model's numbers for what is none."""
+        parameters = self.identity.parameters
+        lost = np.isnan(range_m) | (range_m * 1e3 > parameters.range_max_mm)
+        near = ~lost & (range_m * 1e3 < parameters.range_min_mm)
+        value = np.rint(np.where(lost | near, 0.0, range_m) * 1e3).astype(np.int64)
+        return np.where(lost, self.identity.no_return, np.where(near, self.identity.too_near, value))
+
+    def _measured_ns(self, turn: int) -> int:
+        parameters = self.identity.parameters
+        return self.turn_ns(turn) + round((parameters.last_step + 1) / parameters.steps_per_turn * self.period_ns)
+
+    def _reset(self, now_ns: int) -> None:
+        self.scanning, self.laser, self._adjusting = None, False, False
+        self.quartz = replace(self.quartz, began_ns=now_ns, clock_ms=0)
+
+    def _version(self, _: int) -> list[tuple[str, str]]:
+        return [
+            ("VEND", "Hokuyo Automatic Co.,Ltd."),
+            ("PROD", self.identity.product),
+            ("FIRM", self.identity.firmware),
+            ("PROT", "SCIP 2.0"),
+            ("SERI", self.identity.serial_number),
+        ]
+
+    def _parameters(self, _: int) -> list[tuple[str, str]]:
+        of = self.identity.parameters
+        return [
+            ("MODL", f"{of.model}(Hokuyo Automatic Co.,Ltd.)"),
+            ("DMIN", str(of.range_min_mm)),
+            ("DMAX", str(of.range_max_mm)),
+            ("ARES", str(of.steps_per_turn)),
+            ("AMIN", str(of.first_step)),
+            ("AMAX", str(of.last_step)),
+            ("AFRT", str(of.front_step)),
+            ("SCAN", str(of.rpm)),
+        ]
+
+    def _state(self, now_ns: int) -> list[tuple[str, str]]:
+        return [
+            ("MODL", f"{self.identity.parameters.model}(Hokuyo Automatic Co.,Ltd.)"),
+            ("LASR", "ON" if self.laser else "OFF"),
+            ("SCSP", self.identity.speed),
+            ("MESM", self.identity.mode),
+            ("SBPS", self.identity.line),
+            ("TIME", f"{self.quartz.ms(now_ns):06X}"),
+            ("STAT", "Sensor works well."),
+        ]
+
+
+def clustered(value: Times, cluster: int, range_min_mm: int) -> Times:
+    """One number per cluster: the least that is no error code, else its first (SCIP 2.0, p. 10)."""
+    padded = np.append(value, np.repeat(value[-1:], -value.size % cluster)).reshape(-1, cluster)
+    valid = np.where(padded >= range_min_mm, padded, np.iinfo(np.int64).max)
+    return np.where((padded >= range_min_mm).any(axis=1), valid.min(axis=1), padded[:, 0])

@@ -1,0 +1,84 @@
+"""`scanwright emulate`: both twins at once, the lidar on the horn of the servo, in a room."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from design import frames
+from design.angles import AngleSet
+from design.catalogue import Lidar, load_catalogue
+from design.errors import SceneError
+from design.scene import Scene, cast, load_scene, scene_of
+from firmware_io.ports import Ports
+from firmware_io.twins.dynamics import Load
+from firmware_io.twins.lidar import LidarTwin
+from firmware_io.twins.servo import ServoTwin
+from firmware_io.twins.world import furnished_room, looking, range_model, rays
+
+
+@dataclass(frozen=True, slots=True)
+class EmulatedScanner:
+    """A scanner that runs; `ports` is where programs find it."""
+
+    ports: Ports
+    lidar: LidarTwin
+    servo: ServoTwin
+
+
+def room(mesh: Path | None, unit_m: float = 1.0, at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
+    """The scene of a mesh, or of the furnished room; the scanner's world frame stands at `at_m` in it.
+
+    Raises:
+        SceneError: the mesh cannot be used.
+    """
+    if mesh is None:
+        return scene_of(furnished_room() - np.array(at_m))
+    return load_scene(mesh, unit_m, frames.rigid(np.eye(3), -np.array(at_m)))
+
+
+@contextmanager
+def emulated_scanner(
+    angles: AngleSet,
+    scene: Scene,
+    *,
+    load: Load | None = None,
+    protocol: float = 1.0,
+    sigma_mm: float | None = None,
+    seed: int = 0,
+) -> Iterator[EmulatedScanner]:
+    """Run the twins of a scanner's devices while the body runs.
+
+    Args:
+        angles: angle set of the scanner.
+        scene: what it stands in, in its world frame.
+        load: what hangs on the servo; None for a light, balanced head.
+        protocol: of the servo.
+        sigma_mm: replaces the data sheet's range noise.
+        seed: of the noise.
+
+    Raises:
+        SceneError: the sensor would see nothing there.
+        TaskError: sensor or servo are not in the catalogue.
+    """
+    lidar = load_catalogue().get(angles.sensor, Lidar)
+    model, bearing_rad = range_model(lidar, sigma_mm), lidar.bearings_rad()
+    for turn_rad in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        hits = cast(scene, *rays(angles, bearing_rad, np.full(bearing_rad.size, turn_rad)))
+        if (hits.range_m < model.range_max_m).any():
+            break
+    else:
+        raise SceneError(
+            f"no surface within {model.range_max_m:g} m of the scanner: is the unit right (--unit-m 0.001 for mm), "
+            "and the place (--at)?"
+        )
+    with ExitStack() as stack:
+        servo = stack.enter_context(ServoTwin(angles.servo, protocol, load=load, seed=seed))
+        look = looking(scene, angles, bearing_rad, servo.axis.angle_rad, model, seed)
+        twin = stack.enter_context(LidarTwin(angles.sensor, look))
+        yield EmulatedScanner(Ports(twin.port, servo.port, os.getpid()), twin, servo)

@@ -1,0 +1,218 @@
+"""The twin of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
+
+It answers both protocols byte by byte with their timing: bytes take their time at the baud rate, the return delay is
+kept, a client at another speed is not understood. What it answers and how it turns is `servo_machine` and `dynamics`.
+Faults come on demand, by methods.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import random
+import select
+import struct
+import sys
+import tempfile
+import termios
+import threading
+import time
+import tty
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Self
+
+from firmware_io.twins.dynamics import Load
+from firmware_io.twins.servo_machine import ServoMachine
+from firmware_io.twins.servo_packets import status, take
+
+_TICK_S = 0.02  # between two looks of the servo at itself
+_FORGET_NS = 100_000_000  # a request that stays incomplete is dropped
+
+
+class ServoTwin:
+    """One servo, powered and on its bus; `port` is what a program opens. A context manager.
+
+    Attributes:
+        port: path of the serial port; the same after a re-plug.
+        axis: the true motion of the horn, by `time.monotonic_ns()`.
+        memory: the control table; factory values, to be changed before a program opens the port.
+
+    Args:
+        model: name, as in the catalogue.
+        protocol: 1.0, 2.0, or None for the one that the model has from the factory.
+        load: what hangs on the horn.
+        angle_rad: of the horn when it is switched on.
+        echo: whether the adapter returns what it sends.
+        seed: of the bit errors.
+    """
+
+    def __init__(
+        self,
+        model: str = "MX-64R",
+        protocol: float | None = None,
+        *,
+        load: Load | None = None,
+        angle_rad: float = 0.0,
+        echo: bool = False,
+        seed: int = 0,
+    ) -> None:
+        self._servo = ServoMachine(model, protocol, Load() if load is None else load, time.monotonic_ns(), angle_rad)
+        self.axis, self.memory = self._servo.axis, self._servo.memory
+        self._protocol, self._echo = self._servo.table.protocol, echo
+        self._random = random.Random(seed)
+        self._bit_error_rate = 0.0
+        self._cut = False
+        self._folder = tempfile.TemporaryDirectory(prefix="servo-twin-")
+        self.port = str(Path(self._folder.name) / "ttyServo")
+        self._master = self._slave = -1
+        self._plug()
+        self._jobs: SimpleQueue[tuple[Callable[[], None], threading.Event] | None] = SimpleQueue()
+        self._wake_read, self._wake_write = os.pipe()
+        self._thread = threading.Thread(target=self._run, name=f"twin of {model}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Take the twin off its port. May be called again."""
+        if self._thread.is_alive():
+            self._jobs.put(None)
+            os.write(self._wake_write, b".")
+            self._thread.join()
+            self._pull()
+            os.close(self._wake_read)
+            os.close(self._wake_write)
+            self._folder.cleanup()
+
+    def bit_errors(self, rate: float) -> None:
+        """From now on, each byte of an answer has one bit flipped with this probability."""
+        self._bit_error_rate = rate
+
+    def stall(self) -> None:
+        """Something holds the horn."""
+        self._do(lambda: self.axis.change(time.monotonic_ns(), blocked=True))
+
+    def release(self) -> None:
+        """Nothing holds the horn any more."""
+        self._do(lambda: self.axis.change(time.monotonic_ns(), blocked=False))
+
+    def overload(self) -> None:
+        """The overload protection trips."""
+        self._do(lambda: self._servo.overload(time.monotonic_ns()))
+
+    def overheat(self) -> None:
+        """The motor is 5 degrees above its limit."""
+        self._do(self._servo.overheat)
+
+    def set_voltage(self, volts: float) -> None:
+        """The supply gives another voltage; one that breaks down is a `brown_out`."""
+        self._do(lambda: self._servo.set_voltage(volts, time.monotonic_ns()))
+
+    def brown_out(self) -> None:
+        """The supply breaks down for a moment: the servo restarts, mute until it has."""
+        self._do(lambda: self._servo.restart(time.monotonic_ns()))
+
+    def cut(self) -> None:
+        """The bus is cut: no byte passes; power stays, so in protocol 1.0 the wheel turns on."""
+        self._cut = True
+
+    def mend(self) -> None:
+        """The bus is whole again."""
+        self._cut = False
+
+    def unplug(self) -> None:
+        """The USB adapter is pulled: the port is gone, the servo keeps its power."""
+        self._do(self._pull)
+
+    def replug(self) -> None:
+        """The adapter is back, under the same name."""
+        self._do(self._plug)
+
+    def _do(self, job: Callable[[], None]) -> None:
+        """Let the twin's own thread do it, which alone touches servo and port; wait until it is done."""
+        done = threading.Event()
+        self._jobs.put((job, done))
+        os.write(self._wake_write, b".")
+        while not done.wait(1.0):
+            if not self._thread.is_alive():
+                raise RuntimeError("the twin is closed, or its thread has ended with an error")
+
+    def _plug(self) -> None:
+        self._pull()
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        Path(self.port).symlink_to(os.ttyname(self._slave))
+
+    def _pull(self) -> None:
+        if self._master >= 0:
+            Path(self.port).unlink()
+            os.close(self._master)
+            os.close(self._slave)  # held open so far, as a port does not vanish when a program closes it
+        self._master = self._slave = -1
+
+    def _run(self) -> None:
+        buffer, heard_ns = bytearray(), 0
+        while True:
+            ports = [] if self._master < 0 else [self._master]
+            ready = select.select([self._wake_read, *ports], [], [], _TICK_S)[0]
+            now_ns = time.monotonic_ns()
+            self._servo.protect(now_ns)
+            if self._wake_read in ready:
+                os.read(self._wake_read, 1)
+                task = self._jobs.get()
+                if task is None:
+                    return
+                task[0]()
+                task[1].set()
+            elif ready:
+                data = os.read(self._master, 4096)
+                if self._echo:  # the adapter does that, whatever the servo makes of it
+                    self._send(data)
+                if now_ns - heard_ns > _FORGET_NS:
+                    buffer.clear()
+                heard_ns = now_ns
+                if not self._cut and self._servo.listens(now_ns) and self._understands():
+                    buffer += data
+                    self._serve(buffer, now_ns)
+
+    def _understands(self) -> bool:
+        """Whether the client's baud rate is the servo's, within 3 %."""
+        return abs(_baud_of(self._master) / self._servo.baud - 1) < 0.03
+
+    def _serve(self, buffer: bytearray, begin_ns: int) -> None:
+        """Answer the requests in the buffer, the first byte of which came at `begin_ns`."""
+        byte_ns = 10e9 / self._servo.baud
+        while request := take(buffer, self._protocol):
+            arrived_ns = begin_ns + round(len(request.wire) * byte_ns)
+            delay_ns, begin_ns = self._servo.return_delay_ns, arrived_ns
+            if answered := self._servo.answer(request, arrived_ns):
+                answer = status(self._protocol, self._servo.id, *answered)
+                begin_ns += delay_ns + round(len(answer) * byte_ns)
+                time.sleep(max(0.0, (begin_ns - time.monotonic_ns()) / 1e9))
+                self._send(self._damaged(answer))
+
+    def _send(self, data: bytes) -> None:
+        with suppress(BlockingIOError):  # nobody reads: what does not fit is lost, as with a real port
+            os.write(self._master, data)
+
+    def _damaged(self, answer: bytes) -> bytes:
+        if not self._bit_error_rate:
+            return answer
+        flips = (1 << self._random.randrange(8) if self._random.random() < self._bit_error_rate else 0 for _ in answer)
+        return bytes(byte ^ flip for byte, flip in zip(answer, flips, strict=True))
+
+
+def _baud_of(master: int) -> float:
+    """Baud rate that the client has set on its end."""
+    if sys.platform == "linux":  # TCGETS2: the only way to see rates beyond the standard ones
+        return float(struct.unpack("=36x2I", fcntl.ioctl(master, 0x802C542A, bytes(44)))[1])
+    return float(termios.tcgetattr(master)[5])

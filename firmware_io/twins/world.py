@@ -1,0 +1,128 @@
+"""What a turning lidar sees: every beam cast at the axis angle of its own time, and what the sensor makes of it.
+
+The rays go through `AngleSet.T_world_laser`, the definition of the frame chain, and not through the short cut that
+`assemble` takes: the two check each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from design.angles import AngleSet
+from design.catalogue import Lidar
+from design.frames import Array
+from design.scene import Hits, Scene, cast
+from firmware_io.samples import Floats, Times
+
+
+@dataclass(frozen=True, slots=True)
+class RangeModel:
+    """How a sensor turns a distance into a range.
+
+    Attributes:
+        sigma_m: standard deviation of the noise.
+        quantum_m: step of the ranges that it sends.
+        range_min_m: nothing nearer is measured.
+        range_max_m: nothing farther comes back.
+        incidence_max_rad: a surface that is met at a flatter angle (from its normal) sends nothing back.
+    """
+
+    sigma_m: float
+    quantum_m: float
+    range_min_m: float
+    range_max_m: float
+    incidence_max_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """One scan as the sensor means it; row i is beam i.
+
+    Attributes:
+        range_m: shape (n,); +inf where nothing came back, -inf where something was too near (REP 117).
+        intensity: shape (n,), 0 where there is no range.
+    """
+
+    range_m: Floats
+    intensity: Floats
+
+
+def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
+    """The model of a catalogue sensor; `sigma_mm` replaces the noise of its data sheet.
+
+    SCIP sends millimetres. No data sheet says at which incidence a surface is lost: 85 deg is assumed.
+    """
+    return RangeModel(
+        sigma_m=(lidar.range_sigma_mm if sigma_mm is None else sigma_mm) / 1000,
+        quantum_m=0.001,
+        range_min_m=lidar.range_min_mm / 1000,
+        range_max_m=lidar.range_max_mm / 1000,
+        incidence_max_rad=np.radians(85),
+    )
+
+
+def rays(angles: AngleSet, bearing_rad: Floats, joint_rad: Floats) -> tuple[Array, Array]:
+    """Origins and unit directions in the world of beams, each at its own joint position; all shapes (n, ...)."""
+    T_world_laser = angles.T_world_laser(joint_rad)
+    in_plane = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
+    return T_world_laser[:, :3, 3], np.einsum("nij,nj->ni", T_world_laser[:, :3, :2], in_plane)
+
+
+def see(scene: Scene, angles: AngleSet, bearing_rad: Floats, joint_rad: Floats) -> Hits:
+    """True ranges of beams of one sensor in a scene (world frame), each at its own joint position."""
+    return cast(scene, *rays(angles, bearing_rad, joint_rad))
+
+
+def measure(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured:
+    """Ranges with noise, in whole quanta, and intensities; draws one number per beam, hit or not.
+
+    The intensity falls with the cosine of incidence and with range: plausible, but no model of a certain sensor.
+    """
+    noise_m = model.sigma_m * rng.standard_normal(hits.range_m.size)
+    range_m = np.rint((hits.range_m + noise_m) / model.quantum_m) * model.quantum_m
+    lost = ~(hits.incidence_rad <= model.incidence_max_rad) | (range_m > model.range_max_m)
+    near = ~lost & (range_m < model.range_min_m)
+    intensity = 4000 * np.cos(hits.incidence_rad) / (1 + hits.range_m)
+    return Measured(
+        np.where(lost, np.inf, np.where(near, -np.inf, range_m)),
+        np.where(lost | near, 0.0, intensity),
+    )
+
+
+def looking(
+    scene: Scene,
+    angles: AngleSet,
+    bearing_rad: Floats,
+    angle_at: Callable[[Times], Floats],
+    model: RangeModel,
+    seed: int = 0,
+) -> Callable[[Times], tuple[Floats, Floats]]:
+    """What a lidar twin asks for each scan: the true times of its beams -> range [m] and intensity.
+
+    `angle_at` is the true angle of the axis at given times.
+    """
+    rng = np.random.default_rng(seed)
+
+    def look(time_ns: Times) -> tuple[Floats, Floats]:
+        measured = measure(see(scene, angles, bearing_rad, angle_at(time_ns)), model, rng)
+        return measured.range_m, measured.intensity
+
+    return look
+
+
+def furnished_room() -> Array:
+    """Triangles of the room of the tour, 7.2 x 5.6 x 2.8 m, its floor 0.9 m below the world's origin: (t, 3, 3)."""
+    room = [[-3.2, -2.4, -0.9], [4.0, 3.2, 1.9]]
+    furniture = [
+        [[1.6, -2.4, -0.9], [3.0, -1.6, -0.15]],  # table
+        [[3.4, 0.4, -0.9], [4.0, 2.0, 1.1]],  # cupboard
+        [[-2.2, 2.2, -0.9], [-1.8, 2.6, 1.9]],  # pillar
+        [[-3.2, -1.6, -0.9], [-2.5, -0.2, -0.4]],  # bench
+        [[0.2, 2.8, -0.1], [1.4, 3.2, 0.9]],  # shelf
+        [[0.4, -0.4, 1.6], [1.6, 0.4, 1.9]],  # lamp
+    ]
+    return np.concatenate([trimesh.creation.box(bounds=bounds).triangles for bounds in [room, *furniture]])
