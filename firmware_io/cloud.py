@@ -62,10 +62,10 @@ class PlyWriter:
         self._stack.__exit__(kind, error, trace)
 
     def write(self, rows: NDArray[np.void]) -> None:
-        """Append rows of the writer's fields, shape (n,)."""
+        """Append rows of the writer's fields, any shape."""
         if rows.dtype != self._fields:
             raise ValueError(f"rows of {rows.dtype}, the file holds {self._fields}")
-        self._stream.write(rows.tobytes())
+        self._stream.write(np.ascontiguousarray(rows).data)
         self._rows += rows.size
 
     def _finish(

@@ -6,18 +6,20 @@ The layout is CDR as ROS 2 writes it; `rosbags` holds the message definitions of
 from __future__ import annotations
 
 import math
+import struct
 from functools import cache
 from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from firmware_io.samples import Scan
+from firmware_io.samples import Float32s, Scan
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 LASER_FRAME = "laser"
 SPIN_JOINT = "spin_joint"
+_SPIN_JOINT_BYTES = SPIN_JOINT.encode()
 
 
 @cache
@@ -51,8 +53,21 @@ def encode_scan(scan: Scan) -> bytes:
 
 def decode_scan(data: bytes) -> Scan:
     """Inverse of `encode_scan`, for any CDR LaserScan."""
-    message = _store().deserialize_cdr(data, LASER_SCAN)
-    return scan_of(message, stamp_ns(message.header.stamp))
+    order, time_ns, at = _cdr_header(data)
+    numbers = struct.unpack_from(f"{order}7f", data, at)
+    ranges, at = _cdr_floats(data, order, at + 28)
+    intensities, _ = _cdr_floats(data, order, at)
+    return Scan(
+        stamp_ns=time_ns,
+        angle_min_rad=numbers[0],
+        angle_increment_rad=numbers[2],
+        time_increment_s=numbers[3],
+        scan_time_s=numbers[4],
+        range_min_m=numbers[5],
+        range_max_m=numbers[6],
+        range_m=ranges,
+        intensity=_one_by_one(intensities, ranges),
+    )
 
 
 def scan_of(message: Any, first_beam_ns: int) -> Scan:
@@ -71,7 +86,7 @@ def scan_of(message: Any, first_beam_ns: int) -> Scan:
         range_min_m=float(message.range_min),
         range_max_m=float(message.range_max),
         range_m=ranges,
-        intensity=intensities if intensities.size == ranges.size else np.empty(0, np.float32),
+        intensity=_one_by_one(intensities, ranges),
     )
 
 
@@ -89,9 +104,24 @@ def encode_joint(time_ns: int, position_rad: float) -> bytes:
 
 def decode_joint(data: bytes) -> tuple[int, float]:
     """Time [ns] and position [rad] of the spin joint in a CDR JointState; NaN where it does not name the joint."""
-    message = _store().deserialize_cdr(data, JOINT_STATE)
-    positions = dict(zip(message.name, message.position.tolist(), strict=False))
-    return stamp_ns(message.header.stamp), positions.get(SPIN_JOINT, math.nan)
+    order, time_ns, at = _cdr_header(data)
+    (count,) = struct.unpack_from(f"{order}I", data, at)
+    at += 4
+    names = []
+    for _ in range(count):
+        name, at = _cdr_string(data, order, at)
+        names.append(name)
+    at = _aligned(at, 4)
+    (positions,) = struct.unpack_from(f"{order}I", data, at)
+    at = _aligned(at + 4, 8)
+    if _SPIN_JOINT_BYTES not in names or names.index(_SPIN_JOINT_BYTES) >= positions:
+        return time_ns, math.nan
+    return time_ns, struct.unpack_from(f"{order}d", data, at + 8 * names.index(_SPIN_JOINT_BYTES))[0]
+
+
+def decode(data: bytes, message_type: str) -> Any:
+    """Any message of a type that comes with ROS 2, from CDR."""
+    return _store().deserialize_cdr(data, message_type)
 
 
 def stamp_ns(stamp: Any) -> int:
@@ -103,3 +133,36 @@ def _header(time_ns: int, frame_id: str) -> Any:
     seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
     stamp = _store().types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
     return _store().types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
+
+
+def _cdr_header(data: bytes) -> tuple[str, int, int]:
+    """Byte order of a message for `struct`, time [ns] of the std_msgs/Header it begins with, and where that ends."""
+    # 4 bytes of encapsulation (the second one tells the byte order); alignment counts from behind them, so does not
+    # change modulo 4, and modulo 8 only by `_aligned`
+    order = "<" if data[1] & 1 else ">"
+    seconds, nanoseconds = struct.unpack_from(f"{order}iI", data, 4)
+    _, at = _cdr_string(data, order, 12)
+    return order, seconds * 1_000_000_000 + nanoseconds, _aligned(at, 4)
+
+
+def _cdr_string(data: bytes, order: str, at: int) -> tuple[bytes, int]:
+    """A string without its closing zero, and where it ends."""
+    at = _aligned(at, 4)
+    (size,) = struct.unpack_from(f"{order}I", data, at)
+    if at + 4 + size > len(data):
+        raise ValueError(f"a string of {size} bytes in a message of {len(data)}")
+    return data[at + 4 : at + 4 + max(size - 1, 0)], at + 4 + size
+
+
+def _cdr_floats(data: bytes, order: str, at: int) -> tuple[Float32s, int]:
+    """A sequence of float32, and where it ends."""
+    (count,) = struct.unpack_from(f"{order}I", data, at)
+    return np.frombuffer(data, f"{order}f4", count, at + 4).astype(np.float32), at + 4 + 4 * count
+
+
+def _aligned(at: int, size: int) -> int:
+    return at + (4 - at) % size
+
+
+def _one_by_one(intensities: Float32s, ranges: Float32s) -> Float32s:
+    return intensities if intensities.size == ranges.size else np.empty(0, np.float32)

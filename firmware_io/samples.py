@@ -6,6 +6,7 @@ sensor to the cloud: nothing here removes one.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,56 @@ class Scan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Consecutive scans that differ only in time and in what they measured; rows are scans, columns beams.
+
+    Attributes:
+        first: the first of them, for what they share.
+        stamp_ns: time of the first beam of each scan, shape (s,).
+        range_m: shape (s, n).
+        intensity: shape (s, n), or (s, 0) where the sensor measures none.
+    """
+
+    first: Scan
+    stamp_ns: Times
+    range_m: Float32s
+    intensity: Float32s
+
+
+def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
+    """Scans in their order, up to `most` of them at once."""
+    waiting: list[Scan] = []
+    for scan in scans:
+        if waiting and (len(waiting) == most or _shape(scan) != _shape(waiting[0])):
+            yield _block(waiting)
+            waiting = []
+        waiting.append(scan)
+    if waiting:
+        yield _block(waiting)
+
+
+def _shape(scan: Scan) -> tuple[float, ...]:
+    return (
+        scan.range_m.size,
+        scan.intensity.size,
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        scan.time_increment_s,
+        scan.range_min_m,
+        scan.range_max_m,
+    )
+
+
+def _block(scans: list[Scan]) -> Block:
+    return Block(
+        first=scans[0],
+        stamp_ns=np.array([scan.stamp_ns for scan in scans], np.int64),
+        range_m=np.stack([scan.range_m for scan in scans]),
+        intensity=np.stack([scan.intensity for scan in scans]),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class JointLog:
     """Servo angles over time.
 
@@ -93,3 +144,35 @@ class JointLog:
         known_ns = (self.time_ns[near] - origin_ns).astype(float)
         asked_ns = (time_ns - origin_ns).astype(float)
         return np.interp(asked_ns, known_ns, self.position_rad[near], left=np.nan, right=np.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisCurve:
+    """Servo angle as a piecewise cubic of time.
+
+    Attributes:
+        knot_ns: where the pieces begin, and where the last one ends, shape (k + 1,), increasing.
+        coefficient: shape (k, 4); in piece i the angle [rad] is sum_j coefficient[i, j] s^j, s seconds into the piece.
+    """
+
+    knot_ns: Times
+    coefficient: Floats
+
+    def angle_at(self, time_ns: Times) -> Floats:
+        """Angle [rad] at each time, shape (n,); NaN outside the curve."""
+        piece = np.searchsorted(self.knot_ns, time_ns, side="right") - 1
+        inside = (piece >= 0) & (time_ns <= self.knot_ns[-1])
+        piece = piece.clip(0, len(self.coefficient) - 1)
+        seconds = (time_ns - self.knot_ns[piece]) / 1e9
+        c0, c1, c2, c3 = self.coefficient[piece].T
+        return np.where(inside, c0 + seconds * (c1 + seconds * (c2 + seconds * c3)), np.nan)
+
+
+def straight(log: JointLog) -> AxisCurve:
+    """The log as a curve, straight between its samples."""
+    time_ns, position_rad = log.time_ns, log.position_rad
+    if time_ns.size == 1:
+        return AxisCurve(np.repeat(time_ns, 2), np.array([[position_rad[0], 0.0, 0.0, 0.0]]))
+    slope = np.diff(position_rad) / (np.diff(time_ns) / 1e9)
+    none = np.zeros_like(slope)
+    return AxisCurve(time_ns, np.stack([position_rad[:-1], slope, none, none], axis=1))

@@ -1,6 +1,7 @@
 """De-skew and assembly: against the slow obvious loop, against laws, and against a real scanner's known geometry."""
 
 import os
+import re
 import tracemalloc
 from pathlib import Path
 
@@ -13,11 +14,14 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from design.angles import Angles, AngleSet
 from design.errors import RecordingError
-from firmware_io.assemble import Verdict, assemble_recording, deskew, place
+from firmware_io.assemble import assemble_recording
 from firmware_io.cloud import read_ply
+from firmware_io.deskew import Verdict, deskew, place
 from firmware_io.importer import import_bag
 from firmware_io.recording import RecordingWriter
 from firmware_io.samples import JointLog, Scan
+from firmware_io.trajectory import Trajectory
+from firmware_io.turns import turn_starts
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 needs_data = pytest.mark.skipif(DATA is None, reason="SCANWRIGHT_DATA names no folder with the real recordings")
@@ -160,6 +164,155 @@ def test_organised_and_flat_clouds_hold_the_same_points(tmp_path):
     np.testing.assert_allclose(rows["time_s"][60:100], 0.1 + np.arange(40) * 1e-3, atol=1e-12)
     np.testing.assert_allclose(rows["joint_rad"][60:100], 0.55 + np.arange(40) * 5e-4, atol=1e-12)
     assert b"comment width 60\ncomment height 3\n" in (tmp_path / "o.ply").read_bytes()[:400]
+
+
+def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path):
+    """2.6 turns, from an angle in the middle of a turn."""
+    scans = [a_scan(k, 20, START + k * 50_000_000, time_increment_s=1e-4) for k in range(52)]
+    log = a_log(1.0, 1.0 + 2.6 * 2 * np.pi, START, START + 2_600_000_000)
+    recording = write(tmp_path / "r.mcap", scans, log)
+    whole = assemble_recording(recording, angle_set(0, 90, 0, -90), tmp_path / "w.ply")
+    for per, heights in (("turn", [20, 20, 12]), ("half", [10, 10, 10, 10, 10, 2])):
+        summary = assemble_recording(recording, angle_set(0, 90, 0, -90), tmp_path / f"{per}.ply", per=per)
+        assert [path.name for path in summary.clouds] == [f"{per}_{k:03}.ply" for k in range(len(heights))]
+        assert (summary.points, summary.height) == (whole.points, whole.height)
+        rows = [read_ply(path) for path in summary.clouds]
+        assert [part.size for part in rows] == [20 * height for height in heights]
+        assert b"".join(part.tobytes() for part in rows) == read_ply(tmp_path / "w.ply").tobytes()
+        assert f"comment height {heights[-1]}\n".encode() in summary.clouds[-1].read_bytes()[:400]
+
+
+def test_a_turn_without_a_point_is_no_cloud(tmp_path):
+    ranges = [np.full(20, 5.0 if 10 <= k < 20 else np.nan, np.float32) for k in range(40)]
+    scans = [a_scan(0, 20, START + k * 100_000_000, time_increment_s=1e-4, range_m=r) for k, r in enumerate(ranges)]
+    log = a_log(0.0, 4 * 2 * np.pi, START, START + 4_000_000_000)
+    summary = assemble_recording(write(tmp_path / "r.mcap", scans, log), angle_set(), tmp_path / "c.ply", per="turn")
+    assert [path.name for path in summary.clouds] == ["c_001.ply"]
+    assert summary.left_out == {"no_return": 600}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c_001.ply", "r.mcap"]
+
+
+@settings(deadline=None)
+@given(
+    first=angle_deg,
+    ways_rad=st.lists(st.floats(0.1, 20), min_size=1, max_size=4),
+    sign=st.sampled_from([1, -1]),
+    whole_rad=st.sampled_from([np.pi, 2 * np.pi]),
+    noise_rad=st.sampled_from([0.0, 0.004]),
+)
+def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign, whole_rad, noise_rad):
+    """There, back, there again ... at 1 rad/s; noise of the encoder is no turning point."""
+    corner_s = np.concatenate([[0], np.cumsum(ways_rad)])
+    signs = sign * (-1.0) ** np.arange(len(ways_rad))
+    corner_rad = first + np.concatenate([[0], np.cumsum(signs * ways_rad)])
+    seconds = np.union1d(np.arange(0, corner_s[-1], 0.01), corner_s)
+    noise = np.random.default_rng(0).uniform(-noise_rad, noise_rad, seconds.size)
+    time_ns = START + np.rint(seconds * 1e9).astype(np.int64)
+    log = JointLog(
+        *(
+            found[np.unique(time_ns, return_index=True)[1]]
+            for found in (time_ns, np.interp(seconds, corner_s, corner_rad) + noise)
+        )
+    )
+    expected = list(corner_s[1:-1])
+    for begin_s, way_rad in zip(corner_s[:-1], ways_rad, strict=True):
+        expected += [begin_s + k * whole_rad for k in range(1, int(way_rad / whole_rad) + 1)]
+    found_s = (turn_starts(log, int(time_ns[0]), whole_rad) - START) / 1e9
+    # a whole turn that ends within the noise of a turning point may be seen or not
+    sure = [t for t in expected if np.abs(corner_s[1:] - t).min() > 0.03 or t in corner_s]
+    assert all(np.abs(found_s - t).min() < 0.02 for t in sure)
+    assert all(np.abs(np.array([*expected, *corner_s]) - t).min() < 0.02 for t in found_s)
+
+
+def test_own_body_and_poses_are_reasons_of_their_own(tmp_path, command):
+    scans = [a_scan(0, 40, START + k * 100_000_000, range_m=np.full(40, 5, np.float32)) for k in range(8)]
+    write(tmp_path / "r.mcap", scans, a_log(0.0, 0.0))
+    (tmp_path / "angles.json").write_text(angle_set(0, 90, 0, -90).to_json())
+    bearing_rad = a_scan(0, 40).bearing_rad
+    hidden = bearing_rad > 1.7  # three of 40
+    stator = np.zeros((40, 360), bool)
+    stator[10, :3] = stator[11, 180] = True  # beam 10 at 0, 1 and 2 deg, beam 11 opposite; the axis stands at 0
+    np.savez(tmp_path / "own_body.npz", beams=hidden, stator=stator, bearing_rad=bearing_rad)
+    seconds = np.array([-1, 0.5])  # five scans and a beam; beam i is i ms late
+    lines = [
+        f"{(START + round(t * 1e9)) // 10**9}.{(START + round(t * 1e9)) % 10**9:09} {t} 0 0 0 0 0 1" for t in seconds
+    ]
+    (tmp_path / "poses.tum").write_text("\n".join(lines))
+    words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
+    code, printed, complaints = command(*words, "--flat", "--poses", tmp_path / "poses.tum", "--columns", "ring,time_s")
+    assert (code, complaints) == (0, [])
+    assert f"left out {8 * 4} beams: own body" in printed
+    assert f"left out {3 * 36 - 1} beams: outside poses" in printed
+    assert "poses: 2, usually 1.5 s apart" in printed
+    rows = read_ply(tmp_path / "c.ply")
+    assert rows.dtype.names == ("x", "y", "z", "time_s", "ring")
+    assert not {10, *np.flatnonzero(hidden)} & set(rows["ring"].tolist())
+    bearing, late_s = bearing_rad[rows["ring"]], rows["time_s"]
+    # rolling: R_world_laser = Rx(joint), and the joint stands at 0; the platform drives along x at 1 m/s
+    np.testing.assert_allclose(rows["x"], 5 * np.cos(bearing) + late_s, atol=2e-6)
+    np.testing.assert_allclose(rows["y"], 5 * np.sin(bearing), atol=2e-6)
+
+
+def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_not_know(tmp_path, command):
+    write(tmp_path / "r.mcap", [a_scan(0, 40, range_m=np.full(40, 5, np.float32))], a_log(0.0, 0.0))
+    (tmp_path / "angles.json").write_text(angle_set().to_json())
+    fine_rad = np.linspace(-1.95, 1.0, 400) + 2 * np.pi  # the same bearings, counted one turn further
+    np.savez(tmp_path / "own_body.npz", beams=np.abs(fine_rad - 2 * np.pi) < 0.25, bearing_rad=fine_rad)
+    words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
+    code, printed, _ = command(*words)
+    bearing_rad = a_scan(0, 40).bearing_rad
+    assert code == 0
+    assert f"warning: {np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))} of 40 beams have no bearing" in printed
+    np.testing.assert_array_equal(np.isnan(read_ply(tmp_path / "c.ply")["x"]), np.abs(bearing_rad) < 0.25)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"beams": np.zeros(3, bool)}, "no array 'bearing_rad'"),
+        ({"beams": np.zeros(3, bool), "bearing_rad": np.zeros(3)}, "two or more increasing bearings"),
+        (
+            {"beams": np.zeros(2, bool), "bearing_rad": np.arange(3.0)},
+            r"beams \(2,\), stator \(2, 0\): one row for each of 3",
+        ),
+    ],
+)
+def test_a_wrong_mask_is_one_line(tmp_path, command, arrays, says):
+    np.savez(tmp_path / "own_body.npz", **arrays)
+    (tmp_path / "angles.json").write_text(angle_set().to_json())
+    code, _, complaints = command("assemble", "r", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply")
+    assert code == 2
+    assert len(complaints) == 1
+    assert re.search(says, complaints[0])
+
+
+def test_far_poses_and_gaps_between_them_are_told(tmp_path):
+    recording = write(tmp_path / "r.mcap", [a_scan()], a_log(0.0, 1.0))
+    time_ns = START + np.append(np.arange(-30, 0), [50, 51]) * 100_000_000
+    poses = Trajectory(time_ns, np.full((32, 3), 5e5), np.tile([0, 0, 0, 1.0], (32, 1)))
+    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", poses=poses).said
+    assert "going straight between them is off by 0 mm and 0 deg at most" in said[1]
+    assert "between two poses lie up to 5.10 s" in said[2]
+    assert "500 km from 0, where float32 steps by 1 mm or more" in said[3]
+
+
+def test_the_steps_of_the_encoder_are_smoothed_unless_the_motor_stopped_or_one_asks(tmp_path):
+    step = 2 * np.pi / 4096
+    seconds = np.arange(-1, 5, 0.01)
+    log = JointLog(START + np.rint(seconds * 1e9).astype(np.int64), np.rint(0.35 * seconds / step) * step)
+    scans = [a_scan(k, 60, START + k * 100_000_000, range_m=np.full(60, 20, np.float32)) for k in range(40)]
+    off_m = {}
+    for name, note, options in (("smooth", {}, {}), ("asked", {}, {"smooth": False}), ("held", {"hold": "true"}, {})):
+        with RecordingWriter(tmp_path / "r.mcap", note) as writer:
+            for sample in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
+                writer.joint(*sample)
+            for scan in scans:
+                writer.scan(scan)
+        summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply", **options)
+        rows = read_ply(summary.out)
+        off_m[name] = 20 * np.abs(rows["joint_rad"] - 0.35 * rows["time_s"]).max()
+    assert off_m["smooth"] < 0.004
+    assert off_m["asked"] == off_m["held"] > 0.012
 
 
 def test_a_recording_without_a_single_point_is_refused(tmp_path):

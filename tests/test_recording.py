@@ -176,7 +176,7 @@ def other_topic(path, _scans):
 BROKEN = {
     cut: "the recording was cut off",
     text: "not an MCAP file",
-    flipped: "/joint_states: ",
+    flipped: "r.mcap: damaged: ",
     folder: "this is a folder",
     other_topic: r"no topic /scan; did you mean '/scann'\?",
     missing: "no such file",

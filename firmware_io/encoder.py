@@ -1,0 +1,242 @@
+"""The servo angle between the steps of its encoder: a smoothing spline with a known error.
+
+An encoder of 4096 steps a turn reads in steps of 0.088 deg, 15 mm at 10 m; a line drawn from sample to sample keeps
+that noise and adds the corners. Servos are heavier than that: a cubic spline with one knot for several samples, fitted
+to all of them by least squares, averages the steps away. How many samples a knot gets is chosen by generalised
+cross-validation: too few keep the noise, too many miss the motion.
+
+What the fit cannot know: an error that every sample shares (offset, eccentric magnet; calibration sees those), and
+what the axis does between two samples without a trace in them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline, CubicSpline, PPoly
+from scipy.linalg import solveh_banded
+
+from firmware_io.samples import AxisCurve, Floats, JointLog, straight
+
+_LEAST = 32  # samples; with fewer there is nothing to average
+_FINEST = 4  # samples to a knot
+_SWING = 6.0  # residuals beyond this many times their rms are jumps (a stop, a slip), not noise
+_MISSED = 2 / np.sqrt(12)  # of a step; twice what rounding to steps does is motion that the curve misses
+_REST_S = 0.1  # a staircase slower than this may as well be an axis that stops for its scans
+_STEPS_PER_KNOT = 8.0  # the axis must pass this many encoder steps between knots, or the fit follows the staircase
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmoothAxis:
+    """A smoothed joint log.
+
+    Attributes:
+        curve: the angle.
+        knot_s: usual time from knot to knot.
+        step_rad: step of the encoder; 0 where the positions have none.
+        residual_rad: rms of samples against the curve.
+        error_rad: rms error of the curve, from its residuals and from what a curve with half the knots makes of them.
+    """
+
+    curve: AxisCurve
+    knot_s: float
+    step_rad: float
+    residual_rad: float
+    error_rad: float
+
+
+def axis_curve(log: JointLog, *, held: bool) -> tuple[AxisCurve, str]:
+    """The angle to assemble with, and one line about it: smoothed where that is better than straight lines.
+
+    `held`: the motor stood still during each scan; the log is exact then.
+    """
+    if held:
+        return straight(log), "axis angle: held during each scan"
+    found = smooth(log)
+    if isinstance(found, str):
+        return straight(log), f"axis angle: straight between samples ({found})"
+    off_deg, error_deg = np.degrees([found.residual_rad, found.error_rad])
+    return found.curve, (
+        f"axis angle: smoothed, a knot every {found.knot_s:.3g} s; samples lie {off_deg:.2g} deg rms off the curve, "
+        f"the curve about {error_deg:.1g} deg rms off the truth"
+    )
+
+
+def smooth(log: JointLog) -> SmoothAxis | str:
+    """Fit a spline to the log, or say why straight lines between its samples are better."""
+    count = log.time_ns.size
+    if count < _LEAST:
+        return f"{count} samples are too few to smooth"
+    seconds = (log.time_ns - log.time_ns[0]) / 1e9
+    position = log.position_rad
+    step_rad = _encoder_step(position)
+    per_step = _samples_per_step(position, step_rad)
+    if per_step * np.median(np.diff(seconds)) > _REST_S:
+        return f"the angle rests {per_step * np.median(np.diff(seconds)):.2g} s on each value: does the axis stop?"
+    least = max(_FINEST, per_step * _STEPS_PER_KNOT)
+    fits: list[_Fit] = []
+    per_knot = float(least)
+    while per_knot < count / 4 or not fits:
+        fits.append(_fit(seconds, position, per_knot))
+        if fits[-1].score > 2 * min(fit.score for fit in fits):
+            break
+        per_knot *= 2
+    best = min(fits, key=lambda fit: fit.score)
+    if best.score >= _straight_score(seconds, position, step_rad):
+        return "a smooth curve predicts them no better"
+    residual = position - best.spline(seconds)
+    rms = float(np.sqrt(np.mean(residual**2)))
+    if step_rad and rms > _MISSED * step_rad:
+        return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain"
+    if np.abs(residual).max() > _SWING * rms + step_rad:
+        return f"they jump: one lies {np.degrees(np.abs(residual).max()):.2g} deg off a smooth curve"
+    pieces = PPoly.from_spline(best.spline)
+    knots = pieces.x[3:-3]
+    curve = AxisCurve(
+        knot_ns=log.time_ns[0] + np.rint(knots * 1e9).astype(np.int64),
+        coefficient=np.ascontiguousarray(pieces.c[::-1, 3:-3].T),
+    )
+    return SmoothAxis(
+        curve=curve,
+        knot_s=float(np.median(np.diff(knots))),
+        step_rad=step_rad,
+        residual_rad=rms,
+        error_rad=_error(seconds, position, best, rms, per_step),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A least-squares spline; `score` is the mean squared error it will make on a new sample (cross-validation)."""
+
+    spline: Callable[[Floats], Floats]
+    per_knot: float
+    unknowns: int
+    score: float
+
+
+def _fit(seconds: Floats, position: Floats, per_knot: float) -> _Fit:
+    count = seconds.size
+    # knots at samples, evenly by number and not by time: none is left without samples in a gap
+    inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
+    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+    # normal equations of cubic B-splines: four beside each other overlap, so the matrix is a band
+    basis = BSpline.design_matrix(seconds, knots, 3)
+    unknowns = knots.size - 4
+    square = basis.T @ basis
+    band = np.zeros((4, unknowns))
+    for diagonal in range(4):
+        band[diagonal, : unknowns - diagonal] = square.diagonal(-diagonal)
+    spline = BSpline(knots, solveh_banded(band, basis.T @ position, lower=True), 3)
+    score = np.mean((position - spline(seconds)) ** 2) / (1 - unknowns / count) ** 2
+    return _Fit(spline, per_knot, unknowns, float(score))
+
+
+def _straight_score(seconds: Floats, position: Floats, step_rad: float) -> float:
+    """Mean squared error of straight lines on a new sample: each sample is left out in turn."""
+    part = (seconds[1:-1] - seconds[:-2]) / (seconds[2:] - seconds[:-2])
+    missed = float(np.mean((position[:-2] + part * (position[2:] - position[:-2]) - position[1:-1]) ** 2))
+    # samples on one step of a slow axis predict each other, but not the axis
+    return max(missed, 1.5 * step_rad**2 / 12)
+
+
+def _error(seconds: Floats, position: Floats, best: _Fit, rms: float, correlated: float) -> float:
+    """What noise and what missing knots do to the curve, both as rms.
+
+    Noise keeps `unknowns / count` of its power, more where neighbouring samples share a step of the encoder. A curve
+    with half the knots misses 16 times as much of the motion (in rms); what it differs by beyond its noise tells.
+    """
+    count = seconds.size
+    noise = rms**2 * best.unknowns / count * max(correlated, 1.0)
+    coarse = _fit(seconds, position, 2 * best.per_knot)
+    differs = float(np.mean((coarse.spline(seconds) - best.spline(seconds)) ** 2))
+    missed = max(differs - noise / 2, 0.0) / 15**2
+    return float(np.sqrt(noise + missed))
+
+
+def _encoder_step(position: Floats) -> float:
+    """The step of which all positions within a turn are multiples, up to a common offset; 0 where there is none."""
+    apart = np.diff(np.sort(position % (2 * np.pi)))
+    apart = apart[apart > 1e-9]
+    if not apart.size:
+        return 0.0
+    steps = apart / apart.min()
+    return float(apart.min()) if np.abs(steps - np.rint(steps)).max() < 0.02 else 0.0
+
+
+def _samples_per_step(position: Floats, step_rad: float) -> float:
+    """How many samples the axis usually stays on one step of the encoder."""
+    if not step_rad:
+        return 0.0
+    return float((position.size - 1) * step_rad / np.abs(np.diff(position)).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class OrderPoint:
+    """One way to go between encoder samples: its error against the truth and its price.
+
+    Attributes:
+        method: name.
+        rms_deg: error over the whole log; `worst_deg` the largest.
+        rms_mm_at_10m: the same at the end of a 10 m beam across the axis.
+        prepare_s: once for the log.
+        ns_per_beam: for each beam asked.
+    """
+
+    method: str
+    rms_deg: float
+    worst_deg: float
+    rms_mm_at_10m: float
+    prepare_s: float
+    ns_per_beam: float
+
+
+def interpolation_orders(log: JointLog, truth_rad: Callable[[Floats], Floats], beams: int) -> Iterator[OrderPoint]:
+    """Error against run time of interpolation orders and of the smoothing spline.
+
+    Args:
+        log: encoder samples.
+        truth_rad: the angle [rad] at seconds since the first sample.
+        beams: how many times to ask, evenly over the log.
+    """
+    seconds = (log.time_ns - log.time_ns[0]) / 1e9
+    after_ns = np.linspace(0, log.time_ns[-1] - log.time_ns[0], beams).astype(np.int64)
+    asked_ns = log.time_ns[0] + after_ns
+    true = truth_rad(after_ns / 1e9)
+
+    def held() -> AxisCurve:
+        rows = np.zeros((seconds.size - 1, 4))
+        rows[:, 0] = log.position_rad[:-1]
+        return AxisCurve(log.time_ns, rows)
+
+    def cubic() -> AxisCurve:
+        return AxisCurve(log.time_ns, np.ascontiguousarray(CubicSpline(seconds, log.position_rad).c[::-1].T))
+
+    def smoothed() -> AxisCurve:
+        return axis_curve(log, held=False)[0]
+
+    ways = {
+        "order 0, last sample": held,
+        "order 1, straight": lambda: straight(log),
+        "order 3, through samples": cubic,
+        "smoothed": smoothed,
+    }
+    for method, prepare in ways.items():
+        start = time.perf_counter()
+        curve = prepare()
+        ready = time.perf_counter()
+        angle = curve.angle_at(asked_ns)
+        done = time.perf_counter()
+        off = angle - true
+        rms = float(np.sqrt(np.mean(off**2)))
+        yield OrderPoint(
+            method=method,
+            rms_deg=float(np.degrees(rms)),
+            worst_deg=float(np.degrees(np.abs(off).max())),
+            rms_mm_at_10m=rms * 10_000,
+            prepare_s=ready - start,
+            ns_per_beam=(done - ready) / beams * 1e9,
+        )

@@ -1,0 +1,115 @@
+"""The messages of an MCAP file, a chunk at a time.
+
+The layout is https://mcap.dev/spec. The `mcap` package reads the summary and unpacks the chunks; the records inside a
+chunk are cut here, because its reader makes an object of each record, which takes longer than all the rest.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from operator import itemgetter
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.records import Chunk, ChunkIndex
+from mcap.stream_reader import get_chunk_data_stream
+from mcap.summary import Summary
+
+from design.errors import RecordingError
+from firmware_io.files import foreign
+
+_MAGIC = b"\x89MCAP"
+_MESSAGE = 0x05
+_RECORD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+
+_Timed = tuple[int, int, str, bytes]  # log time [ns], place of the chunk, topic, bytes
+
+
+def topics_of(path: Path) -> dict[str, str]:
+    """Message type of each topic in a file.
+
+    Raises:
+        RecordingError: the file is missing, cut off or not MCAP.
+    """
+    with _opened(path) as stream:
+        summary = _summary(path, stream)
+    return {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
+
+
+def note_of(path: Path, name: str) -> dict[str, str]:
+    """The metadata record of a name; empty where the file has none."""
+    with _opened(path) as stream:
+        records = foreign(f"{path}: damaged", lambda: list(SeekingReader(stream).iter_metadata()))
+    return next((record.metadata for record in records if record.name == name), {})
+
+
+def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, bytes]]:
+    """Topic and bytes of each message, in the order of the log times, as they stand in the file where those are equal.
+
+    Holds the chunks that overlap in time, commonly one.
+
+    Raises:
+        RecordingError: the file is missing, not MCAP, or damaged.
+    """
+    with _opened(path) as stream:
+        summary = _summary(path, stream)
+        wanted = {key: channel.topic for key, channel in summary.channels.items() if channel.topic in topics}
+        chunks = sorted(
+            (chunk for chunk in summary.chunk_indexes if not wanted.keys().isdisjoint(chunk.message_index_offsets)),
+            key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset),
+        )
+        waiting = [] if summary.chunk_indexes else foreign(f"{path}: damaged", _unchunked, stream, topics)
+        for chunk in chunks:
+            ready = [message for message in waiting if message[0] < chunk.message_start_time]
+            yield from (message[2:] for message in ready)
+            waiting = waiting[len(ready) :] + foreign(f"{path}: damaged", _chunk, stream, chunk, wanted)
+            waiting.sort(key=itemgetter(0, 1))  # stable: the order within a chunk remains
+        yield from (message[2:] for message in waiting)
+
+
+def _opened(path: Path) -> BinaryIO:
+    if not path.is_file():
+        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+    stream = foreign(f"{path}: cannot read", path.open, "rb")
+    if stream.read(len(_MAGIC)) != _MAGIC:
+        stream.close()
+        raise RecordingError(f"{path}: not an MCAP file; `scanwright import` converts bags")
+    stream.seek(0)
+    return stream
+
+
+def _summary(path: Path, stream: BinaryIO) -> Summary:
+    what = f"{path}: the recording was cut off (`scanwright repair` mends it)"
+    summary = foreign(what, lambda: SeekingReader(stream).get_summary())
+    if summary is None:
+        raise RecordingError(what)
+    return summary
+
+
+def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str]) -> list[_Timed]:
+    stream.seek(index.chunk_start_offset + _RECORD.size)
+    unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+    data = unpacked.read(size)
+    found = []
+    at = 0
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        if opcode == _MESSAGE:
+            channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
+            if channel in wanted:
+                body = data[at + _MESSAGE_HEAD.size : at + length]
+                found.append((log_ns, index.chunk_start_offset, wanted[channel], body))
+        at += length
+    return found
+
+
+def _unchunked(stream: BinaryIO, topics: Collection[str]) -> list[_Timed]:
+    """The messages of a file without chunks; such a file has no index, so all of it is held."""
+    stream.seek(0)
+    found = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
+    return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in found]

@@ -1,0 +1,91 @@
+"""What the scanner's own parts hide: `own_body.npz` beside the angle set, as `scanwright build` writes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import RecordingError
+from firmware_io.files import foreign
+from firmware_io.samples import Floats
+
+FILE_NAME = "own_body.npz"
+_TURN = 2 * np.pi
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnBody:
+    """Which beams end on the scanner itself.
+
+    Attributes:
+        bearing_rad: of the beams that were looked at, shape (n,), increasing.
+        beams: hidden at every axis angle by what turns with the laser, shape (n,).
+        stator: hidden by what stands still, at the axis angles 2 pi j / g, shape (n, g); (n, 0) where nothing does.
+    """
+
+    bearing_rad: Floats
+    beams: Bools
+    stator: Bools
+
+    def hides(self, bearing_rad: Floats, gamma_rad: Floats) -> Bools:
+        """Whether the beam of each bearing at each axis angle ends on the scanner, shape (n,)."""
+        beams, stator = self.tables(bearing_rad)
+        if not stator.shape[1]:
+            return beams
+        known = np.isfinite(gamma_rad)
+        step = np.rint(np.where(known, gamma_rad, 0.0) * (stator.shape[1] / _TURN)).astype(np.int64) % stator.shape[1]
+        return beams | (known & stator[np.arange(bearing_rad.size), step])
+
+    def tables(self, bearing_rad: Floats) -> tuple[Bools, Bools]:
+        """`beams` and `stator` for other bearings, shapes (n,) and (n, g).
+
+        A beam is what the nearest known one is; one that is farther from all of them than they are apart is not hidden.
+        """
+        nearest, known = self._match(bearing_rad)
+        return self.beams[nearest] & known, self.stator[nearest] & known[:, None]
+
+    def unknown(self, bearing_rad: Floats) -> int:
+        """How many of these bearings were not looked at."""
+        return int(np.sum(~self._match(bearing_rad)[1]))
+
+    def _match(self, bearing_rad: Floats) -> tuple[NDArray[np.int64], Bools]:
+        """The nearest known beam of each bearing, and whether it is near enough."""
+        # a bearing is compared within the turn that begins opposite the middle of the known ones
+        begin = (self.bearing_rad[0] + self.bearing_rad[-1]) / 2 - np.pi
+        folded = (bearing_rad - begin) % _TURN + begin
+        right = np.searchsorted(self.bearing_rad, folded).clip(1, self.bearing_rad.size - 1)
+        left = right - 1
+        nearer_left = folded - self.bearing_rad[left] <= self.bearing_rad[right] - folded
+        nearest = np.where(nearer_left, left, right)
+        step = np.diff(self.bearing_rad).max()
+        return nearest, np.abs(self.bearing_rad[nearest] - folded) <= step
+
+
+def own_body_beside(angles: Path) -> OwnBody | None:
+    """The mask in the folder of an angle set; None where there is none."""
+    path = angles.parent / FILE_NAME
+    return load_own_body(path) if path.is_file() else None
+
+
+def load_own_body(path: Path) -> OwnBody:
+    """Read `own_body.npz`.
+
+    Raises:
+        RecordingError: the file is missing, damaged, or its arrays do not fit each other.
+    """
+    with foreign(f"{path}: cannot read the own-body mask", np.load, path) as arrays:
+        missing = sorted({"beams", "bearing_rad"} - set(arrays))
+        if missing:
+            raise RecordingError(f"{path}: no array '{missing[0]}'; `scanwright build` writes {FILE_NAME}")
+        bearing_rad, beams = np.asarray(arrays["bearing_rad"], float), np.asarray(arrays["beams"], bool)
+        stator = np.asarray(arrays["stator"], bool) if "stator" in arrays else np.zeros((beams.size, 0), bool)
+    if bearing_rad.ndim != 1 or bearing_rad.size < 2 or not np.all(np.diff(bearing_rad) > 0):
+        raise RecordingError(f"{path}: bearing_rad = shape {bearing_rad.shape}: two or more increasing bearings")
+    if beams.shape != bearing_rad.shape or stator.ndim != 2 or stator.shape[0] != beams.size:
+        shapes = f"beams {beams.shape}, stator {stator.shape}"
+        raise RecordingError(f"{path}: {shapes}: one row for each of {bearing_rad.size} bearings")
+    return OwnBody(bearing_rad, beams, stator)

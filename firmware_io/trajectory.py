@@ -1,0 +1,169 @@
+"""Where the platform was: poses of the `world` frame (the robot that carries the scanner) on a map, over time.
+
+Between two poses the position goes straight and the orientation about one axis at constant speed (slerp); that is off
+by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart. Outside the poses nobody knows: NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from design import frames
+from design.errors import RecordingError
+from firmware_io.samples import Floats, Times
+
+_NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
+_EVER_NS = 2**62
+
+
+class PosePieces(NamedTuple):
+    """Poses taken apart for the kernel.
+
+    Between two of them, u in [0, 1] of the way:
+
+        p_map = R_then Rz(u turn) (R_first p + t_first) + t_then + u shift
+
+    where p is turned by the joint already; where `moves` is false, p_map = R_first p + t_first.
+    """
+
+    time_ns: Times  # (k + 1,)
+    moves: NDArray[np.bool_]  # (k,)
+    R_first: Floats  # (k, 3, 3)
+    t_first: Floats  # (k, 3)
+    turn_rad: Floats  # (k,)
+    R_then: Floats  # (k, 3, 3)
+    t_then: Floats  # (k, 3)
+    shift_m: Floats  # (k, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Poses over time.
+
+    Attributes:
+        time_ns: shape (n,), n >= 2, strictly increasing.
+        position_m: shape (n, 3).
+        quaternion: x y z w, unit length, shape (n, 4).
+    """
+
+    time_ns: Times
+    position_m: Floats
+    quaternion: Floats
+
+    def __post_init__(self) -> None:
+        count = self.time_ns.size
+        if count < 2:
+            raise RecordingError(f"{count} poses: at least two are needed to go between them")
+        if self.position_m.shape != (count, 3) or self.quaternion.shape != (count, 4):
+            raise RecordingError(
+                f"{count} times, positions {self.position_m.shape}, quaternions {self.quaternion.shape}"
+            )
+        values = np.hstack([self.position_m, self.quaternion])
+        if not np.isfinite(values).all():
+            raise RecordingError(f"pose {int(np.argmin(np.isfinite(values).all(axis=1))) + 1}: not a finite number")
+        norm = np.linalg.norm(self.quaternion, axis=1)
+        if np.any(np.abs(norm - 1) > _NORM_ERROR):
+            worst = int(np.argmax(np.abs(norm - 1)))
+            raise RecordingError(
+                f"pose {worst + 1}: quaternion of length {norm[worst]:.4g}: 1; the order is qx qy qz qw"
+            )
+        if np.any(np.diff(self.time_ns) <= 0):
+            raise RecordingError(
+                f"pose {int(np.argmax(np.diff(self.time_ns) <= 0)) + 2}: not later than the one before it"
+            )
+
+    def T_map_world(self, time_ns: Times) -> Floats:
+        """Pose at each time, shape (n, 4, 4), NaN outside."""
+        inside = (time_ns >= self.time_ns[0]) & (time_ns <= self.time_ns[-1])
+        # epoch nanoseconds do not fit a float64, differences do
+        origin_ns = self.time_ns[0]
+        known_s = (self.time_ns - origin_ns) / 1e9
+        asked_s = (np.where(inside, time_ns, origin_ns) - origin_ns) / 1e9
+        asked_s = asked_s.clip(0, known_s[-1])
+        R = Slerp(known_s, Rotation.from_quat(self.quaternion))(asked_s).as_matrix()
+        t = np.stack([np.interp(asked_s, known_s, column) for column in self.position_m.T], axis=1)
+        T = frames.rigid(R, t)
+        T[~inside] = np.nan
+        return T
+
+    def pieces(self, first_ns: int, last_ns: int, T_world_rot: Floats) -> PosePieces:
+        """The poses from one time to another, behind the constant `T_world_rot`."""
+        begin, end = np.searchsorted(self.time_ns, [first_ns, last_ns], side="right")
+        begin = min(max(int(begin) - 1, 0), self.time_ns.size - 2)
+        near = slice(begin, max(int(end) + 1, begin + 2))
+        position_m, quaternion = self.position_m[near], self.quaternion[near]
+        R = Rotation.from_quat(quaternion[:-1]).as_matrix()
+        axis, turn_rad = _turns(quaternion)
+        shift_m = np.diff(position_m, axis=0)
+        moves = (turn_rad > 0) | np.any(shift_m != 0, axis=1)
+        R_platform_axis = _with_z(axis)
+        still = ~moves[:, None, None]
+        R_before = np.where(still, R, np.swapaxes(R_platform_axis, 1, 2))
+        t_before = np.where(moves[:, None], 0.0, position_m[:-1])
+        return PosePieces(
+            time_ns=self.time_ns[near],
+            moves=moves,
+            R_first=np.ascontiguousarray(R_before @ T_world_rot[:3, :3]),
+            t_first=R_before @ T_world_rot[:3, 3] + t_before,
+            turn_rad=turn_rad,
+            R_then=np.ascontiguousarray(R @ R_platform_axis),
+            t_then=position_m[:-1],
+            shift_m=shift_m,
+        )
+
+    def error(self) -> tuple[float, float]:
+        """Largest error of going straight between the poses, in m and rad, as the poses themselves tell.
+
+        Each pose is left out and predicted from its two neighbours. They are twice as far apart as poses are, so the
+        miss is four times the error (a h^2 / 8). What the platform does between two poses without trace in them
+        (vibration) is not in it. NaN for two poses.
+        """
+        if self.time_ns.size < 3:
+            return float("nan"), float("nan")
+        gap_s = np.diff(self.time_ns) / 1e9
+        part = gap_s[:-1] / (gap_s[:-1] + gap_s[1:])
+        p = self.position_m
+        miss_m = p[:-2] + part[:, None] * (p[2:] - p[:-2]) - p[1:-1]
+        R = Rotation.from_quat(self.quaternion)
+        step = (R[:-2].inv() * R[2:]).as_rotvec()
+        miss = (R[:-2] * Rotation.from_rotvec(part[:, None] * step)).inv() * R[1:-1]
+        return float(np.linalg.norm(miss_m, axis=1).max() / 4), float(miss.magnitude().max() / 4)
+
+
+def at_rest(T_world_rot: Floats) -> PosePieces:
+    """A platform that stands still for ever."""
+    none = np.zeros((1, 3))
+    return PosePieces(
+        time_ns=np.array([-_EVER_NS, _EVER_NS]),
+        moves=np.zeros(1, np.bool_),
+        R_first=np.ascontiguousarray(T_world_rot[None, :3, :3]),
+        t_first=np.ascontiguousarray(T_world_rot[None, :3, 3]),
+        turn_rad=np.zeros(1),
+        R_then=np.eye(3)[None],
+        t_then=none,
+        shift_m=none,
+    )
+
+
+def _turns(quaternion: Floats) -> tuple[Floats, Floats]:
+    """Axis (z where there is none) and angle [rad] from each orientation to the next, the short way round."""
+    v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
+    vector = w0 * v1 - w1 * v0 - np.cross(v0, v1)
+    cosine = np.sum(quaternion[:-1] * quaternion[1:], axis=1)
+    sine = np.linalg.norm(vector, axis=1)
+    there = np.where(cosine < 0, -sine, sine)
+    axis = np.where(sine[:, None] > 0, vector / np.where(sine > 0, there, 1.0)[:, None], [0.0, 0.0, 1.0])
+    return axis, 2 * np.arctan2(sine, np.abs(cosine))
+
+
+def _with_z(axis: Floats) -> Floats:
+    """Rotations whose third column is each unit vector, shape (n, 3, 3)."""
+    aside = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
+    x = np.cross(aside, axis)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(axis, x), axis], axis=2)

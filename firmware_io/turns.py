@@ -1,0 +1,46 @@
+"""Where one turn of the axis ends and the next begins."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from firmware_io.samples import JointLog, Times
+
+_NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
+
+
+def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Times:
+    """Times at which the axis has turned by a further `whole_rad`, or turns back, increasing.
+
+    The first turn begins at `begin_ns`, and each way anew at its turning point.
+    """
+    begin_ns = int(np.clip(begin_ns, log.time_ns[0], log.time_ns[-1]))
+    later = log.time_ns > begin_ns
+    time_ns = np.append(begin_ns, log.time_ns[later])
+    position = np.append(log.angle_at(np.array([begin_ns])), log.position_rad[later])
+    back = _turning_points(position.tolist())
+    starts = [time_ns[back]]
+    for first, last in pairwise([0, *back, position.size - 1]):
+        turned = np.maximum.accumulate(np.abs(position[first : last + 1] - position[first]))
+        whole = np.arange(whole_rad, turned[-1], whole_rad)
+        since_ns = np.interp(whole, turned, (time_ns[first : last + 1] - time_ns[first]).astype(float))
+        starts.append(time_ns[first] + np.rint(since_ns).astype(np.int64))
+    return np.unique(np.concatenate(starts))
+
+
+def _turning_points(position: list[float]) -> list[int]:
+    """Indices of the extremes from which the axis goes back by more than noise."""
+    found = []
+    way, extreme = 0, 0
+    for i, here in enumerate(position):
+        ahead = (here - position[extreme]) * (way or 1)
+        if way == 0 and abs(ahead) > _NOISE_RAD:
+            way, extreme = (1 if ahead > 0 else -1), i
+        elif way and ahead >= 0:
+            extreme = i
+        elif way and ahead < -_NOISE_RAD:
+            found.append(extreme)
+            way, extreme = -way, i
+    return found
