@@ -1,0 +1,43 @@
+"""PCD of the Point Cloud Library: holds everything, the start of the times as a comment."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from pypcd4.pypcd4 import Encoding, PointCloud
+
+from design.errors import RecordingError
+from firmware_io.files import foreign, whole_file
+from firmware_io.formats.record import Cloud, cloud_of, headlines, pose_matrix, pose_numbers, rows_of
+
+
+def read(path: Path) -> tuple[list[Cloud], list[str]]:
+    """The cloud of a file, whether ascii, binary or binary_compressed."""
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        data = stream.read()
+    pcd = foreign(f"{path}: not a PCD file", PointCloud.from_fileobj, io.BufferedReader(io.BytesIO(data)))
+    rows = pcd.pc_data
+    if not {"x", "y", "z"} <= set(rows.dtype.names or ()):
+        raise RecordingError(f"{path}: the fields are {' '.join(rows.dtype.names or ())}; a cloud has x y z")
+    x, y, z, w, i, j, k = pcd.metadata.viewpoint
+    comments = [line[1:].decode("ascii", "replace").strip() for line in data[:4096].splitlines() if line[:1] == b"#"]
+    cloud = cloud_of(rows, comments)
+    shape = (pcd.metadata.height, pcd.metadata.width)
+    return [Cloud(cloud.points_m, cloud.columns, shape, pose_matrix([x, y, z, i, j, k, w]), cloud.start_ns)], []
+
+
+def write(path: Path, cloud: Cloud) -> list[str]:
+    """Write a cloud, binary."""
+    rows = rows_of(cloud)
+    names = list(rows.dtype.names or ())
+    pcd = PointCloud.from_points([rows[name] for name in names], names, [rows.dtype[name].type for name in names])
+    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(cloud.T_world_cloud))
+    height, width = cloud.shape
+    pcd.metadata = pcd.metadata.derive(viewpoint=(x, y, z, w, i, j, k), height=height, width=width)
+    data = io.BytesIO()
+    pcd.save(data, Encoding.BINARY)
+    comments = [f"# {line}\n" for line in headlines(cloud) if line.startswith("time_s")]
+    with whole_file(path) as part:
+        part.write_bytes("".join(comments).encode() + data.getvalue())
+    return []

@@ -1,0 +1,1 @@
+"""Clouds of several stands become one map: thin, start, align, graph, merge, picture."""

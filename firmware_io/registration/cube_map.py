@@ -1,0 +1,73 @@
+"""Directions sorted into the cells of a cube map: what a scanner saw where, looked up in constant time.
+
+The faces are cut evenly in angle (the tangent warp), so that the solid angles of the cells differ by a third at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firmware_io.samples import Floats
+
+
+@njit(cache=True)
+def cells_of(points_m: Floats, side: int) -> NDArray[np.int32]:
+    """Cell of each point as seen from the origin, shape (n,); the map has `6 * side * side` cells."""
+    cells = np.empty(points_m.shape[0], np.int32)
+    for i in range(points_m.shape[0]):
+        x, y, z = points_m[i, 0], points_m[i, 1], points_m[i, 2]
+        ax, ay, az = abs(x), abs(y), abs(z)
+        if ax >= ay and ax >= az:
+            face, major, u, v = (0 if x > 0 else 1), ax, y, z
+        elif ay >= az:
+            face, major, u, v = (2 if y > 0 else 3), ay, z, x
+        else:
+            face, major, u, v = (4 if z > 0 else 5), az, x, y
+        column = min(side - 1, int((np.arctan2(u, major) / (np.pi / 2) + 0.5) * side))
+        row = min(side - 1, int((np.arctan2(v, major) / (np.pi / 2) + 0.5) * side))
+        cells[i] = (face * side + row) * side + column
+    return cells
+
+
+def solid_angles_sr(side: int) -> Floats:
+    """Solid angle of every cell, shape (6 * side * side,): exact, from the four corners."""
+    edge = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))
+    u, v = np.meshgrid(edge, edge)
+    corner = np.arctan2(u * v, np.sqrt(u**2 + v**2 + 1))
+    face = corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]
+    return np.tile(face.ravel(), 6)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthMap:
+    """The nearest and the farthest surface that a scanner saw in each cell.
+
+    Attributes:
+        side: cells along an edge of the cube.
+        near_m: shape (6 * side * side,), +inf where nothing was seen.
+        far_m: as `near_m`, -inf where nothing was seen.
+    """
+
+    side: int
+    near_m: Floats
+    far_m: Floats
+
+
+def depth_map(points_m: Floats, side: int) -> DepthMap:
+    """What the scanner at the origin saw of points of shape (n, 3)."""
+    near, far = _extremes(points_m, cells_of(points_m, side), 6 * side * side)
+    return DepthMap(side, near, far)
+
+
+@njit(cache=True)
+def _extremes(points_m: Floats, cells: NDArray[np.int32], count: int) -> tuple[Floats, Floats]:
+    near, far = np.full(count, np.inf), np.full(count, -np.inf)
+    for i in range(cells.size):
+        r = np.sqrt(points_m[i, 0] ** 2 + points_m[i, 1] ** 2 + points_m[i, 2] ** 2)
+        near[cells[i]] = min(near[cells[i]], r)
+        far[cells[i]] = max(far[cells[i]], r)
+    return near, far

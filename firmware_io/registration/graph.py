@@ -1,0 +1,131 @@
+"""Poses of all stands from the pairs between them: least squares on SE(3), with the covariance of every pose.
+
+A small motion (rotation vector w, translation v) stands on the right: T + (w, v) = (R exp(w), t + R v). The stated
+covariances of the pairs are those of their noise; where pairs contradict each other by more, all are scaled up by the
+same factor, and one that stands out of all others is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from design import frames
+from firmware_io.samples import Floats
+
+_MAX_STEPS = 30
+_SETTLED = 1e-9
+_OUTLIER = 36.0  # times the median of what the edges are off by, in squared sigmas: 6 sigma
+_MEDIAN_CHI2 = 5.35  # of six degrees of freedom
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """Pose `j` seen from pose `i`, `T_i_j`, and the covariance (6, 6) of a small motion on its right."""
+
+    i: int
+    j: int
+    T_i_j: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Graph:
+    """Solved poses.
+
+    Attributes:
+        T_world: shape (n, 4, 4).
+        covariance: shape (n, 6, 6), zero for the first, which is held.
+        left_out: edges that contradict all others.
+        scale: by how much the stated sigmas of the edges had to grow, at least 1.
+    """
+
+    T_world: Floats
+    covariance: Floats
+    left_out: tuple[Edge, ...]
+    scale: float
+
+
+def solve(T_world: Floats, edges: Sequence[Edge]) -> Graph:
+    """Least squares from a start of shape (n, 4, 4); the first pose is held.
+
+    Raises:
+        ValueError: the edges do not connect all poses.
+    """
+    kept, left_out = list(edges), []
+    while True:
+        if not connected(len(T_world), kept):
+            raise ValueError("the edges do not connect all poses")
+        poses, covariance, chi2 = _least_squares(T_world, kept)
+        limit = _OUTLIER * max(1.0, float(np.median(chi2)) / _MEDIAN_CHI2)
+        worst = int(np.argmax(chi2))
+        rest = kept[:worst] + kept[worst + 1 :]
+        if chi2[worst] <= limit or not connected(len(T_world), rest):
+            break
+        left_out.append(kept[worst])
+        kept = rest
+    freedom = 6 * (len(kept) - len(T_world) + 1)
+    scale = max(1.0, float(np.sqrt(chi2.sum() / freedom))) if freedom else 1.0
+    return Graph(poses, scale**2 * covariance, tuple(left_out), scale)
+
+
+def connected(count: int, edges: Sequence[Edge]) -> bool:
+    """Whether the edges join `count` poses to one graph."""
+    label = np.arange(count)
+    for edge in edges:
+        label[label == label[edge.i]] = label[edge.j]
+    return bool((label == label[0]).all())
+
+
+def _least_squares(T_world: Floats, edges: Sequence[Edge]) -> tuple[Floats, Floats, Floats]:
+    """Gauss-Newton; poses, their covariances, and the squared residual of each edge in sigmas."""
+    poses, n = T_world.copy(), len(T_world)
+    information = [np.linalg.inv(edge.covariance) for edge in edges]
+    for _ in range(_MAX_STEPS):
+        H, g, chi2 = np.zeros((6 * n, 6 * n)), np.zeros(6 * n), np.zeros(len(edges))
+        for k, (edge, weight) in enumerate(zip(edges, information, strict=True)):
+            residual, J_i, J_j = _residual(poses[edge.i], poses[edge.j], edge.T_i_j)
+            chi2[k] = residual @ weight @ residual
+            at_i, at_j = slice(6 * edge.i, 6 * edge.i + 6), slice(6 * edge.j, 6 * edge.j + 6)
+            H[at_i, at_i] += J_i.T @ weight @ J_i
+            H[at_j, at_j] += J_j.T @ weight @ J_j
+            H[at_i, at_j] += J_i.T @ weight @ J_j
+            H[at_j, at_i] += J_j.T @ weight @ J_i
+            g[at_i] += J_i.T @ weight @ residual
+            g[at_j] += J_j.T @ weight @ residual
+        step = np.zeros(6 * n)
+        step[6:] = np.linalg.solve(H[6:, 6:], -g[6:])
+        if np.abs(step).max(initial=0.0) < _SETTLED:
+            break
+        poses = np.array([_moved(T, step[6 * k : 6 * k + 6]) for k, T in enumerate(poses)])
+    spread = np.linalg.inv(H[6:, 6:])
+    covariance = np.zeros((n, 6, 6))
+    for k in range(1, n):
+        covariance[k] = spread[6 * k - 6 : 6 * k, 6 * k - 6 : 6 * k]
+    return poses, covariance, chi2
+
+
+def _residual(T_i: Floats, T_j: Floats, T_i_j: Floats) -> tuple[Floats, Floats, Floats]:
+    """What edge and poses differ by, shape (6,), and its derivatives by small motions of both poses, shape (6, 6)."""
+    seen = np.linalg.inv(T_i) @ T_j
+    R, u = T_i_j[:3, :3].T, seen[:3, 3]
+    turned = R @ seen[:3, :3]
+    residual = np.concatenate([Rotation.from_matrix(turned).as_rotvec(), R @ (u - T_i_j[:3, 3])])
+    J_i, J_j = np.zeros((6, 6)), np.zeros((6, 6))
+    J_i[:3, :3] = -seen[:3, :3].T
+    J_i[3:, :3] = R @ _cross(u)
+    J_i[3:, 3:] = -R
+    J_j[:3, :3] = np.eye(3)
+    J_j[3:, 3:] = turned
+    return residual, J_i, J_j
+
+
+def _moved(T: Floats, step: Floats) -> Floats:
+    return T @ frames.rigid(frames.rotvec_to_matrix(step[:3]), step[3:])
+
+
+def _cross(u: Floats) -> Floats:
+    return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])

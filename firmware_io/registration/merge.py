@@ -1,0 +1,40 @@
+"""Registered clouds as one map: every voxel one point, the mean of all that fell into it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from design import frames
+from firmware_io.formats.record import Cloud
+from firmware_io.registration.thin import joined_means, voxel_means
+from firmware_io.samples import Floats
+
+_SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
+
+
+def merge(clouds: Sequence[Cloud], T_world: Floats, spacing_m: float) -> Cloud:
+    """The map in the world.
+
+    Its columns: `count`, how many points a row stands for, and the mean `intensity` where every cloud has one.
+
+    Args:
+        clouds: at least one point in all.
+        T_world: their poses, shape (n, 4, 4).
+        spacing_m: edge of the voxels.
+    """
+    bright = all("intensity" in cloud.columns for cloud in clouds)
+    means, counts = [], []
+    for cloud, T in zip(clouds, T_world, strict=True):
+        valid = np.isfinite(cloud.points_m).all(axis=1)
+        world = frames.apply(T, cloud.points_m[valid].astype(float))
+        rows = np.column_stack([world, cloud.columns["intensity"][valid]]) if bright else world
+        mean, count = voxel_means(world, rows, spacing_m, np.zeros(len(rows), np.uint8))
+        means.append(mean)
+        counts.append(count)
+    every, level = np.concatenate(means), np.zeros(sum(map(len, means)), np.uint8)
+    joined, number = joined_means(every[:, :3], every, np.concatenate(counts), spacing_m, level)
+    real = np.float32 if np.abs(joined[:, :3]).max() < _SINGLE_M else np.float64
+    columns = {"intensity": joined[:, 3].astype(np.float32)} if bright else {}
+    return Cloud(joined[:, :3].astype(real), columns | {"count": number.astype(np.uint32)})

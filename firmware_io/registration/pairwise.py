@@ -1,0 +1,238 @@
+"""Where one stand is as seen from another: small_gicp from a start, its covariance, and whether to believe it.
+
+The last word is not the solver's "converged", which a wrong room reaches as well, but three facts that a person would
+check: how much of either cloud lies on the other, how much of it hangs where the other scanner looked straight
+through, and whether the surfaces in common hold all six degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+from design import frames
+from firmware_io.registration.cube_map import cells_of
+from firmware_io.registration.view import THREADS, Level, View, level_of
+from firmware_io.samples import Floats
+
+_COARSE_REACH_M = 1.0
+_COARSE_NEAR = 3  # times the spacing
+_FINE_REACH = 1.5  # times the spacing: farther neighbours pull towards surfaces that the other one did not see
+_STEP_RAD = 1e-5  # small_gicp's own 0.1 deg and 1 mm stop an order of magnitude before the answer
+_STEP_M = 1e-4
+_MAX_STEPS = 40
+
+_NEARLY_ALL = 0.97
+_FEW = 100
+_JUDGED = 20_000
+_ALIKE = 0.5  # cosine between normals of one surface: two noisy normals, or a curved surface
+
+MIN_OVERLAP = 0.2
+MAX_CONTRADICTION = 0.07
+_CLEARLY = 0.3  # of what a surface square to the motion does
+_MIN_RESIST = 0.03
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """The pose of stand b in the frame of stand a, and what speaks for it.
+
+    Attributes:
+        a: name of the first cloud.
+        b: name of the second.
+        T_a_b: shape (4, 4), NaN where there was nothing to start from.
+        covariance: of a small motion (rotation vector [rad], translation [m]) on the right of `T_a_b`, shape (6, 6);
+            NaN where the surfaces in common leave a motion free.
+        overlap: share of the smaller view's points that lie on the other's surfaces.
+        contradiction: share of the mutually visible points that hang in space the other scanner saw to be free.
+        why_not: one line for every fact that speaks against the pose; empty where it is believed.
+    """
+
+    a: str
+    b: str
+    T_a_b: Floats
+    covariance: Floats
+    overlap: float
+    contradiction: float
+    why_not: tuple[str, ...]
+
+    @property
+    def merit(self) -> float:
+        """To compare poses of the same two clouds, 0 to 1: overlap, the less the more it is contradicted."""
+        return _merit(self.overlap, self.contradiction)
+
+
+def align(a: View, b: View, T_a_b: Floats) -> Pair:
+    """Register b to a from a start that is right to about a metre and ten degrees."""
+    near = align_coarsely(a, b, T_a_b)
+    T, converged = _gicp(a.fine, b.fine, near, _FINE_REACH * a.spacing_m, THREADS)
+    return judge(a, b, T, converged)
+
+
+def refused(pair: Pair, why: str) -> Pair:
+    """The same pair with one more fact against it."""
+    return replace(pair, why_not=(*pair.why_not, why))
+
+
+def align_coarsely(a: View, b: View, T_a_b: Floats) -> Floats:
+    """The first half of `align`, to compare many starts."""
+    return _gicp(a.coarse, b.coarse, T_a_b, _COARSE_REACH_M, 1)[0]
+
+
+def judge(a: View, b: View, T_a_b: Floats, converged: bool) -> Pair:
+    """Weigh a pose by what both scanners saw."""
+    near_m = _FINE_REACH * a.spacing_m
+    T_b_a = np.linalg.inv(T_a_b)
+    (points_a, normals_a), (points_b, normals_b) = _some(a.fine), _some(b.fine)
+    there, turned = frames.apply(T_a_b, points_b), normals_b @ T_b_a[:3, :3]
+    here = frames.apply(T_b_a, points_a)
+    on_a, index = _touching(a.fine, there, turned, near_m)
+    on_b, _ = _touching(b.fine, here, normals_a @ T_a_b[:3, :3], near_m)
+    overlap = max(float(on_a.mean()), float(on_b.mean()))
+    contradiction = max(_contradiction(a, there, near_m), _contradiction(b, here, near_m))
+    target, points_m = index[on_a], there[on_a]
+    normals = a.fine.normals[target]
+    residual_m = np.einsum("ij,ij->i", normals, points_m - a.fine.points_m[target])
+    loose = _loose(points_m, normals, turned[on_a], a.name)
+    variance_m2 = residual_m @ residual_m / max(len(residual_m) - 6, 1) * len(points_b) / len(b.fine.points_m)
+    J = _jacobian(normals, points_m, T_a_b)
+    known = not loose and len(J) > 6
+    covariance = variance_m2 * np.linalg.inv(J.T @ J) if known else np.full((6, 6), np.nan)
+    why_not = []
+    if not converged:
+        why_not.append(f"small_gicp had not settled after {_MAX_STEPS} steps")
+    if overlap < MIN_OVERLAP:
+        why_not.append(
+            f"only {overlap:.0%} of the points lie on the other cloud: at least {MIN_OVERLAP:.0%} are needed"
+        )
+    if contradiction > MAX_CONTRADICTION:
+        why_not.append(
+            f"{contradiction:.0%} of the points hang where the other scanner looked through: "
+            f"at most {MAX_CONTRADICTION:.0%} may"
+        )
+    return Pair(a.name, b.name, T_a_b, covariance, overlap, contradiction, (*why_not, *loose))
+
+
+def _gicp(target: Level, source: Level, T_target_source: Floats, reach_m: float, threads: int) -> tuple[Floats, bool]:
+    """Align what faces both scanners: the two sides of a thin wall would settle on each other."""
+    target = _facing(target, T_target_source[:3, 3])
+    source = _facing(source, np.asarray(np.linalg.inv(T_target_source)[:3, 3], float))
+    result = small_gicp.align(
+        target.cloud,
+        source.cloud,
+        target.tree,
+        T_target_source,
+        registration_type="GICP",
+        max_correspondence_distance=reach_m,
+        num_threads=threads,
+        max_iterations=_MAX_STEPS,
+        rotation_epsilon=_STEP_RAD,
+        translation_epsilon=_STEP_M,
+    )
+    # With nothing in reach it returns the start and calls that converged
+    return result.T_target_source, bool(result.converged and result.num_inliers > 0)
+
+
+def _facing(level: Level, other_m: Floats) -> Level:
+    """The part of a level that shows its face to another scanner as well; all of it if that is nearly all."""
+    faces = np.einsum("ij,ij->i", level.normals, other_m - level.points_m) >= 0
+    return level if faces.mean() > _NEARLY_ALL or faces.sum() < _FEW else level_of(level.points_m[faces])
+
+
+def coarse_merit(a: View, b: View, T_a_b: Floats) -> float:
+    """`Pair.merit` by the coarse points alone: a hundredth of the work."""
+    there = frames.apply(T_a_b, b.coarse.points_m)
+    here = frames.apply(np.linalg.inv(T_a_b), a.coarse.points_m)
+    margin_m = _FINE_REACH * a.spacing_m
+    contradiction = max(_contradiction(a, there, margin_m), _contradiction(b, here, margin_m))
+    return _merit(max(_coarse_shares(a, b, T_a_b, _COARSE_NEAR * a.spacing_m)), contradiction)
+
+
+def near_share(a: View, b: View, T_a_b: Floats) -> float:
+    """Overlap as far as a pose that may be off by decimetres can tell it."""
+    return max(_coarse_shares(a, b, T_a_b, _COARSE_REACH_M))
+
+
+def _coarse_shares(a: View, b: View, T_a_b: Floats, reach_m: float) -> tuple[float, float]:
+    """Which share of b's coarse points touches a, and of a's b."""
+    T_b_a = np.linalg.inv(T_a_b)
+    on_a, _ = _touching(a.coarse, frames.apply(T_a_b, b.coarse.points_m), b.coarse.normals @ T_b_a[:3, :3], reach_m)
+    on_b, _ = _touching(b.coarse, frames.apply(T_b_a, a.coarse.points_m), a.coarse.normals @ T_a_b[:3, :3], reach_m)
+    return float(on_a.mean()), float(on_b.mean())
+
+
+def _merit(overlap: float, contradiction: float) -> float:
+    return overlap * max(0.0, 1 - contradiction / MAX_CONTRADICTION) + 1e-3 * overlap
+
+
+def _some(level: Level) -> tuple[Floats, Floats]:
+    """Points and normals, as many as a verdict needs."""
+    step = max(1, len(level.points_m) // _JUDGED)
+    return level.points_m[::step], level.normals[::step]
+
+
+def _touching(
+    level: Level, points_m: Floats, normals: Floats, reach_m: float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Which points have a neighbour within reach that faces the same way, and its index."""
+    index, square_m2 = level.tree.batch_knn_search(np.ascontiguousarray(points_m), 1, 1)
+    nearest = index[:, 0].astype(np.int64)
+    alike = np.einsum("ij,ij->i", normals, level.normals[nearest]) > _ALIKE
+    return (square_m2[:, 0] < reach_m**2) & alike, nearest
+
+
+def _contradiction(seer: View, points_m: Floats, margin_m: float) -> float:
+    """Share of points, of those that the seer must have seen, that stand clearly before what it did see there."""
+    cells = cells_of(points_m, seer.depth.side)
+    range_m = np.linalg.norm(points_m, axis=1)
+    # Neighbouring beams differ by this much on a slanted surface, and a cell holds an edge as often as a wall
+    margin_m += 0.02 * range_m
+    seen = range_m < seer.depth.far_m[cells] + margin_m
+    before = seen & (range_m < seer.depth.near_m[cells] - margin_m)
+    return float(before.sum()) / max(int(seen.sum()), 1)
+
+
+def _jacobian(normals: Floats, points_a: Floats, T_a_b: Floats) -> Floats:
+    """Point-to-plane residuals by a small motion on the right of `T_a_b`, shape (n, 6)."""
+    points_b = frames.apply(np.linalg.inv(T_a_b), points_a)
+    normals_b = normals @ T_a_b[:3, :3]
+    return np.hstack([np.cross(points_b, normals_b), normals_b])
+
+
+def _loose(points_m: Floats, normals: Floats, others: Floats, frame: str) -> list[str]:
+    """Name the motions that no surface in common resists: along a corridor, over a floor, about a tank.
+
+    The smallest eigenvalue cannot tell, for noise tilts every normal a little and thousands of them add up. So those
+    points are counted that resist the motion clearly, by the normals of both clouds: on far surfaces, where a normal
+    is a guess, two guesses seldom agree.
+    """
+    if not len(points_m):
+        return []
+    arm = points_m - points_m.mean(axis=0)
+    torque, torque_of_others = np.cross(arm, normals), np.cross(arm, others)
+    shift, turn = _weakest(normals), _weakest(torque)
+    lever_m = np.linalg.norm(np.cross(arm, turn), axis=1)
+    along = np.minimum(np.abs(normals @ shift), np.abs(others @ shift))
+    about = np.minimum(np.abs(torque @ turn), np.abs(torque_of_others @ turn))
+    shares = {
+        f"slide along {_axis(shift)}": float(np.mean(along > _CLEARLY)),
+        f"turn about {_axis(turn)}": float(np.mean(about > _CLEARLY * lever_m)),
+    }
+    return [
+        f"it can {motion} of {frame}: {share:.1%} of the points resist, {_MIN_RESIST:.0%} must"
+        for motion, share in shares.items()
+        if share < _MIN_RESIST
+    ]
+
+
+def _weakest(rows: Floats) -> Floats:
+    """Unit vector that the rows have least of."""
+    return np.linalg.eigh(rows.T @ rows)[1][:, 0]
+
+
+def _axis(direction: Floats) -> str:
+    x, y, z = direction * np.sign(direction[np.argmax(np.abs(direction))]) + 0.0
+    return f"({x:.2f}, {y:.2f}, {z:.2f})"

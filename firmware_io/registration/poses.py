@@ -1,0 +1,54 @@
+"""Poses of clouds as TUM lines (`time x y z qx qy qz qw`, s and m), their covariances as a table beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from design.errors import RecordingError
+from firmware_io.files import foreign, whole_file
+from firmware_io.formats.record import Cloud, pose_matrix, pose_numbers
+from firmware_io.samples import Floats
+
+_AXES = ("rx", "ry", "rz", "x", "y", "z")
+
+
+def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_world: Floats) -> None:
+    """One line for each cloud, in their order; the time is the cloud's start, or its number where that is unknown."""
+    lines = ["# time x y z qx qy qz qw"]
+    for number, (name, cloud, T) in enumerate(zip(names, clouds, T_world, strict=True)):
+        time = str(number) if cloud.start_ns is None else f"{cloud.start_ns // 10**9}.{cloud.start_ns % 10**9:09d}"
+        lines += [f"# {name}", f"{time} " + " ".join(f"{value:.9f}" for value in pose_numbers(T))]
+    with whole_file(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_covariances(path: Path, names: Sequence[str], covariance: Floats) -> None:
+    """One row for each cloud: the upper triangle for a small motion (rotation vector w [rad], translation v [m]).
+
+    It is in the frame of the cloud, on the right of its pose: T + (w, v) = (R exp(w), t + R v).
+    """
+    upper = [(i, j) for i in range(6) for j in range(i, 6)]
+    lines = [",".join(["cloud", *(f"{_AXES[i]}_{_AXES[j]}" for i, j in upper)])]
+    for name, matrix in zip(names, covariance, strict=True):
+        lines.append(",".join([name, *(f"{matrix[i, j]:.6e}" for i, j in upper)]))
+    with whole_file(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_poses(path: Path, count: int) -> list[Floats]:
+    """Poses of `count` clouds, one TUM line for each in their order.
+
+    Raises:
+        RecordingError: the file does not hold that.
+    """
+    text = foreign(f"{path}: cannot read", path.read_text, encoding="utf-8")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) != count:
+        raise RecordingError(f"{path}: {len(lines)} poses for {count} clouds; one line for each, in their order")
+    rows = foreign(f"{path}: a line is time x y z qx qy qz qw", np.loadtxt, lines, ndmin=2)
+    if rows.shape != (count, 8) or not np.isfinite(rows).all() or not np.any(rows[:, 4:], axis=1).all():
+        raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers, the quaternion not zero")
+    return [pose_matrix(row[1:]) for row in rows]

@@ -1,0 +1,128 @@
+"""All stands of a session in one frame: a first chain of pairs, then every pair that overlaps, then the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from firmware_io.registration.graph import Edge, Graph, solve
+from firmware_io.registration.pairwise import Pair, align, near_share, refused
+from firmware_io.registration.start import find
+from firmware_io.registration.view import View
+from firmware_io.samples import Floats
+
+_WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
+_ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """What became of a session.
+
+    Attributes:
+        T_world: pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined.
+        covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
+        pairs: every pair that was tried, the believed ones first.
+        scale: by how much the stated sigmas of the pairs had to grow for them to agree, at least 1.
+    """
+
+    T_world: Floats
+    covariance: Floats
+    pairs: tuple[Pair, ...]
+    scale: float
+
+    @property
+    def complete(self) -> bool:
+        """Whether every cloud found its place."""
+        return bool(np.isfinite(self.T_world).all())
+
+
+def register(views: Sequence[View], given: Sequence[Floats], say: Callable[[str], None]) -> Registration:
+    """Find all poses.
+
+    Args:
+        views: the clouds; the frame of the first one becomes the world, unless its pose is given.
+        given: start poses in the world, one for each view, shape (4, 4) each; empty where nobody knows.
+        say: progress.
+    """
+    pairs: dict[tuple[int, int], Pair] = {}
+    poses = _chain(views, given, pairs, say)
+    order = sorted(poses)
+    sure = {pair for pair in pairs if not pairs[pair].why_not}
+    scale = 1.0
+    covariance = np.full((len(views), 6, 6), np.nan)
+    covariance[0] = 0.0
+    for _ in range(_ROUNDS):
+        near = [pair for pair in combinations(order, 2) if pair not in sure and _in_reach(views, poses, *pair)]
+        for i, j in near:
+            say(f"{views[i].name} and {views[j].name} overlap")
+            pairs[i, j] = align(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j])
+        sure.update(near)
+        if not near and np.isfinite(covariance[order]).all():
+            break
+        graph = _solve(order, poses, pairs)
+        poses = dict(zip(order, graph.T_world, strict=True))
+        covariance[order], scale = graph.covariance, graph.scale
+    T_world = np.array([poses.get(k, np.full((4, 4), np.nan)) for k in range(len(views))])
+    return Registration(T_world, covariance, tuple(sorted(pairs.values(), key=lambda pair: bool(pair.why_not))), scale)
+
+
+def _chain(
+    views: Sequence[View],
+    given: Sequence[Floats],
+    pairs: dict[tuple[int, int], Pair],
+    say: Callable[[str], None],
+) -> dict[int, Floats]:
+    """A first pose for every cloud that can be joined to one that has a pose; neighbours in the row are tried first."""
+    poses = {0: given[0] if given else np.eye(4)}
+    while joined := _next_joined(views, given, poses, pairs, say):
+        poses.update(joined)
+    return poses
+
+
+def _next_joined(
+    views: Sequence[View],
+    given: Sequence[Floats],
+    poses: dict[int, Floats],
+    pairs: dict[tuple[int, int], Pair],
+    say: Callable[[str], None],
+) -> dict[int, Floats]:
+    """One more cloud and its pose; nothing when no pair is left to try."""
+    missing = [k for k in range(len(views)) if k not in poses]
+    untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
+    for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
+        low, high = min(i, k), max(i, k)
+        pair = _pair(views[low], views[high], [given[low], given[high]] if given else [])
+        pairs[low, high] = pair
+        say(f"{pair.a} and {pair.b}: {'; '.join(pair.why_not) or f'{pair.overlap:.0%} overlap'}")
+        if not pair.why_not:
+            return {k: poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))}
+    return {}
+
+
+def _pair(a: View, b: View, given: Sequence[Floats]) -> Pair:
+    """From the given poses if they lead anywhere, else from none."""
+    if given:
+        pair = align(a, b, np.linalg.inv(given[0]) @ given[1])
+        if not pair.why_not:
+            return pair
+    return find(a, b)
+
+
+def _in_reach(views: Sequence[View], poses: dict[int, Floats], i: int, j: int) -> bool:
+    """Whether enough of both clouds may lie on each other to be worth a try."""
+    return near_share(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j]) > _WORTH
+
+
+def _solve(order: Sequence[int], poses: dict[int, Floats], pairs: dict[tuple[int, int], Pair]) -> Graph:
+    """Solve the graph of the believed pairs; those that it throws out are marked in `pairs`."""
+    row = {k: position for position, k in enumerate(order)}
+    edges = [Edge(row[i], row[j], pair.T_a_b, pair.covariance) for (i, j), pair in pairs.items() if not pair.why_not]
+    graph = solve(np.array([poses[k] for k in order]), edges)
+    for edge in graph.left_out:
+        i, j = order[edge.i], order[edge.j]
+        pairs[i, j] = refused(pairs[i, j], "it contradicts what all other pairs say")
+    return graph

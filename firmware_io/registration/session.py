@@ -1,0 +1,99 @@
+"""`scanwright register`: files of clouds become poses, a map and a picture, or the word why they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from design.errors import RecordingError
+from firmware_io.cloud_files import read_clouds, write_clouds
+from firmware_io.registration.merge import merge
+from firmware_io.registration.pairwise import Pair
+from firmware_io.registration.picture import overlap_picture
+from firmware_io.registration.poses import read_poses, write_covariances, write_poses
+from firmware_io.registration.register import Registration, register
+from firmware_io.registration.view import view_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """What became of `register_files`.
+
+    Attributes:
+        names: of the clouds.
+        found: their poses and pairs.
+        points: of the map; 0 where there is none, as a cloud found no place.
+        wrote: all files.
+        said: what the files could not hold, or what was not read.
+    """
+
+    names: tuple[str, ...]
+    found: Registration
+    points: int
+    wrote: tuple[Path, ...]
+    said: tuple[str, ...]
+
+    @property
+    def refused(self) -> list[Pair]:
+        """The pairs that were not believed."""
+        return [pair for pair in self.found.pairs if pair.why_not]
+
+
+def register_files(
+    paths: Sequence[Path],
+    out: Path,
+    poses: Path,
+    start: Path | None,
+    spacing_m: float,
+    map_spacing_m: float,
+    say: Callable[[str], None],
+) -> Session:
+    """Register clouds, write map, poses, covariances and picture; nothing at all unless every cloud found its place.
+
+    Args:
+        paths: files of clouds, at least two clouds in all.
+        out: the map, in any format.
+        poses: TUM file to write; `.cov.csv` goes beside it.
+        start: TUM file of start poses; without it the poses in the files, if there are any, are the start.
+        spacing_m: between the points that are registered.
+        map_spacing_m: edge of the voxels of the map.
+        say: progress.
+
+    Raises:
+        RecordingError: a file cannot be read or written, or there is only one cloud.
+    """
+    for name, value in (("spacing", spacing_m), ("map spacing", map_spacing_m)):
+        if not (np.isfinite(value) and value > 0):
+            raise RecordingError(f"{name} {value} m: must be above 0")
+    names, clouds, said = [], [], []
+    for path in paths:
+        read, lines = read_clouds(path)
+        names += [path.stem] if len(read) == 1 else [f"{path.stem}_{k}" for k in range(1, len(read) + 1)]
+        clouds += read
+        said += lines
+    if len(clouds) < 2:
+        raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
+    if len(set(names)) < len(names):
+        names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
+    if start is not None:
+        given = read_poses(start, len(clouds))
+    else:
+        given = [cloud.T_world_cloud for cloud in clouds] if any(cloud.placed for cloud in clouds) else []
+    views = []
+    for name, cloud in zip(names, clouds, strict=True):
+        say(f"{name}: {len(cloud.points_m):,} points")
+        views.append(view_of(name, cloud.points_m.astype(float), spacing_m))
+    found = register(views, given, say)
+    if not found.complete:
+        return Session(tuple(names), found, 0, (), tuple(said))
+    say("merging")
+    merged = merge(clouds, found.T_world, map_spacing_m)
+    wrote, lost = write_clouds(out, [merged])
+    covariances, png = poses.with_suffix(".cov.csv"), out.with_suffix(".png")
+    write_poses(poses, names, clouds, found.T_world)
+    write_covariances(covariances, names, found.covariance)
+    overlap_picture(png, views, found)
+    return Session(tuple(names), found, len(merged.points_m), (*wrote, poses, covariances, png), (*said, *lost))

@@ -1,0 +1,119 @@
+"""Resampling that undoes what the scanner's own density does to a cloud.
+
+A rotating 2D lidar sees some directions a hundred times more densely than others, near surfaces more densely than far
+ones, and along a line more densely than across. Handed over as it is, such a cloud registers its own pattern: the
+twenty nearest neighbours of a point lie on one scan line, and the lines of one scan align with those of the other.
+
+How densely the scanner looked into each direction is counted in the cells of a cube map, which also knows what a model
+of the beams does not: shadows, dropped beams, more than one turn. With the step between neighbouring beams that gives
+the gap between the lines there, and a voxel is taken no finer than that gap on the surface it stands for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firmware_io.registration.cube_map import cells_of, solid_angles_sr
+from firmware_io.samples import Floats
+
+_SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
+_LEVELS = 3  # voxels grow up to 2**3 times; where lines are still farther apart nothing is known between them
+
+
+def thin(points_m: Floats, spacing_m: float) -> Floats:
+    """Mean points of voxels, shape (m, 3), evenly spread over the surfaces that the scanner at the origin saw.
+
+    Args:
+        points_m: shape (n, 3), finite, in the order in which they were measured.
+        spacing_m: edge of the finest voxels.
+    """
+    means, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
+    gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, beam_step_rad(points_m))
+    level = np.clip(np.ceil(np.log2(np.maximum(gap_m, spacing_m) / spacing_m)), 0, _LEVELS).astype(np.uint8)
+    # Fine voxels nest in coarse ones, so that nothing is lost by starting from their means
+    return joined_means(means, means, counts, spacing_m, level)[0]
+
+
+def line_gaps_rad(points_m: Floats, counts: NDArray[np.int64], step_rad: float) -> Floats:
+    """Angle between neighbouring scan lines in the direction of each point, shape (n,).
+
+    In a cloud without lines (of another scanner, or shuffled) it is the mean distance of neighbours.
+
+    Args:
+        points_m: shape (n, 3).
+        counts: how many beams each of them stands for, shape (n,).
+        step_rad: angle between neighbouring beams of one line.
+    """
+    cells = cells_of(points_m, _SIDE)
+    count = np.bincount(cells, counts, 6 * _SIDE**2)
+    each_sr = solid_angles_sr(_SIDE) / np.maximum(count, 1)
+    gap = each_sr / np.minimum(step_rad, np.sqrt(each_sr))
+    return gap[cells]
+
+
+def beam_step_rad(points_m: Floats) -> float:
+    """Angle between beams that were measured one after the other: the median, as the rest are gaps and line ends."""
+    some = np.unique(np.linspace(0, len(points_m) - 2, min(len(points_m) - 1, 20_011)).astype(int))
+    here, there = points_m[some], points_m[some + 1]
+    sine, cosine = np.linalg.norm(np.cross(here, there), axis=1), np.einsum("ij,ij->i", here, there)
+    return float(np.median(np.arctan2(sine, cosine)))
+
+
+def voxel_means(
+    points_m: Floats, values: Floats, spacing_m: float, level: NDArray[np.uint8]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Mean of `values`, shape (n, k), in each occupied voxel, shape (m, k), and how many points each holds, shape (m,).
+
+    Voxels have the edge `spacing_m * 2**level`, and come in the order in which their first points do.
+    """
+    means, counts = _accumulate(points_m, values, spacing_m, level)
+    return means / counts[:, None], counts
+
+
+def joined_means(
+    points_m: Floats, values: Floats, counts: NDArray[np.int64], spacing_m: float, level: NDArray[np.uint8]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """`voxel_means` of what are means already, of `counts` points each."""
+    weighted = np.column_stack([values * counts[:, None], counts])
+    sums, _ = _accumulate(points_m, weighted, spacing_m, level)
+    return sums[:, :-1] / sums[:, -1:], sums[:, -1].astype(np.int64)
+
+
+@njit(cache=True)
+def _accumulate(
+    points_m: Floats, values: Floats, spacing_m: float, level: NDArray[np.uint8]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Sums and counts by an open hash table: one pass, whatever the extent of the cloud."""
+    n, k = values.shape
+    size = 1
+    while size < 2 * n:
+        size *= 2
+    slot = np.full(size, -1, np.int64)
+    key = np.empty((n, 4), np.int64)
+    sums = np.zeros((n, k))
+    counts = np.zeros(n, np.int64)
+    used = 0
+    for i in range(n):
+        edge = spacing_m * 2.0 ** level[i]
+        a = np.int64(np.floor(points_m[i, 0] / edge))
+        b = np.int64(np.floor(points_m[i, 1] / edge))
+        c = np.int64(np.floor(points_m[i, 2] / edge))
+        # Teschner et al., "Optimized spatial hashing for collision detection of deformable objects" (2003)
+        h = ((a * 73856093) ^ (b * 19349663) ^ (c * 83492791) ^ np.int64(level[i]) * 2654435761) & (size - 1)
+        while True:
+            j = slot[h]
+            if j < 0:
+                j = used
+                slot[h] = j
+                key[j, 0], key[j, 1], key[j, 2], key[j, 3] = a, b, c, level[i]
+                used += 1
+                break
+            if key[j, 0] == a and key[j, 1] == b and key[j, 2] == c and key[j, 3] == level[i]:
+                break
+            h = (h + 1) & (size - 1)
+        counts[j] += 1
+        for d in range(k):
+            sums[j, d] += values[i, d]
+    return sums[:used], counts[:used]
