@@ -1,0 +1,129 @@
+"""A small process that holds the servo's port, and stops the servo when the program that drives it is gone.
+
+No handler can run in a program that is killed. So the port is opened once and shared: the guard inherits it, listens on
+a pipe to the program, and when that pipe ends without a word (kill -9, a crash, a power cut of the terminal), or stays
+silent while the servo turns (Ctrl-Z, a program that hangs), it sends the packet that takes the servo's torque, until it
+is answered. The port's lock belongs to the open port, so nobody else gets in before the servo stands.
+
+The file is also the guard's program: it imports the standard library only, to be there in some 20 ms.
+What it cannot do: stop a servo whose bus is cut, or do anything once the machine itself has lost its power.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import termios
+import time
+
+SILENCE_S = 2.0  # as long as a turning servo may go without a word from the program
+
+_TURNING, _RESTING, _DONE = b"t", b"r", b"d"
+_GIVE_UP_S = 2.0
+_ANSWER_S = 0.05
+
+
+class Guard:
+    """The program's end of the pipe.
+
+    Args:
+        port_fd: the open port.
+        packet: what takes the servo's torque.
+        answer: what the servo's answer to it begins with.
+        silence_s: after how long without a word a turning servo is stopped.
+    """
+
+    def __init__(self, port_fd: int, packet: bytes, answer: bytes, silence_s: float = SILENCE_S) -> None:
+        # A session of its own: Ctrl-C and the end of the terminal reach the program, not the guard.
+        self._process = subprocess.Popen(
+            [sys.executable, "-I", "-S", __file__, str(port_fd), packet.hex(), answer.hex(), str(silence_s)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            pass_fds=(port_fd,),
+            start_new_session=True,
+            bufsize=0,
+        )
+        assert self._process.stdin and self._process.stdout
+        self._words, ready = self._process.stdin, self._process.stdout
+        self._said_s = 0.0
+        with ready:
+            if ready.read(1) != b"!":
+                self._words.close()
+                raise RuntimeError(f"the guard process did not start (exit {self._process.wait()})")
+
+    def turning(self) -> bool:
+        """The servo turns from now on, and the program is alive; False if the guard has stopped it."""
+        return self._say(_TURNING)
+
+    def resting(self) -> bool:
+        """The servo stands; silence is fine."""
+        return self._say(_RESTING)
+
+    def beat(self) -> bool:
+        """The program is alive, said at most ten times a second."""
+        return time.monotonic() - self._said_s < 0.1 or self._say(_TURNING)
+
+    def dismiss(self, stands: bool) -> bool:
+        """End the guard, which first stops the servo if it does not stand; whether it does now. May be called again."""
+        if not self._words.closed:
+            if stands:
+                self._say(_DONE)
+            self._words.close()
+        return self._process.wait() == 0
+
+    def _say(self, word: bytes) -> bool:
+        self._said_s = time.monotonic()
+        try:
+            self._words.write(word)
+        except BrokenPipeError:
+            return False
+        return True
+
+
+def watch(port_fd: int, packet: bytes, answer: bytes, silence_s: float) -> None:
+    """The guard's life: wait for the program's end, then stop the servo unless told that it stands."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    os.write(1, b"!")
+    os.close(1)
+    wait_s = None
+    while select.select([0], [], [], wait_s)[0]:
+        words = os.read(0, 4096)
+        if words.endswith(_DONE):
+            return
+        if not words:
+            break
+        wait_s = silence_s if words.endswith(_TURNING) else None
+    os.close(0)  # from here on the program hears that its guard has acted
+    try:
+        stop(port_fd, packet, answer)
+    except (OSError, termios.error):  # the port is gone
+        sys.exit(1)
+
+
+def stop(port_fd: int, packet: bytes, answer: bytes) -> None:
+    """Send the packet until it is answered.
+
+    Raises:
+        OSError: the port is gone, as termios.error does; or nobody answers.
+    """
+    end_s = time.monotonic() + _GIVE_UP_S
+    while time.monotonic() < end_s:
+        termios.tcflush(port_fd, termios.TCIFLUSH)  # an answer to the dead program is none to us
+        os.write(port_fd, packet)
+        heard, until_s = b"", time.monotonic() + _ANSWER_S
+        while select.select([port_fd], [], [], max(0.0, until_s - time.monotonic()))[0]:
+            some = os.read(port_fd, 4096)
+            if not some:
+                raise OSError("the port is gone")
+            heard += some
+            if answer in heard:
+                return
+    raise OSError("no answer")
+
+
+if __name__ == "__main__":
+    watch(int(sys.argv[1]), bytes.fromhex(sys.argv[2]), bytes.fromhex(sys.argv[3]), float(sys.argv[4]))

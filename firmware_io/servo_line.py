@@ -1,0 +1,112 @@
+"""The serial port under the servo bus: what is sent, what comes, and when."""
+
+from __future__ import annotations
+
+import errno
+import time
+
+import serial
+from serial.tools.list_ports import comports
+
+from design.errors import DeviceError, ProtocolError
+
+_SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenever its time-out is changed
+
+
+class Line:
+    """An open port, with what the SDK's packet handlers ask of one to read an answer; those names are theirs.
+
+    Attributes:
+        port: of pyserial.
+        wait_s: how long an answer may take beyond the time of its bytes: twice the USB latency timer of up to 16 ms,
+            the return delay, a busy host.
+        echoes: whether the adapter returns what it sends.
+        deadline_s: until when to wait, on the monotonic clock.
+        sent: the last request.
+        began_ns: when it was written.
+        ended_ns: when the last byte came.
+    """
+
+    wait_s = 0.050
+
+    def __init__(self, port: str, baud: int) -> None:
+        try:
+            self.port = serial.Serial(port, baud, exclusive=True, timeout=_SLICE_S, write_timeout=1.0)
+        except (OSError, ValueError) as error:  # pyserial's own are OSErrors
+            raise DeviceError(_why_not_opened(port, error)) from error
+        self.is_using = False  # only `Tape` is ever sent to, which sets it; reading clears it
+        self.echoes = False
+        self.deadline_s = 0.0
+        self.began_ns = self.ended_ns = 0
+        self.sent = b""
+        self._echo_due = False
+
+    def clearPort(self) -> None:
+        """Drop what has come."""
+        self.port.reset_input_buffer()
+
+    def isPacketTimeout(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() >= self.deadline_s
+
+    def readPort(self, length: int) -> bytes:
+        """Up to that many bytes of an answer; fewer when the deadline passes."""
+        if self._echo_due:
+            self._echo_due = False
+            if self._read(len(self.sent)) != self.sent:
+                raise ProtocolError("the adapter's echo is not what was sent: do two programs send at a time?")
+        data = self._read(length)
+        if data:
+            self.ended_ns = time.monotonic_ns()
+        return data
+
+    def write(self, packet: bytes) -> None:
+        """Send a request."""
+        self.sent, self._echo_due = packet, self.echoes
+        self.began_ns = self.ended_ns = time.monotonic_ns()
+        self.port.write(packet)
+
+    def find_echo(self) -> None:
+        """Whether the adapter returns what it sends, tried with a byte that no servo answers."""
+        self.deadline_s = time.monotonic() + self.wait_s
+        self.clearPort()
+        self.write(b"\0")
+        self.echoes = self._read(1) == b"\0"
+
+    @property
+    def byte_s(self) -> float:
+        """How long one byte takes, with its start and stop bit."""
+        return 10 / float(self.port.baudrate)
+
+    def _read(self, length: int) -> bytes:
+        data = b""
+        while len(data) < length and not self.isPacketTimeout():
+            data += self.port.read(length - len(data))
+        return data
+
+
+class Tape:
+    """A line that keeps the bytes instead of sending them."""
+
+    is_using = False
+    packet = b""
+
+    def clearPort(self) -> None:
+        """Nothing comes."""
+
+    def writePort(self, packet: list[int]) -> int:
+        """Keep the request."""
+        self.packet = bytes(packet)
+        return len(packet)
+
+
+def _why_not_opened(port: str, error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    if number == errno.ENOENT:
+        there = ", ".join(sorted(found.device for found in comports())) or "none"
+        return f"{port}: no such port; serial ports here: {there}"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"{port}: you may not open it; become a member of its group (often 'dialout'), then log in again"
+    if number in (errno.EAGAIN, errno.EBUSY):
+        return f"{port}: another program has it open; end that one first"
+    return f"{port}: cannot be opened: {error}"
