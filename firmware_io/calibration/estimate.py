@@ -1,0 +1,126 @@
+"""From beams to errors: coarse to fine, first with one beam per tile, then with all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from firmware_io.calibration.model import COUNT, LAG, MOUNT, Beams, Ints, Mount, rays
+from firmware_io.calibration.observable import Choice, check_fan, choose, several_speeds, spectrum
+from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, reduced, step, sums
+from firmware_io.calibration.surfaces import group, without_misfits
+from firmware_io.calibration.tiles import Tiles, flat_tiles
+from firmware_io.samples import Floats
+
+# (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
+_WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
+_NARROW = ((0.12, 3.0), (0.06, 2.0), (0.03, 1.0), (0.03, 1.0))
+_STEPS = 4
+_TRUST = 0.1  # times `near`: the standard deviation of tiles about planes that are wrong by up to `near`
+_ROUNDS = 2  # of grouping, with all beams
+_VAGUE_DEG, _LAST_VAGUE_DEG = 15.0, 45.0  # in the end misfits are found beam by beam
+_LAST_NOISES, _LAST_M, _LAST_DEG = 2.5, 0.02, 1.0  # in the end: near as noise allows, near as walls are
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """What was found.
+
+    Attributes:
+        x: parameters, held ones as they were, shape (COUNT,).
+        choice: which of them were found, and why the others were not.
+        covariance: of the found ones, shape (k, k).
+        spectrum: singular values of their information, in units of their limits, shape (k,).
+        tiles: what it was found from.
+        grouping: their surfaces.
+        noise_m: standard deviation of a range, after all.
+        bulge_m: standard deviation of the walls from planes; 0 where the noise hides it.
+    """
+
+    x: Floats
+    choice: Choice
+    covariance: Floats
+    spectrum: Floats
+    tiles: Tiles
+    grouping: Grouping
+    noise_m: float
+    bulge_m: float
+
+
+def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
+    """Find the scanner's errors.
+
+    Raises:
+        RecordingError: the recordings do not show the mounting errors.
+    """
+    check_fan(mount)
+    tiles = flat_tiles(beams, mount, start)
+    # Wide planes cannot see offsets of centimetres: they would bend them to what is wrong elsewhere.
+    free = np.array(MOUNT[:2] + (LAG if several_speeds(beams) else ()))
+    x = start
+    for near_m, turn_deg in _WIDE:
+        x, grouping, normal = _coarse(tiles, mount, x, free, near_m, turn_deg)
+    x, grouping, normal = _coarse(tiles, mount, x, np.union1d(free, MOUNT), *_WIDE[-1])
+    choice = choose(beams, tiles, grouping, normal)
+    for near_m, turn_deg in _NARROW:
+        x, grouping, normal = _coarse(tiles, mount, x, choice.free, near_m, turn_deg)
+    last_m = max(_LAST_NOISES * tiles.noise_m, _LAST_M)
+    for _ in range(_ROUNDS):
+        choice = choose(beams, tiles, grouping, normal)
+        held = np.setdiff1d(np.arange(COUNT), choice.free)
+        x[held] = start[held]
+        grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
+        on = grouping.surface[tiles.tile] >= 0
+        own, tile = tiles.beams.taken(on), tiles.tile[on]
+        weight = 1 / tiles.variance_m2[tile]
+        bulge = 0.0
+        for _ in range(_STEPS):
+            x, grouping, normal = _iterated(mount, x, choice.free, grouping, own, tile, weight, bulge)
+            grouping = without_misfits(grouping, misfits(normal, tiles.count), tiles.count)
+            bulge = bulge_m(normal, grouping)
+    part = reduced(normal, grouping, choice.free, bulge)
+    scale = float(np.average(misfits(normal, tiles.count)[grouping.used], weights=tiles.count[grouping.used]))
+    return Estimate(
+        x=x,
+        choice=choice,
+        covariance=scale * covariance(part),
+        spectrum=spectrum(part, choice.free),
+        tiles=tiles,
+        grouping=grouping,
+        noise_m=tiles.noise_m * float(np.sqrt(scale)),
+        bulge_m=bulge,
+    )
+
+
+def _coarse(
+    tiles: Tiles, mount: Mount, x: Floats, free: Ints, near_m: float, turn_deg: float
+) -> tuple[Floats, Grouping, Floats]:
+    """Group, then solve with one beam per tile; the sums that come back are those of all beams, nearly."""
+    grouping = group(tiles, mount, x, near_m, *np.radians([turn_deg, _VAGUE_DEG]))
+    on = grouping.surface >= 0
+    variance = tiles.variance_m2 / tiles.count
+    plane = _planes(grouping)
+    slant = np.sum(plane * rays(mount, x, tiles.middle.under(x))[1], axis=1) / np.linalg.norm(plane, axis=1)
+    weight = 1 / (variance + (_TRUST * near_m / slant) ** 2)[on]
+    own, tile = tiles.middle.taken(on), np.flatnonzero(on)
+    for _ in range(_STEPS):
+        x, grouping, _ = _iterated(mount, x, free, grouping, own, tile, weight, 0.0)
+    normal = sums(mount, x, own.under(x), tile, 1 / variance[on], _planes(grouping))
+    return x, grouping, normal
+
+
+def _iterated(
+    mount: Mount, x: Floats, free: Ints, grouping: Grouping, beams: Beams, tile: Ints, weight: Floats, bulge: float
+) -> tuple[Floats, Grouping, Floats]:
+    """One Gauss-Newton step; the sums that come back are those it was made from."""
+    normal = sums(mount, x, beams.under(x), tile, weight, _planes(grouping))
+    dx, dq = step(reduced(normal, grouping, free, bulge))
+    x = x.copy()
+    x[free] += dx
+    return x, replace(grouping, q=grouping.q + dq), normal
+
+
+def _planes(grouping: Grouping) -> Floats:
+    """The plane of each tile, shape (m, 3); of the first surface where it has none."""
+    return grouping.q[np.maximum(grouping.surface, 0)]

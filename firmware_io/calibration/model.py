@@ -1,0 +1,229 @@
+"""The scanner with its errors: where a beam starts and where it points, and what each error moves.
+
+In the frame of the axis that stands still (`rot` at joint 0), a beam of joint angle j, bearing b and range r ends at
+
+    p   = o + (r + bias) d,     o = Rz(psi) t,     d = Rz(psi) exp(delta) R_designed [cos b, sin b, 0]
+    psi = j(t + lag) + cos1 cos j + sin1 sin j + cos2 cos 2j + sin2 sin 2j - way backlash / 2
+
+`way` is the sign of the turning. Rotation about the axis, translation along it, and the zero of the bearing are
+gauges: no static scene shows them, so they are no parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design import frames
+from design.angles import AngleSet
+from design.errors import RecordingError
+from firmware_io.deskew import Verdict, judge
+from firmware_io.encoder import axis_curve
+from firmware_io.recording import Recording
+from firmware_io.samples import AxisCurve, Floats, Times
+
+Ints = NDArray[np.int64]
+_SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
+STANDING_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number that a calibration may find.
+
+    Attributes:
+        name: key in reports; ends in its unit.
+        words: for people.
+        shown: factor from SI to the unit people read.
+        unit: that unit.
+        limit: standard deviation [SI] above which the scene is said not to show it.
+    """
+
+    name: str
+    words: str
+    shown: float
+    unit: str
+    limit: float
+
+
+_DEG, _MM, _MS = float(np.degrees(1.0)), 1e3, 1e3
+_TURN, _WAY = np.radians(0.15), 5e-3
+PARAMETERS = (
+    Parameter("delta_x_rad", "tilt about x", _DEG, "deg", _TURN),
+    Parameter("delta_y_rad", "tilt about y", _DEG, "deg", _TURN),
+    Parameter("t_x_m", "offset along x", _MM, "mm", _WAY),
+    Parameter("t_y_m", "offset along y", _MM, "mm", _WAY),
+    Parameter("range_bias_m", "range bias", _MM, "mm", _WAY),
+    Parameter("cos_1_rad", "1st harmonic, cosine", _DEG, "deg", _TURN),
+    Parameter("sin_1_rad", "1st harmonic, sine", _DEG, "deg", _TURN),
+    Parameter("cos_2_rad", "2nd harmonic, cosine", _DEG, "deg", _TURN),
+    Parameter("sin_2_rad", "2nd harmonic, sine", _DEG, "deg", _TURN),
+    Parameter("lag_s", "time offset", _MS, "ms", 2e-3),
+    Parameter("backlash_rad", "backlash", _DEG, "deg", _TURN),
+)
+COUNT = len(PARAMETERS)
+MOUNT = (0, 1, 2, 3)
+BIAS, HARMONIC_1, HARMONIC_2, LAG, BACKLASH = (4,), (5, 6), (7, 8), (9,), (10,)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beams:
+    """Every beam that returned, of all recordings, in the order they were fired.
+
+    Attributes:
+        range_m: shape (n,).
+        bearing_rad: shape (n,).
+        joint_rad: logged joint angle at the beam's time plus the lag that was asked for, shape (n,).
+        speed_rad_s: of the joint, shape (n,).
+        recording: number of the beam's recording, shape (n,).
+        place: number of the place where the scanner stood, shape (n,).
+        time_ns: shape (n,).
+        curves: the joint's angle over time in each recording, as `assemble` takes it: the encoder's steps smoothed.
+    """
+
+    range_m: Floats
+    bearing_rad: Floats
+    joint_rad: Floats
+    speed_rad_s: Floats
+    recording: Ints
+    place: Ints
+    time_ns: Times
+    curves: tuple[AxisCurve, ...]
+
+    def taken(self, which: NDArray[np.generic]) -> Beams:
+        """Some of the beams: a mask or indices."""
+        columns = {name: getattr(self, name)[which] for name in _COLUMNS}
+        return Beams(**columns, curves=self.curves)
+
+    def late_by(self, lag_s: float) -> Beams:
+        """The same beams with the angles logged `lag_s` after them; beyond its ends a curve goes on at its speed."""
+        joint_rad, speed_rad_s = np.empty(self.range_m.size), np.empty(self.range_m.size)
+        for k, curve in enumerate(self.curves):
+            mine = self.recording == k
+            joint_rad[mine], speed_rad_s[mine] = _joint(curve, self.time_ns[mine] + round(lag_s * 1e9))
+        return replace(self, joint_rad=joint_rad, speed_rad_s=speed_rad_s)
+
+    def under(self, x: Floats) -> Beams:
+        """The same beams with the time offset of a parameter vector; `self` must be without."""
+        return self.late_by(x[LAG[0]]) if x[LAG[0]] else self
+
+    @property
+    def way(self) -> Floats:
+        """+1, -1 or 0 (standing) for each beam."""
+        return np.where(np.abs(self.speed_rad_s) > STANDING_RAD_S, np.sign(self.speed_rad_s), 0.0)
+
+
+_COLUMNS = ("range_m", "bearing_rad", "joint_rad", "speed_rad_s", "recording", "place", "time_ns")
+
+
+def gather(recordings: Sequence[Recording], *, one_place: bool) -> tuple[Beams, dict[str, int]]:
+    """All beams that returned and have an angle, and how many were left out, reason by reason.
+
+    `one_place`: the scanner stood still from the first recording to the last, so that all show one scene.
+    """
+    ranges, bearings, numbers, times = [], [], [], []
+    verdicts = np.zeros(len(Verdict), np.int64)
+    curves = [axis_curve(recording.joint_log, held=recording.held)[0] for recording in recordings]
+    for k, (recording, curve) in enumerate(zip(recordings, curves, strict=True)):
+        for scan in recording.scans():
+            time_ns = scan.time_ns
+            inside = (time_ns >= curve.knot_ns[0]) & (time_ns <= curve.knot_ns[-1])
+            verdict = judge(scan, np.where(inside, 0.0, np.nan))
+            verdicts += np.bincount(verdict, minlength=len(Verdict))
+            good = verdict == Verdict.POINT
+            ranges.append(scan.range_m[good].astype(float))
+            bearings.append(scan.bearing_rad[good])
+            numbers.append(np.full(int(good.sum()), k))
+            times.append(time_ns[good])
+    left_out = {reason.name.lower(): int(verdicts[reason]) for reason in Verdict if reason and verdicts[reason]}
+    if not verdicts[Verdict.POINT]:
+        raise RecordingError(f"{recordings[0].path}: none of the {verdicts.sum()} beams becomes a point: {left_out}")
+    number = np.concatenate(numbers)
+    beams = Beams(
+        range_m=np.concatenate(ranges),
+        bearing_rad=np.concatenate(bearings),
+        joint_rad=np.zeros(number.size),
+        speed_rad_s=np.zeros(number.size),
+        recording=number,
+        place=np.zeros_like(number) if one_place else number,
+        time_ns=np.concatenate(times),
+        curves=tuple(curves),
+    )
+    return beams.late_by(0.0), left_out
+
+
+def _joint(curve: AxisCurve, time_ns: Times) -> tuple[Floats, Floats]:
+    """Angle and speed of the joint; beyond its ends the curve goes on at its last speed."""
+    first_ns, last_ns = int(curve.knot_ns[0]), int(curve.knot_ns[-1])
+    half_ns = min(_SPEED_OVER_NS, (last_ns - first_ns) // 2)
+    if not half_ns:
+        return np.full(time_ns.size, curve.coefficient[0, 0]), np.zeros(time_ns.size)
+    near_ns = np.clip(time_ns, first_ns + half_ns, last_ns - half_ns)
+    speed_rad_s = (curve.angle_at(near_ns + half_ns) - curve.angle_at(near_ns - half_ns)) / (2 * half_ns / 1e9)
+    inside_ns = np.clip(time_ns, first_ns, last_ns)
+    return curve.angle_at(inside_ns) + (time_ns - inside_ns) / 1e9 * speed_rad_s, speed_rad_s
+
+
+def start_vector(angles: AngleSet) -> Floats:
+    """Parameters as the angle set has them, shape (COUNT,)."""
+    x = np.zeros(COUNT)
+    x[0:2] = np.radians(angles.delta_rotvec_rot_deg)
+    x[2:4] = np.array(angles.t_rot_laser_mm[:2]) / 1000
+    return x
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mount:
+    """The laser's scan plane in the rotation frame, for one vector of parameters.
+
+    Attributes:
+        designed: rotation of the angle set without its delta, shape (3, 3).
+        along_m: translation along the axis, which no calibration changes.
+    """
+
+    designed: Floats
+    along_m: float
+
+    @staticmethod
+    def of(angles: AngleSet) -> Mount:
+        """The mount of an angle set, its delta taken off."""
+        bare = angles.model_copy(update={"delta_rotvec_rot_deg": (0.0, 0.0)})
+        return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000)
+
+    def plane(self, x: Floats) -> Floats:
+        """First two columns of `exp(delta) R_designed`, and what 1 rad of each delta adds to them, shape (3, 3, 2)."""
+        exact = frames.rotvec_to_matrix([x[0], x[1], 0.0]) @ self.designed
+        turn = _left_jacobian(np.array([x[0], x[1], 0.0]))
+        return np.stack([exact[:, :2], *(np.cross(turn[:, k], exact[:, :2], axisb=0, axisc=0) for k in (0, 1))])
+
+
+def _left_jacobian(rotvec_rad: Floats) -> Floats:
+    """exp(v + dv) = exp(J dv) exp(v) for small dv, shape (3, 3)."""
+    angle = float(np.linalg.norm(rotvec_rad))
+    K = np.cross(rotvec_rad, np.eye(3), axisb=0, axisc=0)
+    one = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    two = (1 - np.sinc(angle / np.pi)) / angle**2 if angle > 1e-4 else 1 / 6
+    return np.eye(3) + one * K + two * (K @ K)
+
+
+def axis_angle(x: Floats, joint_rad: Floats, way: Floats) -> Floats:
+    """Psi of each beam, shape (n,)."""
+    one, two = joint_rad, 2 * joint_rad
+    harmonics = x[5] * np.cos(one) + x[6] * np.sin(one) + x[7] * np.cos(two) + x[8] * np.sin(two)
+    return joint_rad + harmonics - 0.5 * x[10] * way
+
+
+def rays(mount: Mount, x: Floats, beams: Beams) -> tuple[Floats, Floats]:
+    """Origin and direction of each beam, its lag already in `beams.joint_rad`, each shape (n, 3)."""
+    psi = axis_angle(x, beams.joint_rad, beams.way)
+    columns = mount.plane(x)[0]
+    u = np.multiply.outer(np.cos(beams.bearing_rad), columns[:, 0])
+    u += np.multiply.outer(np.sin(beams.bearing_rad), columns[:, 1])
+    cos, sin = np.cos(psi), np.sin(psi)
+    direction = np.column_stack([cos * u[:, 0] - sin * u[:, 1], sin * u[:, 0] + cos * u[:, 1], u[:, 2]])
+    height = np.full(psi.size, mount.along_m)
+    origin = np.column_stack([cos * x[2] - sin * x[3], sin * x[2] + cos * x[3], height])
+    return origin, direction

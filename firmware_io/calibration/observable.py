@@ -1,0 +1,179 @@
+"""What the recordings show, and what they do not: which parameters to find, which to hold, when to refuse, and why.
+
+Least squares answers always; whether the answer means something is asked here. The question is put with walls that
+bulge as real ones do: what only perfect planes would show counts as not shown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.errors import RecordingError
+from firmware_io.calibration import model
+from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Beams, Ints, Mount
+from firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
+from firmware_io.calibration.surfaces import seen_twice
+from firmware_io.calibration.tiles import Tiles
+from firmware_io.samples import Floats
+
+BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
+FLATTEST_FAN_RAD = np.radians(3.0)
+_TWICE = 0.05  # share of the beams
+_ONE_LINE = 0.01  # share of the surface that faces across it
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A parameter that stays as it was, and why."""
+
+    names: tuple[str, ...]
+    words: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """What to find.
+
+    Attributes:
+        free: parameters to find, in the order of `PARAMETERS`.
+        held: those that the recordings do not show.
+        notes: what a person should know though nothing had to be held for it.
+    """
+
+    free: Ints
+    held: tuple[Held, ...]
+    notes: tuple[str, ...]
+
+
+def check_fan(mount: Mount) -> None:
+    """Refuse a scan plane that the axis turns into itself.
+
+    Raises:
+        RecordingError: the scan plane is (nearly) perpendicular to the axis.
+    """
+    tilt_rad = float(np.arccos(np.clip(abs(mount.designed[2, 2]), 0.0, 1.0)))
+    if tilt_rad < FLATTEST_FAN_RAD:
+        raise RecordingError(
+            f"flat fan: the scan plane is {np.degrees(tilt_rad):.2f} deg from perpendicular to the axis: it sweeps one "
+            "line of the scene, and surfaces need width; tilt the laser by "
+            f"{np.degrees(FLATTEST_FAN_RAD):.0f} deg or more"
+        )
+
+
+def several_speeds(beams: Beams) -> bool:
+    """Whether the joint moved at speeds (with sign) that differ by a tenth or more."""
+    low, high = np.percentile(beams.speed_rad_s, [2, 98])
+    return not stood_still(beams) and bool(high - low > 0.1 * max(abs(low), abs(high)))
+
+
+def stood_still(beams: Beams) -> bool:
+    """Whether the axis moves between scans only."""
+    return bool(np.median(np.abs(beams.speed_rad_s)) < STANDING_RAD_S)
+
+
+def choose(beams: Beams, tiles: Tiles, grouping: Grouping, normal: Floats) -> Choice:
+    """Decide which parameters the recordings (all their `beams`) show.
+
+    Raises:
+        RecordingError: they do not show one of the mounting errors. The message says which, and why.
+    """
+    turned_deg = np.degrees(np.ptp(beams.joint_rad))
+    twice = tiles.count[seen_twice(tiles, grouping)].sum() / tiles.count.sum()
+    if twice < _TWICE:
+        raise RecordingError(
+            f"nothing is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
+            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg, and without a second look mounting errors cannot "
+            "be told from the shape of the scene: turn it a full turn"
+        )
+    free = np.array(MOUNT)
+    sd = _sd(reduced(normal, grouping, free, BUILDERS_BULGE_M), free)
+    weak = [k for k in MOUNT if not sd[k] <= PARAMETERS[k].limit]
+    if weak:
+        named = ", ".join(f"{PARAMETERS[k].words} (+-{_shown(k, sd[k])}, limit {_shown(k)})" for k in weak)
+        raise RecordingError(f"the scene does not show {named}: {_geometry(tiles, grouping)}")
+    held: list[Held] = []
+    for group in (model.BIAS, model.HARMONIC_1, model.LAG, model.BACKLASH, model.HARMONIC_2):
+        why = _motion(beams, group)
+        if not why:
+            tried = np.sort(np.append(free, group))
+            sd = _sd(reduced(normal, grouping, tried, BUILDERS_BULGE_M), tried)
+            worst = max(tried, key=lambda k: sd[k] / PARAMETERS[k].limit)
+            if sd[worst] <= PARAMETERS[worst].limit:
+                free = tried
+                continue
+            why = (
+                f"found together with the others, {PARAMETERS[worst].words} would be known to "
+                f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
+            )
+        held.append(Held(tuple(PARAMETERS[k].name for k in group), _words(group), why))
+    share = _facing(tiles, grouping)[0]
+    notes = []
+    if share[0] < _ONE_LINE:
+        notes.append(f"{_geometry(tiles, grouping)}; what was found rests on the other surfaces alone")
+    joined = tiles.count[grouping.used].sum() / tiles.count.sum()
+    if joined < 0.6:
+        notes.append(f"only {joined:.0%} of the flat patches join surfaces: the result may be worse than it says")
+    return Choice(free, tuple(held), tuple(notes))
+
+
+def spectrum(part: Reduced, free: Ints) -> Floats:
+    """Singular values of the information in units of each parameter's limit, falling: below 1 is not shown."""
+    unit = np.array([PARAMETERS[k].limit for k in free])
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(part.information * np.outer(unit, unit))[::-1], 0.0))
+
+
+def _sd(part: Reduced, free: Ints) -> dict[int, float]:
+    """Standard deviation of each free parameter; infinite where nothing is known."""
+    return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
+
+
+def _motion(beams: Beams, group: tuple[int, ...]) -> str:
+    """Why the motion of the axis cannot show a parameter, "" where it can."""
+    if group not in (model.LAG, model.BACKLASH):
+        return ""
+    ways = set(np.unique(beams.way).tolist()) - {0.0}
+    if stood_still(beams):
+        return "the axis stood still while the lidar measured"
+    if group == model.LAG and not several_speeds(beams):
+        return "one way at one speed: late angles turn the whole cloud about the axis, and no scene shows that"
+    if group == model.BACKLASH and len(ways) == 1:
+        return "the axis turned one way only"
+    moving = np.abs(beams.speed_rad_s[beams.way != 0])
+    slow, fast = np.percentile(moving, [5, 95])
+    if group == model.BACKLASH and fast < 1.2 * slow:
+        return "both ways at one speed: half of it, divided by the speed, is inside the time offset"
+    return ""
+
+
+def _facing(tiles: Tiles, grouping: Grouping) -> tuple[Floats, Floats]:
+    """Shares of the surface that face along three perpendicular directions, rising, and these (columns)."""
+    used = grouping.used
+    normal = grouping.q[grouping.surface[used]]
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    weight = tiles.count[used] / tiles.count[used].sum()
+    share, directions = np.linalg.eigh((normal * weight[:, None]).T @ normal)
+    return share, directions
+
+
+def _geometry(tiles: Tiles, grouping: Grouping) -> str:
+    """The scene in words: what all its surfaces have in common."""
+    share, directions = _facing(tiles, grouping)
+    facing = directions * np.sign(directions[np.abs(directions).argmax(axis=0), np.arange(3)])
+    shown = ["({:.2f}, {:.2f}, {:.2f})".format(*(column + 0.0)) for column in facing.T.round(2)]
+    if share[1] < _ONE_LINE:
+        return f"empty hall: all surfaces face along {shown[2]} of the axis frame; scan where walls are in reach"
+    if share[0] < _ONE_LINE:
+        return f"corridor: no surface faces along {shown[0]} of the axis frame"
+    return "its surfaces are too few, too far or too much alike; scan another place, away from the middle of the room"
+
+
+def _words(group: tuple[int, ...]) -> str:
+    return PARAMETERS[group[0]].words.split(",")[0]
+
+
+def _shown(k: int, value: float | None = None) -> str:
+    parameter = PARAMETERS[k]
+    return f"{(parameter.limit if value is None else value) * parameter.shown:.3g} {parameter.unit}"

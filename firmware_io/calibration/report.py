@@ -1,0 +1,141 @@
+"""What a calibration found, as a record for programs and as lines for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from firmware_io.calibration.entropy import Witness
+from firmware_io.calibration.estimate import Estimate
+from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Beams, Mount
+from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
+from firmware_io.samples import Floats
+
+_WALLS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well beams and planes agree under one vector of parameters.
+
+    Attributes:
+        residual_m: root mean square of the ranges' residuals, nothing rejected.
+        walls_m: straightness of the largest surfaces: root mean square height of what each side of the fan sees in
+            each square metre. Noise averages out of it; bent and double walls do not.
+    """
+
+    residual_m: float
+    walls_m: tuple[float, ...]
+
+
+def fit_of(found: Estimate, mount: Mount, x: Floats) -> Fit:
+    """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
+    tiles, grouping = found.tiles, found.grouping
+    on = grouping.surface[tiles.tile] >= 0
+    beams, tile = tiles.beams.taken(on).late_by(x[LAG[0]]), tiles.tile[on]
+    weight = np.ones(tile.size)
+    grouping = planes_alone(mount, x, beams, tile, weight / found.noise_m**2, grouping)
+    normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)], kink=np.inf)
+    return Fit(rms(normal, float(tile.size)), _straightness(found, normal, grouping))
+
+
+def _straightness(found: Estimate, normal: Floats, grouping: Grouping) -> tuple[float, ...]:
+    used, tiles = grouping.used, found.tiles
+    height_m, weight = heights(normal[used])
+    surface = grouping.surface[used]
+    size = np.bincount(surface, tiles.count[used])
+    walls = []
+    for wall in np.argsort(size)[::-1][:_WALLS]:
+        mine = surface == wall
+        _, label = np.unique(2 * grouping.spot[used][mine] + tiles.side[used][mine], return_inverse=True)
+        total = np.bincount(label, weight[mine])
+        mean = np.bincount(label, weight[mine] * height_m[mine]) / total
+        walls.append(float(np.sqrt(mean**2 @ total / total.sum())))
+    return tuple(walls)
+
+
+def report(found: Estimate, start: Floats, mount: Mount, beams: Beams, witness: Witness) -> dict[str, Any]:
+    """The record that is written beside the calibrated angle set."""
+    sd = np.full(COUNT, np.nan)
+    sd[found.choice.free] = np.sqrt(np.diag(found.covariance))
+    applied = start.copy()
+    applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
+    fits = {"before": start, "after": found.x, "as_assembled": applied}
+    fit = {name: fit_of(found, mount, x) for name, x in fits.items()}
+    used = int(found.tiles.count[found.grouping.used].sum())
+    return {
+        "schema": "scanwright/calibration/1",
+        "beams": int(beams.range_m.size),
+        "beams_used": used,
+        "surfaces": len(found.grouping.q),
+        "parameters": [
+            {
+                "name": PARAMETERS[k].name,
+                "words": PARAMETERS[k].words,
+                "unit": PARAMETERS[k].unit,
+                "value": float(found.x[k] * PARAMETERS[k].shown),
+                "sd": float(sd[k] * PARAMETERS[k].shown),
+                "start": float(start[k] * PARAMETERS[k].shown),
+                "applied_by": "angle set" if k in MOUNT else "assemble --lag-s" if k in LAG else None,
+            }
+            for k in found.choice.free.tolist()
+        ],
+        "covariance": {
+            "names": [PARAMETERS[k].name for k in found.choice.free.tolist()],
+            "matrix": found.covariance.tolist(),
+        },
+        "singular_values": found.spectrum.tolist(),
+        "held": [{"names": list(held.names), "words": held.words, "why": held.why} for held in found.choice.held],
+        "notes": list(found.choice.notes),
+        "range_noise_mm": found.noise_m * 1e3,
+        "wall_bulge_mm": found.bulge_m * 1e3,
+        "residual_mm": {name: one.residual_m * 1e3 for name, one in fit.items()},
+        "wall_straightness_mm": {name: [wall * 1e3 for wall in one.walls_m] for name, one in fit.items()},
+        "entropy": {
+            "kernel_mm": witness.width_m * 1e3,
+            "before": witness.before,
+            "after": witness.after,
+            "minimum_from_result": {
+                PARAMETERS[k].name: None
+                if (off := witness.minima[PARAMETERS[k].name]) is None
+                else {"value": off * PARAMETERS[k].shown, "unit": PARAMETERS[k].unit}
+                for k in MOUNT
+            },
+        },
+    }
+
+
+def lines(record: dict[str, Any]) -> Iterator[str]:
+    """The record for a person."""
+    yield (
+        f"{record['beams_used']:,} of {record['beams']:,} beams see {record['surfaces']} flat surfaces; "
+        f"noise of a range {record['range_noise_mm']:.1f} mm, walls bulge {record['wall_bulge_mm']:.1f} mm"
+    )
+    for one in record["parameters"]:
+        change = f"  from {one['start']:.4f}" if one["applied_by"] == "angle set" else ""
+        yield f"  {one['words']:22} {one['value']:10.4f} +- {one['sd']:.4f} {one['unit']}{change}"
+    for held in record["held"]:
+        yield f"  {held['words']:22}       held: {held['why']}"
+    residual, walls, entropy = record["residual_mm"], record["wall_straightness_mm"], record["entropy"]
+    yield (
+        f"residual          {residual['before']:.1f} -> {residual['after']:.1f} mm "
+        f"({residual['as_assembled']:.1f} as `assemble` applies it)"
+    )
+    pairs = ", ".join(f"{a:.1f} -> {b:.1f}" for a, b in zip(walls["before"], walls["after"], strict=True))
+    yield f"walls straight    {pairs} mm"
+    own = [
+        f"{name.rsplit('_', 1)[0]} {off['value']:+.3f} {off['unit']}" if off else f"{name.rsplit('_', 1)[0]} ?"
+        for name, off in entropy["minimum_from_result"].items()
+    ]
+    change = f"{entropy['before']:.3f} -> {entropy['after']:.3f}"
+    yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
+    if entropy["after"] > entropy["before"]:
+        yield "warning: the entropy says that the cloud has become less crisp: do not trust this calibration"
+    for note in record["notes"]:
+        yield f"warning: {note}"
+    by_name = {one["name"]: one for one in record["parameters"]}
+    if "lag_s" in by_name:
+        yield f"the angles are late: assemble with --lag-s {by_name['lag_s']['value'] / 1e3:.6f}"

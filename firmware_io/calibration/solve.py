@@ -1,0 +1,243 @@
+"""Least squares of ranges against planes that nobody knows.
+
+A beam (o, d) meets the plane q . p = 1 at the range (1 - q . o) / (q . d); what it measured instead is its residual.
+Neither the residual's derivatives nor the choice of beams depends on the noise, so the estimate is the likeliest one
+and reaches the Cramer-Rao bound. The sums of all beams of a tile, over
+
+    parameters x (k) | its surface's plane q (3) | its spot's bulge u (1) | the residual (1)
+
+are one small symmetric matrix. From these alone every bulge (walls are not as flat as planes: u of each spot is
+drawn from a normal distribution) and every plane is eliminated: what remains is the information on x, k x k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+
+from firmware_io.calibration.model import COUNT, Beams, Ints, Mount, axis_angle
+from firmware_io.samples import Floats
+
+_Q = COUNT
+_U = COUNT + 3
+_E = COUNT + 4
+WIDTH = COUNT + 5
+_MEDIAN_CHI2 = 0.4549  # of one degree of freedom
+KINK = 3.0
+_REFITS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grouping:
+    """Which surface and which spot of it each tile sees.
+
+    Attributes:
+        surface: number of each tile's surface, -1 for none, shape (m,).
+        spot: number of each tile's spot, counted over all surfaces; meaningless where surface is -1, shape (m,).
+        q: plane of each surface, q . p = 1, shape (s, 3).
+    """
+
+    surface: Ints
+    spot: Ints
+    q: Floats
+
+    @property
+    def used(self) -> Ints:
+        """Tiles that see a surface."""
+        return np.flatnonzero(self.surface >= 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """What is left when bulges and planes are gone.
+
+    Attributes:
+        information: of the free parameters, shape (k, k).
+        right: right-hand side, shape (k,).
+        plane_rows: for each surface, dq = plane_rows @ [dx, 1], shape (s, 3, k + 1).
+    """
+
+    information: Floats
+    right: Floats
+    plane_rows: Floats
+
+
+def sums(mount: Mount, x: Floats, beams: Beams, tile: Ints, weight: Floats, q: Floats, kink: float = KINK) -> Floats:
+    """Normal equations of every tile, shape (m, WIDTH, WIDTH).
+
+    Args:
+        mount: where the laser sits.
+        x: parameters, shape (COUNT,).
+        beams: their lag already applied.
+        tile: of each beam, shape (n,).
+        weight: 1 / variance of each beam's range, shape (n,).
+        q: plane that each beam should meet, one row per tile, shape (m, 3).
+        kink: standard deviations beyond which a residual counts in proportion, not in square (Huber).
+    """
+    psi = axis_angle(x, beams.joint_rad, beams.way)
+    return _sums(
+        mount.plane(x), mount.along_m, x, psi, beams.joint_rad, beams.speed_rad_s, beams.way, beams.bearing_rad,
+        beams.range_m, tile, weight, q, kink,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _sums(plane, along_m, x, psi, joint, speed, way, bearing, range_m, tile, weight, q, kink):  # type: ignore[no-untyped-def]
+    tiles = len(q)
+    out = np.zeros((tiles, WIDTH, WIDTH))
+    row = np.zeros(WIDTH)
+    for i in range(range_m.size):
+        c, s = np.cos(psi[i]), np.sin(psi[i])
+        cb, sb = np.cos(bearing[i]), np.sin(bearing[i])
+        a, b, n = q[tile[i], 0], q[tile[i], 1], q[tile[i], 2]
+        # the plane as the turning frame sees it
+        e, f = c * a + s * b, c * b - s * a
+        u0 = plane[0, 0, 0] * cb + plane[0, 0, 1] * sb
+        u1 = plane[0, 1, 0] * cb + plane[0, 1, 1] * sb
+        u2 = plane[0, 2, 0] * cb + plane[0, 2, 1] * sb
+        slant = e * u0 + f * u1 + n * u2
+        length = np.sqrt(a * a + b * b + n * n)
+        if abs(slant) < 0.02 * length:
+            continue
+        met = (1.0 - e * x[2] - f * x[3] - n * along_m) / slant
+        px, py, pz = x[2] + met * u0, x[3] + met * u1, along_m + met * u2
+        around = (f * px - e * py) / slant
+        for k in range(2):
+            v0 = plane[k + 1, 0, 0] * cb + plane[k + 1, 0, 1] * sb
+            v1 = plane[k + 1, 1, 0] * cb + plane[k + 1, 1, 1] * sb
+            v2 = plane[k + 1, 2, 0] * cb + plane[k + 1, 2, 1] * sb
+            row[k] = met * (e * v0 + f * v1 + n * v2) / slant
+        row[2] = e / slant
+        row[3] = f / slant
+        row[4] = 1.0
+        c1, s1 = np.cos(joint[i]), np.sin(joint[i])
+        c2, s2 = c1 * c1 - s1 * s1, 2.0 * c1 * s1
+        row[5] = around * c1
+        row[6] = around * s1
+        row[7] = around * c2
+        row[8] = around * s2
+        row[9] = around * speed[i] * (1.0 - x[5] * s1 + x[6] * c1 - 2.0 * x[7] * s2 + 2.0 * x[8] * c2)
+        row[10] = -0.5 * around * way[i]
+        row[11] = (c * px - s * py) / slant
+        row[12] = (s * px + c * py) / slant
+        row[13] = pz / slant
+        row[14] = -length / slant
+        row[15] = range_m[i] + x[4] - met
+        w = weight[i]
+        off = abs(row[15]) * np.sqrt(w)
+        if off > kink:
+            w *= kink / off
+        into = out[tile[i]]
+        for j in range(WIDTH):
+            for k in range(j + 1):
+                into[j, k] += w * row[j] * row[k]
+    for t in range(tiles):
+        for j in range(WIDTH):
+            for k in range(j):
+                out[t, k, j] = out[t, j, k]
+    return out
+
+
+def reduced(normal: Floats, grouping: Grouping, free: Ints, bulge_m: float) -> Reduced:
+    """Eliminate every spot's bulge (standard deviation `bulge_m`; 0 for perfect planes) and every surface's plane.
+
+    Args:
+        normal: the sums of all tiles, shape (m, WIDTH, WIDTH).
+        grouping: the tiles' surfaces and spots.
+        free: parameters to find, shape (k,).
+        bulge_m: standard deviation of the walls from planes.
+    """
+    spot, first = _per_spot(grouping, normal)
+    surface_of = grouping.surface[first]
+    if bulge_m > 0:
+        pivot = spot[:, _U, _U] + 1 / bulge_m**2
+        spot = spot - spot[:, :, _U, None] * spot[:, None, _U, :] / pivot[:, None, None]
+    surface = _summed(spot, surface_of, len(grouping.q))
+    keep = np.append(free, _E)
+    planes = surface[:, _Q : _Q + 3, _Q : _Q + 3]
+    across = surface[:, _Q : _Q + 3][:, :, keep]
+    rows = -np.linalg.pinv(planes, rcond=1e-12, hermitian=True) @ across
+    whole = (surface[:, keep][:, :, keep] + across.swapaxes(1, 2) @ rows).sum(axis=0)
+    return Reduced(whole[:-1, :-1], whole[:-1, -1], rows)
+
+
+def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
+    """Values of tiles summed over each spot, and one tile of each spot."""
+    used = grouping.used
+    spots, first, label = np.unique(grouping.spot[used], return_index=True, return_inverse=True)
+    return _summed(values[used], label, spots.size), used[first]
+
+
+def _summed(values: Floats, label: Ints, labels: int) -> Floats:
+    """Rows summed by label, zero where a label has none."""
+    order = np.argsort(label, kind="stable")
+    present, first = np.unique(label[order], return_index=True)
+    out = np.zeros((labels, *values.shape[1:]))
+    out[present] = np.add.reduceat(values[order], first)
+    return out
+
+
+def step(part: Reduced) -> tuple[Floats, Floats]:
+    """One Gauss-Newton step of the free parameters, and of every surface's plane."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
+    scaled = part.information * np.outer(scale, scale)
+    dx = -scale * np.linalg.lstsq(scaled, scale * part.right, rcond=1e-10)[0]
+    return dx, part.plane_rows @ np.append(dx, 1.0)
+
+
+def covariance(part: Reduced) -> Floats:
+    """Of the free parameters, shape (k, k); infinite where the information is singular."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
+    values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
+    with np.errstate(divide="ignore"):
+        spread = np.where(values > 1e-11, 1 / values, np.inf)
+    if np.isinf(spread).any():
+        weak = np.abs(vectors[:, np.isinf(spread)]).max(axis=1) > 1e-3
+        spread = np.where(np.isinf(spread), 0.0, spread)
+        found = (vectors * spread) @ vectors.T
+        found[weak, :] = found[:, weak] = 0.0
+        found[weak, weak] = np.inf
+    else:
+        found = (vectors * spread) @ vectors.T
+    return found * np.outer(scale, scale)
+
+
+def bulge_m(normal: Floats, grouping: Grouping) -> float:
+    """How far spots stand off their planes, beyond what noise does: standard deviation, from the median."""
+    spot, _ = _per_spot(grouping, normal[:, _U, [_U, _E]])
+    square, noise = (spot[:, 1] / spot[:, 0]) ** 2, 1 / spot[:, 0]
+    low, high = 0.0, float(square.max())
+    for _ in range(60):
+        middle = (low + high) / 2
+        if np.median(square / (noise + middle)) > _MEDIAN_CHI2:
+            low = middle
+        else:
+            high = middle
+    return float(np.sqrt(high)) if high > 0.02 * float(np.median(noise)) else 0.0
+
+
+def misfits(normal: Floats, beams: Ints) -> Floats:
+    """Mean squared residual of each tile, in units of its variance, shape (m,); `beams` in each of them."""
+    return normal[:, _E, _E] / beams
+
+
+def planes_alone(mount: Mount, x: Floats, beams: Beams, tile: Ints, weight: Floats, grouping: Grouping) -> Grouping:
+    """The same surfaces with the planes that fit best when the parameters stay as they are."""
+    none = np.array([], np.int64)
+    for _ in range(_REFITS):
+        normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)])
+        grouping = replace(grouping, q=grouping.q + reduced(normal, grouping, none, 0.0).plane_rows[:, :, 0])
+    return grouping
+
+
+def heights(normal: Floats) -> tuple[Floats, Floats]:
+    """Mean height of each tile over its surface [m] and its weight, each shape (m,)."""
+    weight = normal[:, _U, _U]
+    return -normal[:, _U, _E] / np.maximum(weight, 1e-300), weight
+
+
+def rms(normal: Floats, weight_sum: float) -> float:
+    """Root mean square of the residuals that a sum was made from [m]."""
+    return float(np.sqrt(normal[:, _E, _E].sum() / weight_sum))

@@ -1,0 +1,250 @@
+"""Tiles: what the lidar saw through a small window of bearing and joint angle, where that is flat.
+
+A tile is cut from the beams by their bearing and joint angle, never by where their points lie: so neither noise nor a
+wrong mounting moves a beam from one tile into another, and one tile holds one look at one place, of one pass of the
+axis. Windows that see an edge are cut into four until they are flat or too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import RecordingError
+from firmware_io.calibration.model import Beams, Ints, Mount, axis_angle, rays
+from firmware_io.samples import AxisCurve, Floats
+
+_WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
+_LEAST = 12  # beams in a tile: three make a plane, the rest say whether it is one
+_FEWEST = 50  # windows: their median roughness is the noise
+_FLICKER_RAD = np.radians(1.0)
+_ROUGHEST = 1.5  # times the noise: far or dark surfaces are noisier than most, edges are far rougher
+_STEEPEST = np.cos(np.radians(84.0))  # flatter looks along a surface are all roughness and beam width
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tiles:
+    """Flat looks, and the beams in them sorted by tile.
+
+    Attributes:
+        beams: beams of all tiles.
+        start: index of each tile's first beam, shape (m + 1,).
+        middle: one beam per tile, through its middle, its range by the tile's own plane, shape (m,).
+        normal_laser: normal of the tile's plane in the laser frame, towards the laser, shape (m, 3).
+        normal_sd_rad: how well that is known, shape (m,).
+        rms_m: of the beams' ranges about the tile's plane, shape (m,).
+        side: which side of the fan looks, 0 or 1: the first half of the fan meets what the second half sees too.
+        noise_m: standard deviation of a range: the median of what tiles show.
+        dropped: beams in no tile.
+    """
+
+    beams: Beams
+    start: Ints
+    middle: Beams
+    normal_laser: Floats
+    normal_sd_rad: Floats
+    rms_m: Floats
+    side: Ints
+    noise_m: float
+    dropped: int
+
+    @property
+    def count(self) -> Ints:
+        """Beams in each tile, shape (m,)."""
+        return np.diff(self.start)
+
+    @property
+    def variance_m2(self) -> Floats:
+        """Of one range in each tile, shape (m,): the common noise, more where a tile is rough beyond chance."""
+        chance = 1 + 3 * np.sqrt(2 / np.maximum(self.count - 3, 1))
+        return self.noise_m**2 + np.maximum(self.rms_m**2 - chance * self.noise_m**2, 0.0)
+
+    @property
+    def tile(self) -> Ints:
+        """Tile of each beam, shape (n,)."""
+        return np.repeat(np.arange(self.count.size), self.count)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Flat:
+    """Candidates of one window size: their planes q (q . p = 1), information and roughness."""
+
+    start: Ints
+    q: Floats
+    information: Floats
+    rms_m: Floats
+    slant: Floats
+
+
+def flat_tiles(beams: Beams, mount: Mount, x: Floats) -> Tiles:
+    """Cut all beams into flat tiles.
+
+    Raises:
+        RecordingError: no window of the recording shows a flat surface.
+    """
+    side, turned_back = fan_side(beams, mount), _turned_back(beams)
+    noise_m = _noise(beams, side, turned_back, mount, x)
+    left = np.arange(beams.range_m.size)
+    found: list[tuple[Ints, _Flat]] = []
+    for window_rad in _WINDOWS_RAD:
+        order, start = _windows(beams, side, turned_back, left, window_rad)
+        flat = _fit(beams.taken(order), start, mount, x)
+        accepted = _is_flat(flat, noise_m)
+        rows = np.repeat(accepted, np.diff(flat.start))
+        found.append((order[rows], _only(flat, accepted)))
+        left = order[~rows]
+    index = np.concatenate([order for order, _ in found])
+    if not index.size:
+        raise RecordingError("no flat surface is in sight: a calibration needs walls, floors or other planes")
+    count = np.concatenate([np.diff(flat.start) for _, flat in found])
+    start = np.append(0, np.cumsum(count))
+    q, information, rms_m = (np.concatenate([getattr(f, k) for _, f in found]) for k in ("q", "information", "rms_m"))
+    own = beams.taken(index)
+    middle = _middle(own, start, mount, x, q)
+    length = np.linalg.norm(q, axis=1)
+    sd = noise_m * np.sqrt(np.linalg.eigvalsh(np.linalg.inv(information))[:, -1]) / length
+    normal = -_turned(q / length[:, None], -axis_angle(x, middle.joint_rad, middle.way))
+    columns = mount.plane(x)[0]
+    R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
+    return Tiles(own, start, middle, normal @ R, sd, rms_m, side[index][start[:-1]], noise_m, left.size)
+
+
+def normals(tiles: Tiles, mount: Mount, x: Floats) -> Floats:
+    """Normal of each tile where the axis stands still, shape (m, 3)."""
+    columns = mount.plane(x)[0]
+    R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
+    return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.way))
+
+
+def fan_side(beams: Beams, mount: Mount) -> Ints:
+    """0 or 1: on which side of the bearing that comes closest to the axis a beam lies, shape (n,)."""
+    toward = mount.designed[2, :2]
+    bearing_rad = np.arctan2(toward[1], toward[0])
+    return (np.sin(beams.bearing_rad - bearing_rad) > 0).astype(np.int64)
+
+
+def _windows(beams: Beams, side: Ints, turned_back: Ints, which: Ints, window_rad: float) -> tuple[Ints, Ints]:
+    """Beams sorted by window, and the first one of each window that holds enough beams; others are kept behind."""
+    mine = beams.taken(which)
+    keys = (
+        mine.recording,
+        turned_back[which],
+        side[which],
+        np.floor(mine.bearing_rad / window_rad).astype(np.int64),
+        np.floor(mine.joint_rad / window_rad).astype(np.int64),  # counts turns: one pass of the axis to a window
+    )
+    key = np.zeros(which.size, np.int64)
+    for part in keys:
+        part = part - part.min()
+        key = key * (int(part.max()) + 1) + part
+    order = np.argsort(key, kind="stable")
+    return which[order], np.append(np.flatnonzero(np.diff(key[order], prepend=-1)), which.size)
+
+
+def _turned_back(beams: Beams) -> Ints:
+    """How often the axis has turned back before each beam, shape (n,)."""
+    back = np.zeros(beams.time_ns.size, np.int64)
+    for k, curve in enumerate(beams.curves):
+        mine = beams.recording == k
+        back[mine] = np.searchsorted(_reversals_ns(curve), beams.time_ns[mine])
+    return back
+
+
+def _reversals_ns(curve: AxisCurve) -> list[int]:
+    """Times at which the axis was furthest before it came back by more than an encoder's flicker."""
+    found: list[int] = []
+    way, furthest, at_ns = 0, float(curve.coefficient[0, 0]), int(curve.knot_ns[0])
+    for time_ns, angle_rad in zip(curve.knot_ns.tolist(), curve.angle_at(curve.knot_ns).tolist(), strict=True):
+        ahead = angle_rad - furthest
+        if way * ahead > 0 or (way == 0 and abs(ahead) > _FLICKER_RAD):
+            way, furthest, at_ns = way or (1 if ahead > 0 else -1), angle_rad, time_ns
+        elif way and abs(ahead) > _FLICKER_RAD:
+            found.append(at_ns)
+            way, furthest, at_ns = -way, angle_rad, time_ns
+    return found
+
+
+def _fit(beams: Beams, start: Ints, mount: Mount, x: Floats) -> _Flat:
+    """The plane q of each window: 1/r is linear in it, so one weighted least squares finds it."""
+    origin, direction = rays(mount, x, beams)
+    range_m = beams.range_m + x[4]
+    regressor = direction + origin / range_m[:, None]
+    first = start[:-1]
+    count = np.diff(start)
+    mean_m = np.add.reduceat(range_m, first) / count
+    weight = np.repeat(mean_m, count) ** 2  # turns a difference of 1/r into one of r
+    A = regressor * weight[:, None]
+    y = weight / range_m
+    products = np.stack([A[:, i] * A[:, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))], axis=1)
+    sums = np.add.reduceat(products, first)
+    information = sums[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    enough = (count >= _LEAST) & (np.linalg.cond(information) < 1e12)
+    information = np.where(enough[:, None, None], information, np.eye(3))
+    right = np.add.reduceat(A * y[:, None], first)
+    q = np.linalg.solve(information, right[..., None])[..., 0]
+    spread = np.repeat(q, count, axis=0)
+    slant = np.sum(spread * direction, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        residual = range_m - (1 - np.sum(spread * origin, axis=1)) / slant
+        square = np.add.reduceat(residual**2, first) / np.maximum(count - 3, 1)
+        cosine = np.abs(np.add.reduceat(slant, first)) / count / np.linalg.norm(q, axis=1)
+    return _Flat(start, q, information, np.where(enough, np.sqrt(square), np.inf), cosine)
+
+
+def _noise(beams: Beams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
+    """Median of the roughness of the smallest windows that hold enough beams."""
+    everything = np.arange(beams.range_m.size)
+    for window_rad in reversed(_WINDOWS_RAD):
+        order, start = _windows(beams, side, turned_back, everything, window_rad)
+        rough = _fit(beams.taken(order), start, mount, x).rms_m
+        rough = rough[np.isfinite(rough)]
+        if rough.size >= _FEWEST:
+            return max(float(np.median(rough)), 1e-6)
+    widest = np.degrees(_WINDOWS_RAD[0])
+    raise RecordingError(
+        f"fewer than {_FEWEST} windows of {widest:.0f} x {widest:.0f} deg hold {_LEAST} beams: the scan is too coarse, "
+        "or too short, to tell flat surfaces; turn the axis more slowly or scan longer"
+    )
+
+
+def _is_flat(flat: _Flat, noise_m: float) -> NDArray[np.bool_]:
+    freedom = np.maximum(np.diff(flat.start) - 3, 1)
+    with np.errstate(invalid="ignore"):
+        return (flat.rms_m < noise_m * (_ROUGHEST + 2.5 / np.sqrt(2 * freedom))) & (flat.slant > _STEEPEST)
+
+
+def _only(flat: _Flat, which: NDArray[np.bool_]) -> _Flat:
+    count = np.diff(flat.start)[which]
+    start = np.append(0, np.cumsum(count))
+    return _Flat(start, flat.q[which], flat.information[which], flat.rms_m[which], flat.slant[which])
+
+
+def _middle(beams: Beams, start: Ints, mount: Mount, x: Floats, q: Floats) -> Beams:
+    """One beam through the middle of each tile."""
+    first, count = start[:-1], np.diff(start)
+
+    def mean(column: Floats) -> Floats:
+        return np.add.reduceat(column, first) / count
+
+    origin_ns = int(beams.time_ns[0])
+    middle = Beams(
+        range_m=mean(beams.range_m),
+        bearing_rad=mean(beams.bearing_rad),
+        joint_rad=mean(beams.joint_rad),
+        speed_rad_s=mean(beams.speed_rad_s),
+        recording=beams.recording[first],
+        place=beams.place[first],
+        time_ns=origin_ns + mean((beams.time_ns - origin_ns).astype(float)).astype(np.int64),
+        curves=beams.curves,
+    )
+    origin, direction = rays(mount, x, middle)
+    range_m = (1 - np.sum(q * origin, axis=1)) / np.sum(q * direction, axis=1) - x[4]
+    return replace(middle, range_m=range_m)
+
+
+def _turned(vectors: Floats, angle_rad: Floats) -> Floats:
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    a, b = vectors[:, 0], vectors[:, 1]
+    return np.column_stack([cos * a - sin * b, sin * a + cos * b, vectors[:, 2]])
