@@ -200,6 +200,7 @@ def optimise(
     if picture is not None:
         from design.landscape_picture import landscape_picture
 
+        picture.parent.mkdir(parents=True, exist_ok=True)
         landscape_picture(picture, result, f"{loaded.task.name}: {_title(loaded)}{shortest}")
     if as_json:
         best = [
@@ -328,12 +329,12 @@ def accuracy(
 ) -> None:
     """Report error against run time of every way to compute J, at the optimum of a task."""
     from design import accuracy_report as report
-    from design.accuracy import measure, on_front
+    from design.accuracy import as_log, measure, on_front
     from design.problem import problem_of
     from design.stress import stress_rows
     from design.task import load_task
 
-    loaded = load_task(task)
+    loaded = as_log(load_task(task))
     folder = out / loaded.task.name
     if stress:
         _say("stiff and extreme cases")
@@ -476,7 +477,7 @@ def emulate(
     at: Annotated[
         tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where the scanner stands in the mesh, metres.")
     ] = (0.0, 0.0, 0.0),
-    noise_mm: Annotated[float | None, typer.Option(help="Range noise; default is the data sheet's.")] = None,
+    noise_mm: Annotated[float | None, typer.Option(min=0, help="Range noise; default is the data sheet's.")] = None,
     seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
@@ -490,6 +491,7 @@ def emulate(
     angles = load_angles(out / "angles.json")
     place = room(scene, unit_m, at)
     with (
+        suppress(KeyboardInterrupt),
         _on_duty(),
         emulated_scanner(angles, place, load=load_of(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
         announced(out, twins.ports),
@@ -497,8 +499,7 @@ def emulate(
         print(f"lidar {angles.sensor} at {twins.ports.lidar} and {twins.lidar.address}")
         print(f"servo {angles.servo} at {twins.ports.servo}")
         print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
-        with suppress(KeyboardInterrupt):
-            Event().wait()
+        Event().wait()
 
 
 @app.command()
@@ -519,6 +520,7 @@ def scan(
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     from firmware_io.acquire import acquire
     from firmware_io.assemble import assemble_recording
+    from firmware_io.own_body import own_body_beside
     from firmware_io.plan import plan_scan
 
     plan = plan_scan(
@@ -536,11 +538,12 @@ def scan(
         return
     try:
         with _on_duty():
-            summary = acquire(plan, _say)
+            summary = acquire(plan, _say_in_place)
     except KeyboardInterrupt:
         kept = f"; what was recorded is in {plan.recording}" if plan.recording.exists() else ""
         print(f"scanwright: stopped, both devices stand still{kept}", file=sys.stderr)
         raise typer.Exit(130) from None
+    _say_in_place(f"recorded {summary.duration_s:.1f} s, assembling")
     for reason, count in summary.left_out.items():
         print(f"left out {count:,}: {reason}")
     if summary.reconnects:
@@ -552,7 +555,8 @@ def scan(
         f"recorded {summary.scans:,} scans and {summary.joint_samples:,} angles, {summary.duration_s:.1f} s, "
         f"to {summary.recording}"
     )
-    cloud = assemble_recording(plan.recording, plan.angles, plan.recording.with_suffix(".ply"))
+    own_body = own_body_beside(out / "angles.json")
+    cloud = assemble_recording(plan.recording, plan.angles, plan.recording.with_suffix(".ply"), own_body=own_body)
     for reason, count in cloud.left_out.items():
         print(f"left out {count:,} beams: {reason.replace('_', ' ')}")
     for sentence in cloud.said:
@@ -799,6 +803,14 @@ def _on_duty() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _say_in_place(line: str) -> None:
+    """Progress of long work: on a terminal, what follows a line with a percentage takes its place."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K  .. {line}", end="" if "%" in line else "\n", file=sys.stderr, flush=True)
+    else:
+        _say(line)
 
 
 def _say(line: str) -> None:

@@ -4,7 +4,7 @@
 
 Angle pairs are `default_rng(1).uniform(-90, 90, (300, 2))`, those of the prototype study. For each: one valid, closed
 solid; no volume shared with the lidar; the degrees of the fan that the linkage hides beyond the ring's cone (rays of
-1 deg from the optical centre against the mesh).
+1 deg from the optical centre against the mesh); the share of its surface on walls thinner than the printer's least.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import manifold3d
 import numpy as np
 
 from cad import bought, solids
+from cad.checks.printing import thin_walls
 from cad.mesh import Mesh, checked_mesh, mesh_of
-from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, covered_screws, linkage_of
+from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
 from cad.sizing import stack_of
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
@@ -53,15 +54,17 @@ def main(pairs: int = 300, sensor: str = "UTM-30LX", servo: str = "MX-64R") -> N
         lidar = [mesh_of(part.moved(base)) for part in bought.lidar_solids(scanner.lidar).values()]
         shared = max(float((_manifold(mesh) ^ _manifold(other)).volume()) for other in lidar)
         grams = solid.Volume() * scanner.printer.density_g_cm3 / 1000
-        rows.append((seconds, stack.h, grams, hidden_deg(mesh, linkage), shared, len(covered_screws(linkage))))
+        thin, surface = thin_walls(mesh, scanner.printer.min_wall_mm)
+        hidden = hidden_deg(mesh, linkage)
+        rows.append((seconds, stack.h, grams, hidden, shared, 100 * thin / surface, stack.sub_plate is not None))
     table = np.array(rows)
     print(f"{sensor} on {servo}: {len(rows)} of {pairs} built")
     for line in refused:
         print("  refused", line)
-    for name, column in zip(("seconds", "h_mm", "mass_g", "hidden_deg", "shared_mm3"), table.T, strict=False):
+    for name, column in zip(("seconds", "h_mm", "mass_g", "hidden_deg", "shared_mm3", "thin_%"), table.T, strict=False):
         low, middle, high, top = np.quantile(column, [0, 0.5, 0.95, 1])
         print(f"  {name:<11} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
-    print(f"  hub covers a screw in {int((table[:, 5] > 0).sum())}, more than one in {int((table[:, 5] > 1).sum())}")
+    print(f"  with a sub-plate, where the hub would cover a screw: {int(table[:, 6].sum())}")
 
 
 def hidden_deg(mesh: Mesh, linkage: AlignmentLinkage) -> float:

@@ -14,17 +14,26 @@ from cad import bought, solids
 from cad.deck import Deck, deck_of
 from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of
+from cad.parts.bearing_cage import bearing_cage, cage_base, cage_of
 from cad.parts.servo_shaft import servo_shaft, shaft_of
 from cad.parts.slip_ring_adapter import adapter_of, slip_ring_adapter
+from cad.parts.sub_plate import sub_plate, sub_plate_of
 from cad.sizing import Stack, stack_of
 from design.scanner import Scanner
 
 PRINTED, TURNED = (0.93, 0.45, 0.10), (0.75, 0.76, 0.78)
-BOUGHT = {"servo": (0.16, 0.16, 0.19), "ring": (0.72, 0.58, 0.20), "lidar": (0.20, 0.23, 0.27)}
+STEEL = (0.60, 0.62, 0.66)
+BOUGHT = {
+    "servo": (0.16, 0.16, 0.19),
+    "ring": (0.72, 0.58, 0.20),
+    "lidar": (0.20, 0.23, 0.27),
+    "bearing_inner": STEEL,
+    "bearing_outer": STEEL,
+}
 WINDOW = (0.35, 0.05, 0.08)
 
 
-TURNING = ("servo_shaft", "alignment_linkage")
+TURNING = ("servo_shaft", "alignment_linkage", "sub_plate", "servo_horn", "ring_rotor", "bearing_inner", "lidar")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +48,16 @@ class Assembly:
 
     def standing_parts(self) -> list[str]:
         """Names of the made parts that stand still."""
-        return [name for name in self.made if name not in TURNING]
+        return [name for name in self.made if not turns(name)]
 
     def turning_parts(self) -> list[str]:
         """Names of the made parts that turn with the horn."""
-        return [name for name in self.made if name in TURNING]
+        return [name for name in self.made if turns(name)]
+
+
+def turns(name: str) -> bool:
+    """Whether a part, made or bought, turns with the horn."""
+    return name.startswith(TURNING)
 
 
 def make_parts(scanner: Scanner) -> Assembly:
@@ -56,9 +70,17 @@ def make_parts(scanner: Scanner) -> Assembly:
     deck = deck_of(scanner, stack)
     shaft, linkage = shaft_of(scanner, stack), linkage_of(scanner, stack)
     made = {"servo_shaft": servo_shaft(shaft)}
+    cage = cage_of(scanner, stack)
     if scanner.slip_ring is not None:
         made["slip_ring_adapter"] = slip_ring_adapter(adapter_of(scanner, stack))
+    elif cage is not None:
+        made["cage_base"] = cage_base(cage)
+    if cage is not None:
+        made["bearing_cage"] = bearing_cage(cage)
     made["alignment_linkage"] = alignment_linkage(linkage)
+    between = sub_plate_of(scanner, stack)
+    if between is not None:
+        made["sub_plate"] = sub_plate(between)
     if not deck.flat:
         made["base_mount"] = base_mount(mount_of(scanner, stack, deck))
     others = {
@@ -67,6 +89,8 @@ def make_parts(scanner: Scanner) -> Assembly:
     }
     if scanner.slip_ring is not None:
         others |= bought.ring_solids(stack)
+    if stack.bearing is not None:
+        others |= bought.bearing_solids(stack.bearing, stack)
     T = scanner.angles.T_rot_laser()
     optical = solids.location(stack.R(), T[:3, 3] * 1000)
     base = optical * cq.Location(cq.Vector(0, 0, -scanner.lidar.optical_height_mm))
@@ -78,18 +102,19 @@ def as_tree(assembly: Assembly) -> cq.Assembly:
     """All parts under one named root, each with its name and colour."""
     tree = cq.Assembly(name="scanwright")
     for name, solid in (assembly.made | assembly.bought).items():
-        tree.add(solid, name=name, color=cq.Color(*_colour(name)))
+        tree.add(solid, name=name, color=cq.Color(*colour_of(name)))
     return tree
 
 
 def alone(name: str, solid: cq.Solid) -> cq.Assembly:
     """One part under a named root: a STEP file without a root names its product by a process-wide counter."""
-    return cq.Assembly(name="scanwright").add(solid, name=name, color=cq.Color(*_colour(name)))
+    return cq.Assembly(name="scanwright").add(solid, name=name, color=cq.Color(*colour_of(name)))
 
 
-def _colour(name: str) -> tuple[float, float, float]:
+def colour_of(name: str) -> tuple[float, float, float]:
+    """SRGB colour of a part, made or bought."""
     if name == "lidar_window":
         return WINDOW
     if name == "servo_shaft":
         return TURNED
-    return BOUGHT.get(name.split("_")[0], PRINTED)
+    return BOUGHT.get(name, BOUGHT.get(name.split("_")[0], PRINTED))

@@ -1,7 +1,7 @@
 """Bought parts, true to size, as far as the catalogue knows them. Millimetres.
 
 The lidar is made in its body frame (origin on the base at the optical axis, x to the front, z up), servo and
-slip ring in the rotation frame at gamma = 0 (`cad/sizing.py`).
+slip ring and bearing in the rotation frame at gamma = 0 (`cad/sizing.py`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from cad import solids
 from cad.parts.servo_shaft import ServoShaft
 from cad.screws import SCREWS
 from cad.sizing import Stack
-from design.catalogue import Lidar, Servo
+from design.catalogue import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5
 EAR_ROOM = 3.6  # radius of the recess around a case hole
@@ -76,3 +76,12 @@ def ring_solids(stack: Stack) -> dict[str, cq.Solid]:
     stator: cq.Shape = solids.upright(outer, stack.ring_bottom + 1.0, stack.ring_top - 1.0)
     stator = stator.cut(solids.upright(split, stack.ring_bottom - 1.0, stack.ring_top + 1.0))
     return {"ring_stator": stator.Solids()[0], "ring_rotor": rotor.Solids()[0]}
+
+
+def bearing_solids(bearing: Bearing, stack: Stack) -> dict[str, cq.Solid]:
+    """Inner and outer ring; the balls between them are left out."""
+    inner, outer = bearing.bore_mm / 2, bearing.outer_mm / 2
+    wall = 0.3 * (outer - inner)
+    low, high = stack.bearing_top - bearing.width_mm, stack.bearing_top
+    bodies = {"bearing_inner": (inner, inner + wall), "bearing_outer": (outer - wall, outer)}
+    return {name: solids.lathe([(a, low), (b, low), (b, high), (a, high)]) for name, (a, b) in bodies.items()}

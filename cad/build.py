@@ -40,8 +40,20 @@ class PartReport:
 
 @dataclass(frozen=True, slots=True)
 class PartsResult:
-    """What `build_parts` made. `files` are relative to the build folder."""
+    """What `build_parts` made.
 
+    Attributes:
+        assembly: the solids.
+        meshes: canonical mesh of each made part.
+        t_world_rot_mm: where the optical centre stands in the world.
+        parts: facts of each made part.
+        findings: what a person should know.
+        left_out: what this scanner does not need.
+        files: relative to the build folder.
+    """
+
+    assembly: Assembly
+    meshes: dict[str, Mesh]
     t_world_rot_mm: tuple[float, float, float]
     parts: tuple[PartReport, ...]
     findings: tuple[Finding, ...]
@@ -75,9 +87,10 @@ def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None])
     digest = config_hash(scanner)
     files: dict[str, bytes] = {}
     reports = []
+    meshes_of_parts: dict[str, Mesh] = {}
     for name, solid in assembly.made.items():
         progress(f"meshing and writing {name}")
-        mesh = checked_mesh(solid, name)
+        mesh = meshes_of_parts[name] = checked_mesh(solid, name)
         files[f"parts/{name}.step"] = step_text(alone(name, solid), f"{name} config={digest}").encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
         reports.append(_report(name, solid.Volume(), _density(name, scanner, assembly), mesh))
@@ -86,17 +99,24 @@ def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None])
     bodies = link_bodies(scanner, assembly)
     meshes = {"servo": assembly.standing_parts(), "rot": assembly.turning_parts()}
     files["scanner.urdf"] = urdf_text(scanner, stack, bodies, meshes).encode("utf-8")
+    write_files(folder, files)
+    return PartsResult(
+        assembly=assembly,
+        meshes=meshes_of_parts,
+        t_world_rot_mm=deck.t_world_rot,
+        parts=tuple(reports),
+        findings=findings_of(scanner, assembly, bodies),
+        left_out=left_out_of(scanner, stack, deck),
+        files=tuple(sorted(files)),
+    )
+
+
+def write_files(folder: Path, files: dict[str, bytes]) -> None:
+    """Write files by their names relative to the build folder."""
     for file, content in files.items():
         path = folder / file
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
-    return PartsResult(
-        t_world_rot_mm=deck.t_world_rot,
-        parts=tuple(reports),
-        findings=findings_of(scanner, assembly, bodies),
-        left_out=left_out_of(scanner, deck),
-        files=tuple(sorted(files)),
-    )
 
 
 def config_hash(scanner: Scanner) -> str:
@@ -107,7 +127,7 @@ def config_hash(scanner: Scanner) -> str:
         "delta": angles.delta_rotvec_rot_deg,
         "products": [
             None if product is None else product.model_dump()
-            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, scanner.printer)
+            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, stack_of(scanner).bearing, scanner.printer)
         ],
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]
@@ -116,7 +136,7 @@ def config_hash(scanner: Scanner) -> str:
 def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
 
-    Of bought parts only mass and size are known: homogeneous boxes; half the ring's mass turns.
+    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns.
     """
     from cad import mass
 
@@ -131,6 +151,13 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
         half = mass.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top))
         standing.append(half)
         turning.append(half)
+    if stack.bearing is not None:
+        r = stack.bearing.outer_mm / 2
+        half = mass.of_box(
+            stack.bearing.mass_g / 2, (-r, -r, stack.bearing_top - stack.bearing.width_mm), (r, r, stack.bearing_top)
+        )
+        standing.append(half)
+        turning.append(half)
     x, y, z = lidar.body_mm
     base = -lidar.optical_height_mm
     laser = mass.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
@@ -138,7 +165,7 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
 
 
 def _density(name: str, scanner: Scanner, assembly: Assembly) -> float:
-    from cad.mass import ALUMINIUM_G_CM3
+    from cad.loads import ALUMINIUM_G_CM3
     from cad.remarks import shaft_is_turned
 
     if name == "servo_shaft" and shaft_is_turned(assembly.stack):

@@ -103,9 +103,11 @@ def _height_of_back(scanner: Scanner, stack: Stack, normal: Array, back: Array, 
     ]
     below = [float(-(np.array(point) @ normal)) for point in (*case, *plate)]
     sideways = float(np.hypot(normal[0], normal[1]))
-    around = max(stack.ring_radius + 8.0, stack.hub_radius)  # the adapter's arms stand around the ring
-    below += [around * sideways - z * float(normal[2]) for z in (stack.horn, stack.ring_top)]
-    below.append(rotor_radius(scanner.lidar) + SWEEP_MARGIN)
+    around, top = max(stack.ring_radius + 8.0, stack.hub_radius), stack.ring_top  # with the adapter's arms
+    if stack.bearing is not None:
+        around, top = stack.cage_outer + 4.0, stack.cage_top  # with the heads of its screws
+    below += [around * sideways - z * float(normal[2]) for z in (stack.horn, top)]
+    below.append(rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN)
     return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
 
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from design.frames import Array
 
-ALUMINIUM_G_CM3 = 2.7
-
 
 @dataclass(frozen=True, slots=True)
 class Inertial:

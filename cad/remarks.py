@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from cad.deck import Deck
 from cad.findings import Finding
+from cad.loads import RATED_AT_MM, Weight, rated_moment_nm, supported, weight_of
 from cad.screws import SCREWS
 from cad.sizing import Stack
 from design.catalogue import Product
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
     from cad.assembly import Assembly
     from cad.mass import Inertial
 
-STANDARD_GRAVITY = 9.80665
 SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
-RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
 
 # Which values of a product shape which parts.
 SHAPING = {
@@ -77,74 +74,65 @@ def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial
                 "horizontal): have it turned from aluminium or steel after its STEP file",
             )
         )
-    found += _covered(assembly)
     found += _tilt_moment(scanner, assembly, bodies)
     if assembly.deck.flat:
         found.append(_held_by_screws(scanner, assembly.deck))
-    products = (scanner.lidar, scanner.servo, scanner.slip_ring, scanner.printer)
+    products = (scanner.lidar, scanner.servo, scanner.slip_ring, assembly.stack.bearing, scanner.printer)
     for product in products:
         if product is not None:
-            found += _unverified(product)
+            found += unverified(product)
     return tuple(found)
 
 
-def left_out_of(scanner: Scanner, deck: Deck) -> tuple[LeftOut, ...]:
+def left_out_of(scanner: Scanner, stack: Stack, deck: Deck) -> tuple[LeftOut, ...]:
     """Parts that this scanner does not need."""
     out = []
     if scanner.slip_ring is None:
         out.append(LeftOut("slip_ring_adapter", "this scanner has no slip ring", 1, "parts"))
+    if stack.bearing is None:
+        why = f"the horn of {scanner.servo.name} carries an axis this upright alone"
+        if scanner.servo.radial_load_n is None:
+            why = f"the maker of {scanner.servo.name} rates no radial load that would ask for one"
+        out.append(LeftOut("bearing_cage", why, 1, "parts"))
     if deck.flat:
         out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)
 
 
-def _covered(assembly: Assembly) -> list[Finding]:
-    from cad.parts.alignment_linkage import covered_screws
-
-    covered = [assembly.linkage.holes[i] for i in covered_screws(assembly.linkage)]
-    if not covered:
-        return []
-    named = ", ".join(f"({x:g}, {y:g})" for x, y in covered)
-    return [
-        Finding(
-            "screw_under_hub",
-            "warning",
-            "alignment_linkage",
-            f"alignment_linkage: the hub covers the lidar's screw at {named} mm of its base: use the other "
-            f"{len(assembly.linkage.holes) - len(covered)}",
-        )
-    ]
-
-
 def _tilt_moment(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial]) -> list[Finding]:
-    """Weight of all that turns, times its lever over the horn, against the horn's rating."""
-    from cad.mass import together
+    """What the weight of all that turns puts on the horn, against its rating."""
+    from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 
-    rated = scanner.servo.radial_load_n
+    rated, stack, servo = rated_moment_nm(scanner), assembly.stack, scanner.servo
     if rated is None:
         return []
-    rotor = together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
-    lever = rotor.centre_m - np.array([0.0, 0.0, assembly.stack.horn / 1000])
-    down = -np.array(scanner.angles.T_world_rot(0.0)[2, :3])
-    # the worst turn: the offset from the axis adds to the lever along it
-    sideways = math.hypot(down[0], down[1])
-    moment = (
-        rotor.mass_kg
-        * STANDARD_GRAVITY
-        * (abs(lever[2]) * sideways + math.hypot(lever[0], lever[1]) * abs(float(down[2])))
-    )
-    limit = rated * RATED_AT_MM / 1000
-    if moment <= limit:
+    weight = rotor_weight(scanner, stack, bodies)
+    cage = cage_of(scanner, stack)
+    if cage is None:
+        moment, help_ = weight.moment_nm, "support the shaft with a bearing near the hub; none of the catalogue fits it"
+    else:
+        moment = supported(weight, stack, stiffness_n_per_m(cage)).horn_moment_nm
+        help_ = "lighten what turns, or raise the axis"
+    if moment <= rated:
         return []
     return [
         Finding(
             "tilt_moment",
             "warning",
             "servo_shaft",
-            f"servo_shaft: the tilted axis puts {moment:.2f} N m on the horn of {scanner.servo.name}, rated "
-            f"{limit:.2f} N m ({rated:g} N at {RATED_AT_MM:g} mm): support the shaft with a bearing near the hub",
+            f"servo_shaft: the tilted axis puts {moment:.2f} N m on the horn of {servo.name}, rated {rated:.2f} N m "
+            f"({servo.radial_load_n:g} N at {RATED_AT_MM:g} mm): {help_}",
         )
     ]
+
+
+def rotor_weight(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> Weight:
+    """Weight of all that turns, from the bodies of `link_bodies`."""
+    from cad.mass import together
+
+    rotor = together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
+    x, y, z = rotor.centre_m
+    return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
 def _held_by_screws(scanner: Scanner, deck: Deck) -> Finding:
@@ -160,7 +148,8 @@ def _held_by_screws(scanner: Scanner, deck: Deck) -> Finding:
     )
 
 
-def _unverified(product: Product) -> list[Finding]:
+def unverified(product: Product) -> list[Finding]:
+    """Values of a product that nobody has verified and that shape a part."""
     provenance = product.provenance()
     return [
         Finding(

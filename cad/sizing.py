@@ -6,11 +6,14 @@ ring's top, everything that stands still beside the shaft stays below it: cleara
 
     z = 0             optical centre
     -h                top of the linkage's hub
-    -h - HUB_HEIGHT   bottom of the hub
+    shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
+    hub_bottom        bottom of the hub: the shoulder, or below it the journal that sits in a bearing
     ring_top          HUB_GAP below: the rotor's wires leave here
     ring_bottom       the ring's length below
-                      RING_GAP below: top of the shaft's collar
+                      RING_GAP, or the shaft's waist, below: top of the shaft's collar
     horn              the servo's horn face
+
+A tilted axis whose rotor is too heavy for the horn alone gets a bearing on the journal (`cad/loads.py`).
 
 The same boxes of the lidar (`Envelope`) give h and are cut from the linkage, so the two cannot disagree.
 """
@@ -18,12 +21,14 @@ The same boxes of the lidar (`Envelope`) give h and are cut from the linkage, so
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
+from cad.loads import WAIST, bearing_of
 from cad.screws import SCREWS, Screw
-from design.catalogue import Lidar, Servo
+from design.catalogue import Bearing, Lidar, Servo
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
@@ -39,28 +44,53 @@ SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
 SHAFT_MIN = 8.0
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
+SUB_PLATE = 4.0  # thickness
+EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
+EAR_HALF_WIDTH = 10.0
+BEARING_STEP = 0.5  # between the hub's face and the bearing: only the inner ring touches
+JOURNAL_END = 1.0  # of the journal below the bearing
+CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
+CAGE_WALL = 5.0
+CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
+BEARING_PLAY = 0.3  # along the axis: the horn alone carries along it
+CAGE_GAP = 1.0  # between hub and cage
+WINDOWS_REACH = 3.0  # of the cage's windows into its roof
+CAGE_SEAT_WALL = 4.0  # around the bearing
+CAGE_LIP = 1.5  # under the bearing's outer ring, thick and wide
 H_FLOOR = (45.0, 58.0)  # for an upright lidar and from 60 deg of tilt: stiffness and shadow (measured study)
 
+Axis = Literal["x", "y"]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What belongs to the lidar, as boxes (low corner, high corner) in the laser frame."""
+    """What belongs to the lidar, as boxes (low corner, high corner) in the laser frame.
+
+    Attributes:
+        body: the lidar.
+        cables: where they leave, straight.
+        plate: of the linkage, with a sub-plate if there is one.
+        under: heads of the lidar's screws below the plate, or the ears of the sub-plate.
+    """
 
     body: Box
     cables: tuple[Box, ...]
     plate: Box
-    heads: Box
+    under: Box
 
     def corners(self) -> Array:
         """Corners of all boxes, shape (n, 3)."""
-        return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.heads)])
+        return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.under)])
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """The scanner along its axis: radii, lengths and the z of each plane (rotation frame)."""
+    """The scanner along its axis: radii, lengths and the z of each plane (rotation frame).
+
+    Where the hub would cover a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
+    to the linkage from the lidar's side by its ears.
+    """
 
     h: float
     R_rot_laser: tuple[tuple[float, float, float], ...]
@@ -72,6 +102,8 @@ class Stack:
     flange_thickness: float
     collar_radius: float
     collar_height: float
+    bearing: Bearing | None
+    sub_plate: Axis | None  # of the laser frame, along which its ears stick out
 
     @property
     def hub_radius(self) -> float:
@@ -79,19 +111,71 @@ class Stack:
         return self.shaft_diameter / 2 + HUB_WALL
 
     @property
+    def shoulder(self) -> float:
+        """Height of the plane that parts what turns from what stands still, but for the journal."""
+        return -self.h - HUB_HEIGHT
+
+    @property
+    def journal(self) -> float:
+        """Length of the hub below its shoulder."""
+        return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
+
+    @property
     def hub_bottom(self) -> float:
         """Height of the hub's lower face."""
-        return -self.h - HUB_HEIGHT
+        return self.shoulder - self.journal
 
     @property
     def clamp(self) -> float:
         """Height of the radial screws."""
-        return self.hub_bottom + CLAMP_ABOVE_BOTTOM
+        return self.shoulder + CLAMP_ABOVE_BOTTOM
+
+    @property
+    def spigot(self) -> float:
+        """Length of the shaft inside the hub."""
+        return SPIGOT + self.journal
 
     @property
     def spigot_top(self) -> float:
         """Height of the shaft's upper end, which is the floor of the hub's bore."""
-        return self.hub_bottom + SPIGOT
+        return self.hub_bottom + self.spigot
+
+    @property
+    def bearing_top(self) -> float:
+        """Height of the bearing's upper face."""
+        return self.shoulder - BEARING_STEP
+
+    @property
+    def bearing_middle(self) -> float:
+        """Height of the bearing's balls."""
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm / 2)
+
+    @property
+    def cage_inner(self) -> float:
+        """Inner radius of the bearing's cage, around the ring."""
+        return max(self.ring_radius + CAGE_TIE, CAGE_MIN)
+
+    @property
+    def cage_outer(self) -> float:
+        """Outer radius of the bearing's cage."""
+        return self.cage_inner + CAGE_WALL
+
+    @property
+    def cage_top(self) -> float:
+        """Height of the cage's upper face."""
+        return self.shoulder - CAGE_GAP
+
+    @property
+    def cage_seat(self) -> float:
+        """Height of the lip that the bearing lies on, if it falls down its play."""
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_PLAY
+
+    @property
+    def cage_roof(self) -> float:
+        """Height at which the cage starts to narrow towards the bearing, at 45 deg."""
+        if self.bearing is None:
+            return self.cage_seat
+        return self.cage_seat - CAGE_LIP - (self.cage_inner - self.bearing.outer_mm / 2 + CAGE_LIP)
 
     @property
     def ring_top(self) -> float:
@@ -106,7 +190,7 @@ class Stack:
     @property
     def horn(self) -> float:
         """Height of the servo's horn face."""
-        return self.ring_bottom - RING_GAP - self.collar_height
+        return self.ring_bottom - (RING_GAP if self.bearing is None else WAIST) - self.collar_height
 
     @property
     def flat(self) -> float:
@@ -115,8 +199,12 @@ class Stack:
 
     @property
     def shadow_half_angle(self) -> float:
-        """Half angle [rad] of the cone about -z that the ring hides from the optical centre."""
-        return math.atan2(max(self.ring_radius, self.hub_radius), -self.ring_top)
+        """Half angle [rad] of the cone about -z that ring, or cage, hide from the optical centre."""
+        ring = math.atan2(max(self.ring_radius, self.hub_radius), -self.ring_top)
+        if self.bearing is None:
+            return ring
+        seat = math.atan2(self.bearing.outer_mm / 2 + CAGE_SEAT_WALL, -self.cage_top)
+        return max(ring, seat, math.atan2(self.cage_outer, -self.cage_roof))
 
     def R(self) -> Array:
         """Laser in the rotation frame, shape (3, 3)."""
@@ -138,9 +226,9 @@ def stack_of(scanner: Scanner) -> Stack:
         )
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
-    h = _hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius)
+    h = _hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius, None)
     rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
-    return Stack(
+    alone = Stack(
         h=h,
         R_rot_laser=rows,
         ring_length=length,
@@ -151,10 +239,36 @@ def stack_of(scanner: Scanner) -> Stack:
         flange_thickness=flange_thickness,
         collar_radius=collar_radius,
         collar_height=collar_height,
+        bearing=None,
+        sub_plate=None,
     )
+    bearing = bearing_of(scanner, alone)
+    stack = replace(alone, bearing=bearing)
+    if not covered_screws(scanner.lidar, stack):
+        return stack
+    # the ears on the sides that lean less reach no lower than the lidar's corners
+    axis: Axis = "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
+    return replace(stack, h=_hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
 
 
-def envelope_of(lidar: Lidar) -> Envelope:
+def covered_screws(lidar: Lidar, stack: Stack) -> list[int]:
+    """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
+    return [i for i, hole in enumerate(lidar.mount_holes_mm) if not _driver_passes(lidar, stack, hole)]
+
+
+def _driver_passes(lidar: Lidar, stack: Stack, hole: tuple[float, float]) -> bool:
+    """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
+    R, room = stack.R(), SCREWS[lidar.mount_screw].head_room
+    depth = np.linspace(0.0, 150.0, 601)
+    line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
+    reach = np.hypot(line[:, 0], line[:, 1]) - room
+    hub = (line[:, 2] > stack.shoulder - room) & (line[:, 2] < room - stack.h)
+    journal = (line[:, 2] > stack.hub_bottom - room) & (line[:, 2] < stack.hub_bottom + stack.journal)
+    radius = 0.0 if stack.bearing is None else stack.bearing.bore_mm / 2
+    return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
+
+
+def envelope_of(lidar: Lidar, sub_plate: Axis | None) -> Envelope:
     """The boxes of one lidar, gaps included, in the laser frame (origin at the optical centre)."""
     half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
     seat = -lidar.optical_height_mm
@@ -168,20 +282,33 @@ def envelope_of(lidar: Lidar) -> Envelope:
         )
         for y in lidar.cable_y_mm
     )
-    screw = SCREWS[lidar.mount_screw]
-    under = seat - PLATE_THICKNESS
     gap = BODY_GAP
+    if sub_plate is None:
+        lower = seat - PLATE_THICKNESS
+        under = (-half_x, -half_y, lower - SCREWS[lidar.mount_screw].head_height - 0.5), (half_x, half_y, lower)
+    else:
+        lower = seat - SUB_PLATE - PLATE_THICKNESS
+        x, y = ear_corner(lidar, sub_plate)
+        under = (-x, -y, lower), (x, y, seat)
     return Envelope(
         body=((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)),
         cables=cables,
-        plate=((-half_x, -half_y, under), (half_x, half_y, seat)),
-        heads=((-half_x, -half_y, under - screw.head_height - 0.5), (half_x, half_y, under)),
+        plate=((-half_x, -half_y, lower), (half_x, half_y, seat)),
+        under=under,
     )
 
 
-def rotor_radius(lidar: Lidar) -> float:
+def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
+    """Half extents of the strip that holds the two ears of a sub-plate."""
+    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    if sub_plate == "x":
+        return half_x + EAR_REACH, EAR_HALF_WIDTH
+    return EAR_HALF_WIDTH, half_y + EAR_REACH
+
+
+def rotor_radius(lidar: Lidar, sub_plate: Axis | None) -> float:
     """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
-    return float(np.linalg.norm(envelope_of(lidar).corners(), axis=1).max())
+    return float(np.linalg.norm(envelope_of(lidar, sub_plate).corners(), axis=1).max())
 
 
 def box_corners(box: Box) -> Array:
@@ -245,12 +372,12 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)
 
 
-def _hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float) -> float:
+def _hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None) -> float:
     """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
-    envelope = envelope_of(lidar)
+    envelope = envelope_of(lidar, sub_plate)
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
     plate = float((box_corners(envelope.plate) @ R[2]).min())
-    heads = float((box_corners(envelope.heads) @ R[2]).min())
+    heads = float((box_corners(envelope.under) @ R[2]).min())
     wishes = [1.0 - z for z in lowest]
     wishes.append(1.0 - heads - HUB_HEIGHT)
     wishes.append(1.0 - plate - (HUB_HEIGHT - CLAMP_ABOVE_BOTTOM - 3.0))  # a driver reaches the radial screws

@@ -85,6 +85,13 @@ def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
 
 
+def lathe(profile: ArrayLike) -> cq.Solid:
+    """Solid of revolution about z of a polygon (n, 2) of (r, z); no edge of it may lie on the axis."""
+    points = [cq.Vector(float(r), 0.0, float(z)) for r, z in np.asarray(profile, dtype=float)]
+    wire = cq.Wire.makePolygon(points, close=True)
+    return cq.Solid.revolve(wire, [], 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))
+
+
 def diamond(half: float, y: float) -> Array:
     """Square on its corner about (0, y), shape (4, 2): cuts a V into what ends at y."""
     return np.array([[half, y], [0.0, y + half], [-half, y], [0.0, y - half]])
@@ -95,6 +102,12 @@ def octagon(half_x: float, half_y: float, chamfer: float, y: float = 0.0) -> Arr
     a, b, c = half_x, half_y, chamfer
     corners = [[a, c - b], [a, b - c], [a - c, b], [c - a, b], [-a, b - c], [-a, c - b], [c - a, -b], [a - c, -b]]
     return np.array([[px, py + y] for px, py in corners])
+
+
+def gable(half_width: float, low: float, high: float) -> Array:
+    """Upright window with a roof of 45 deg, which prints without support: (sideways, z) corners, shape (5, 2)."""
+    a, eaves = half_width, high - half_width
+    return np.array([[-a, low], [a, low], [a, eaves], [0.0, high], [-a, eaves]])
 
 
 def polygon(radius: float, sides: int, turn: float = 0.0) -> Array:

@@ -3,6 +3,7 @@
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,3 +34,29 @@ def command(monkeypatch, capsys):
         return code, printed.out, [line for line in printed.err.splitlines() if not line.startswith("  ..")]
 
     return run
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
+    from cad.build import build_parts
+    from cad.deck import mount_offset_mm
+    from cad.exports import export_scanner
+    from design.angles import Angles, AngleSet
+    from design.catalogue import load_catalogue
+    from design.scanner import scanner_of
+
+    angles = AngleSet(
+        task="tilted",
+        angles_deg=Angles(alpha_rot=0, beta_rot=35, alpha_laser=-20, beta_laser=-70),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="UH1256-02-0610-06S",
+        motion={"mode": "spin", "period_s": 18.0},
+    )
+    offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", load_catalogue()))
+    scanner = scanner_of(angles.model_copy(update={"t_world_rot_mm": offset}), "fdm-0.4", load_catalogue())
+    folder = tmp_path_factory.mktemp("made")
+    result = build_parts(scanner, folder, lambda _: None)
+    exports = export_scanner(scanner, result, folder, lambda _: None)
+    return SimpleNamespace(folder=folder, result=result, exports=exports, scanner=scanner)

@@ -2,24 +2,28 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
+import manifold3d
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cad.checks.printing import thin_walls
 from cad.deck import deck_of, mount_offset_mm
 from cad.kernel import require_kernel
 from cad.mesh import checked_mesh
 from cad.parts.alignment_linkage import alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of
-from cad.sizing import envelope_of, rotor_radius, stack_of
+from cad.parts.sub_plate import ear_screws, sub_plate, sub_plate_of
+from cad.sizing import covered_screws, envelope_of, rotor_radius, stack_of
 from cad.solids import box, building, checked
 from design.angles import Angles, AngleSet
 from design.catalogue import SlipRing, load_catalogue
 from design.errors import BuildError
-from design.scanner import Scanner, scanner_of
+from design.scanner import scanner_of
 
 degrees = st.floats(-90, 90)
 turns = st.floats(-180, 180)
@@ -39,7 +43,7 @@ def scanner_for(alpha, beta, lidar="UTM-30LX", servo="MX-64R", alpha_rot=0.0, be
 def with_ring(**changes):
     scanner = scanner_for(0, 0)
     ring = SlipRing.model_validate(scanner.slip_ring.model_dump() | changes)
-    return Scanner(scanner.angles, scanner.lidar, scanner.servo, ring, scanner.printer)
+    return replace(scanner, slip_ring=ring)
 
 
 HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidden screws
@@ -52,6 +56,7 @@ HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidd
     (-75, -60, "URG-04LX"),
     (5, 0, "UST-10LX"),
     (-45, 85, "UST-10LX"),
+    (80, -75, "UTM-30LX"),  # fins beside the lidar
 ]
 
 
@@ -65,12 +70,51 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     assert 20_000 < body.volume < 120_000
     a, b = np.radians([alpha, beta])
     normal = np.array([np.sin(b) * np.cos(a), -np.sin(a), np.cos(b) * np.cos(a)])
-    seat = scanner.lidar.optical_height_mm
+    seat = scanner.lidar.optical_height_mm + (4.0 if stack.sub_plate else 0.0)
     flat = np.abs(body.triangles_center @ normal + seat) < 1e-3
     area = body.area_faces[flat & (body.face_normals @ normal > 0.999)].sum()
     assert area > 0.85 * scanner.lidar.body_mm[0] * scanner.lidar.body_mm[1]  # less holes and marks
+    thin, surface = thin_walls(mesh, scanner.printer.min_wall_mm)
+    assert thin < 0.01 * surface
     # two radial screws reach the spigot: the body is open there
     assert len(linkage_of(scanner, stack).clamp_azimuths) == 2
+
+
+COVERED = [(25.5, -21.4, "UTM-30LX"), (-22.3, 22.2, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]
+
+
+@pytest.mark.parametrize(("alpha", "beta", "lidar"), COVERED)
+def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha, beta, lidar):
+    scanner = scanner_for(alpha, beta, lidar)
+    stack = stack_of(scanner)
+    bodies = {
+        "plate": sub_plate(sub_plate_of(scanner, stack)),
+        "linkage": alignment_linkage(linkage_of(scanner, stack)),
+    }
+    base = stack.R() @ [0, 0, -scanner.lidar.optical_height_mm]
+    mesh = {}
+    for name, solid in bodies.items():
+        made = checked_mesh(solid, name)
+        mesh[name] = trimesh.Trimesh((made.vertices - base) @ stack.R(), made.faces, process=False)  # body frame
+        assert mesh[name].is_watertight and mesh[name].body_count == 1
+    half = scanner.lidar.body_mm[0] / 2
+    np.testing.assert_allclose(mesh["plate"].bounds[:, 2], [-4, 0], atol=1e-4)
+    down = np.array([[0.0, 0.0, -1.0]])
+    for x, y in scanner.lidar.mount_holes_mm:  # on the bench: from below through the plate alone
+        assert len(mesh["plate"].ray.intersects_location([[x, y, 1]], down)[0]) == 0
+        pocket = mesh["linkage"].ray.intersects_location([[x, y, 1]], down)[0][:, 2].max()
+        assert pocket == pytest.approx(-4 - 3.5, abs=1e-3)  # a head of 3
+    ears = ear_screws(scanner.lidar, stack.sub_plate)
+    assert len(ears) == 4
+    for x, y in ears:  # beside the lidar, from its side
+        assert max(abs(x), abs(y)) - 2.75 > half
+        for name in bodies:
+            assert len(mesh[name].ray.intersects_location([[x, y, 1]], -down)[0]) == 0
+        through = mesh["linkage"].ray.intersects_location([[x, y, -3.9]], down)[0]
+        assert len(through) == 0 or through[:, 2].max() < -11.9
+    # nothing shares room
+    both = [manifold3d.Manifold(manifold3d.Mesh(m.vertices.astype("f4"), m.faces.astype("u4"))) for m in mesh.values()]
+    assert (both[0] ^ both[1]).volume() < 0.05
 
 
 @settings(deadline=None)
@@ -79,7 +123,8 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     scanner = scanner_for(alpha, beta)
     stack = stack_of(scanner)
     assert 45 <= stack.h <= 90 and stack.h % 0.25 == 0
-    assert (envelope_of(scanner.lidar).corners() @ stack.R()[2]).min() >= stack.hub_bottom + 0.99
+    assert stack.sub_plate is not None or covered_screws(scanner.lidar, stack) == []
+    assert (envelope_of(scanner.lidar, stack.sub_plate).corners() @ stack.R()[2]).min() >= stack.hub_bottom + 0.99
     assert stack.spigot_top > stack.hub_bottom > stack.ring_top > stack.ring_bottom > stack.horn
 
 
@@ -87,9 +132,10 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
 @given(alpha=turns, beta=degrees, alpha_laser=degrees, beta_laser=degrees)
 def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
     scanner = scanner_for(alpha_laser, beta_laser, alpha_rot=alpha, beta_rot=beta)
-    deck = deck_of(scanner, stack_of(scanner))
+    stack = stack_of(scanner)
+    deck = deck_of(scanner, stack)
     height = deck.t_world_rot[2] * (-1 if deck.hangs else 1)
-    assert height > rotor_radius(scanner.lidar)
+    assert height > rotor_radius(scanner.lidar, stack.sub_plate)
     a, b = np.radians([alpha, beta])
     u_z = np.cos(a) * np.cos(b)
     assert deck.hangs == (u_z < -1e-6)
@@ -129,7 +175,7 @@ def test_an_upside_down_lidar_is_refused():
 def test_holes_outside_the_plate_are_refused():
     scanner = scanner_for(0, 0)
     lidar = scanner.lidar.model_copy(update={"mount_holes_mm": ((29, 0.0), (-29, 0.0), (0.0, 29))})
-    wrong = Scanner(scanner.angles, lidar, scanner.servo, scanner.slip_ring, scanner.printer)
+    wrong = replace(scanner, lidar=lidar)
     with pytest.raises(BuildError, match="alignment_linkage: seat: mount_holes_mm"):
         linkage_of(wrong, stack_of(wrong))
 

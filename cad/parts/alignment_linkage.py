@@ -3,7 +3,9 @@
 Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm. A hub clamps the shaft's spigot (blind bore with a flat at
 +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must stay free, leads
 to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a square
-notch at its -x below the cables, a groove in the hub at +y (index).
+notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub, its lower end is
+the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel along the journal. Under a
+sub-plate (`sub_plate.py`) the plate lies lower, with threads for its ears and pockets for the heads of its screws.
 """
 
 from __future__ import annotations
@@ -15,18 +17,23 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
+from cad.loads import JOURNAL_WALL
 from cad.mesh import checked_mesh
+from cad.parts.fins import FAR, fins_beside
+from cad.parts.sub_plate import EAR_SCREW, ear_screws, plate_marks
 from cad.screws import SCREWS, Screw
-from cad.sizing import BODY_GAP, HUB_HEIGHT, PLATE_THICKNESS, Box, Stack, box_corners, envelope_of
+from cad.sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, Stack, box_corners, envelope_of
 from cad.solids import building, checked
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
 
 PART = "alignment_linkage"
-FAR = 200.0  # beyond any linkage
 CLAMP_SCREW = SCREWS["M3"]
 CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
+INNER_RING = 1.2  # how far the hub's face may touch the bearing's inner ring, on the radius
+WIRES_HALF_WIDTH = 5.0
+WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
 HEEL = 8.0  # how far the neck reaches below a lying plate
 RETRIES = 5
 
@@ -36,11 +43,14 @@ class AlignmentLinkage:
     """Lengths in mm, angles in rad, directions in the rotation frame."""
 
     stack: Stack
-    seat: float  # z of the seat in the laser frame
+    seat: float  # z of the lidar's base in the laser frame
+    top: float  # z of the plate's upper face: the seat, or below a sub-plate
     half_x: float
     half_y: float
     chamfer: float
     body: Box
+    ears: Box | None  # room of a sub-plate's ears
+    ear_screws: tuple[tuple[float, float], ...]
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
@@ -58,7 +68,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         BuildError: the screw holes come too near to the plate's edge.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    envelope = envelope_of(lidar)
+    envelope = envelope_of(lidar, stack.sub_plate)
     screw = SCREWS[lidar.mount_screw]
     hole = screw.nominal + printer.screw_clearance_mm
     half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
@@ -75,10 +85,13 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
     return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
+        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE),
         half_x=half_x,
         half_y=half_y,
         chamfer=chamfer,
         body=envelope.body,
+        ears=None if stack.sub_plate is None else _grown(envelope.under),
+        ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
         cables=envelope.cables,
         fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
         fan=_free_bearings(stack, lidar.bearings_rad()),
@@ -108,36 +121,31 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     raise BuildError(f"{fault} (after {RETRIES + 1} attempts)")
 
 
-def covered_screws(p: AlignmentLinkage) -> list[int]:
-    """Which base screws (index into `holes`) the hub hides from a straight driver."""
-    return [i for i, hole in enumerate(p.holes) if not _driver_passes(p, hole)]
-
-
 def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     tilt = f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
     stack = p.stack
     laser = solids.location(stack.R())
     with building(PART, "plate and neck", "tilt", tilt):
-        plate = solids.prism(solids.octagon(p.half_x, p.half_y, p.chamfer), p.seat - PLATE_THICKNESS, p.seat)
+        plate = _plate(p)
         body = plate.moved(laser).fuse(_neck(p, attempt))
         body = checked(body, PART, "plate and neck", "tilt", tilt)
     with building(PART, "free room of lidar, cables and fan", "tilt", tilt):
         lidar_room = [shape.moved(laser) for shape in _lidar_room(p)]
-        drivers = [_driver(p, hole).moved(laser) for hole in p.holes]
+        drivers = [shape.moved(laser) for shape in _drivers(p)]
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z).moved(laser) for start, end in p.fan]
-        body = body.cut(*lidar_room, *drivers, *fan)
+        neck = _neck_corners(p, attempt) @ stack.R()
+        fins = [shape.moved(laser) for shape in fins_beside(p.top, p.body, p.cables, neck)]
+        body = body.cut(*lidar_room, *drivers, *fan, *fins)
         # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
         body = _largest(body)
     with building(PART, "hub", "h", f"{stack.h} mm"):
-        hub = solids.upright(stack.hub_radius, stack.hub_bottom, -stack.h)
-        free = [_driver(p, hole).moved(laser) for hole in p.holes if _driver_passes(p, hole)]
-        body = body.fuse(hub).cut(*lidar_room, *free)
+        hub = _hub(p)
+        body = body.fuse(hub).cut(*lidar_room, *drivers)
         body = checked(body, PART, "hub", "h", f"{stack.h} mm")
     with building(PART, "holes and marks", "h", f"{stack.h} mm"):
-        under = p.seat - PLATE_THICKNESS - 2.0
-        holes = [solids.upright(p.screw_hole / 2, under, p.seat + 1.0, *hole).moved(laser) for hole in p.holes]
+        holes = [shape.moved(laser) for shape in _holes(p)]
         marks = [shape.moved(laser) for shape in _plate_marks(p)]
-        body = body.cut(*holes, *marks, *_clamps(p), _index_groove(p), _bore(p)).clean()
+        body = body.cut(*holes, *marks, *_clamps(p), *_wires(p), _index_groove(p), _bore(p)).clean()
         body = checked(body, PART, "holes and marks", "h", f"{stack.h} mm")
     bottom = body.BoundingBox().zmin
     if abs(bottom - stack.hub_bottom) > 1e-3:
@@ -147,7 +155,11 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
 
 
 def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
-    """Hull of the hub's core, raised to just under the lidar, and the plate.
+    return solids.hull(_neck_corners(p, attempt))
+
+
+def _neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
+    """Of the hub's core, raised to just under the lidar, and of the plate: the neck is their hull, shape (n, 3).
 
     No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
     """
@@ -157,12 +169,12 @@ def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     R = stack.R()
     under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
     top = min(max(-stack.h, under_body), 40.0 - stack.h)
-    layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.hub_bottom + 1.5, top)]
+    layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.shoulder + 1.5, top)]
     outline = solids.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
-    for z in (p.seat - 0.2, p.seat - PLATE_THICKNESS + 0.5):
+    for z in (p.top - 0.2, p.top - PLATE_THICKNESS + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
     layers.append(_heel(np.concatenate(layers[2:]), stack))
-    return solids.hull(np.concatenate(layers))
+    return np.concatenate(layers)
 
 
 def _heel(plate: Array, stack: Stack) -> Array:
@@ -171,33 +183,55 @@ def _heel(plate: Array, stack: Stack) -> Array:
     if len(lower) == 0:
         return plate
     tilt_sine = math.hypot(stack.R()[2, 0], stack.R()[2, 1])
-    room = float(lower[:, 2].min()) - stack.hub_bottom - 2.0
+    room = float(lower[:, 2].min()) - stack.shoulder - 2.0
     return lower - [0.0, 0.0, max(0.0, min(HEEL * tilt_sine**2, room))]
 
 
 def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
     """What must stay free so that the lidar can be put in along its own z: body and cables, swept upwards."""
-    (x0, y0, z0), (x1, y1, _) = p.body
-    room = [solids.box((x0, y0, z0), (x1, y1, FAR))]
+    (x0, y0, _), (x1, y1, _) = p.body
+    room = [solids.box((x0, y0, p.top), (x1, y1, FAR))]
+    if p.ears is not None:
+        (x0, y0, _), (x1, y1, _) = p.ears
+        room.append(solids.box((x0, y0, p.top), (x1, y1, FAR)))
     for (cx0, cy0, cz0), (cx1, cy1, _) in p.cables:
         room.append(solids.box((cx0, cy0, cz0), (cx1, cy1, FAR)))
     return room
 
 
-def _driver(p: AlignmentLinkage, hole: tuple[float, float]) -> cq.Solid:
-    """Head and driver of one base screw, from the plate's lower face along -z of the laser frame."""
-    return solids.upright(p.screw.head_room, p.seat - PLATE_THICKNESS - 150.0, p.seat - PLATE_THICKNESS, *hole)
+def _plate(p: AlignmentLinkage) -> cq.Shape:
+    """The plate, and under a sub-plate its ears."""
+    low = p.top - PLATE_THICKNESS
+    plate: cq.Shape = solids.prism(solids.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
+    if p.ears is None:
+        return plate
+    (x0, y0, _), (x1, y1, _) = p.ears
+    return plate.fuse(solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, p.top)))
 
 
-def _driver_passes(p: AlignmentLinkage, hole: tuple[float, float]) -> bool:
-    """Whether the driver's way misses the hub, or takes no more than its rim."""
-    stack = p.stack
-    R = stack.R()
-    depth = np.linspace(0.0, 150.0, 601)
-    line = np.array([*hole, p.seat - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
-    near = np.abs(line[:, 2] + stack.h + HUB_HEIGHT / 2) < HUB_HEIGHT / 2 + p.screw.head_room
-    reach = np.hypot(line[near, 0], line[near, 1])
-    return not near.any() or float(reach.min()) > stack.shaft_diameter / 2 + 3.0 + p.screw.head_room
+def _drivers(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
+    if p.ears is not None:
+        return []
+    low = p.top - PLATE_THICKNESS
+    return [solids.upright(p.screw.head_room, low - 150.0, low, *hole) for hole in p.holes]
+
+
+def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
+    if p.ears is None:
+        low = p.top - PLATE_THICKNESS - 2.0
+        return [solids.upright(p.screw_hole / 2, low, p.top + 1.0, *hole) for hole in p.holes]
+    pocket = p.top - p.screw.head_height - 0.5
+    pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
+    low = p.top - PLATE_THICKNESS - 1.0
+    return pockets + [solids.upright(EAR_SCREW.core / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
+
+
+def _grown(box: Box) -> Box:
+    """A box with the lidar's gap around its sides."""
+    (x0, y0, z0), (x1, y1, z1) = box
+    return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
 def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
@@ -229,6 +263,38 @@ def _clamp_azimuths(normal: Array) -> tuple[float, ...]:
     return middle - math.pi / 4, middle + math.pi / 4
 
 
+def _hub(p: AlignmentLinkage) -> cq.Shape:
+    """The hub, and below its shoulder the journal of the bearing with a step that only the inner ring touches."""
+    stack = p.stack
+    hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
+    if stack.bearing is None:
+        return hub
+    step = solids.upright(stack.bearing.bore_mm / 2 + INNER_RING, stack.bearing_top, stack.shoulder + 1.0)
+    return hub.fuse(step, solids.upright(_journal_radius(p), stack.hub_bottom, stack.shoulder + 1.0))
+
+
+def _journal_radius(p: AlignmentLinkage) -> float:
+    """A light press in the bearing: half of the sliding fit."""
+    bearing = p.stack.bearing
+    return 0.0 if bearing is None else bearing.bore_mm / 2 - p.fit / 4
+
+
+def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Channel between the two radial screws: along the journal, inside the bearing, then out over the cage."""
+    stack = p.stack
+    if stack.bearing is None or stack.ring_length == 0:
+        return []
+    inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
+    low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
+    channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
+    return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
+
+
+def _free_side(p: AlignmentLinkage) -> float:
+    """Azimuth between the two radial screws."""
+    return sum(p.clamp_azimuths) / 2
+
+
 def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
     stack = p.stack
     cuts = []
@@ -251,17 +317,18 @@ def _bore(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _index_groove(p: AlignmentLinkage) -> cq.Solid:
+    """At the hub's lower end, or above the wires where they leave at +y."""
     stack = p.stack
-    return solids.prism(solids.diamond(1.0, stack.hub_radius), stack.hub_bottom - 1.0, stack.hub_bottom + 4.0)
+    low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
+    if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:
+        low, high = -stack.h - 5.0, -stack.h + 1.0
+    return solids.prism(solids.diamond(1.0, stack.hub_radius), low, high)
 
 
 def _plate_marks(p: AlignmentLinkage) -> list[cq.Solid]:
-    """FRONT: a V in the edge at +x; below the cables a square notch at -x. Laser frame."""
-    under = p.seat - PLATE_THICKNESS - 1.0
-    x = p.half_x
-    front = np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + 1.0, 4.0]])
-    rear = np.array([[-x - BODY_GAP - 1.0, -4.0], [3.0 - x, -4.0], [3.0 - x, 4.0], [-x - BODY_GAP - 1.0, 4.0]])
-    return [solids.prism(outline, under, p.seat + 1.0) for outline in (front, rear)]
+    """FRONT: a V in the edge at +x; below the cables a square notch at -x. Laser frame; half the plate deep."""
+    x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
+    return [solids.prism(outline, p.top - PLATE_THICKNESS / 2, p.top + 1.0) for outline in plate_marks(x)]
 
 
 def _largest(shape: cq.Shape) -> cq.Shape:

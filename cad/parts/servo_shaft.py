@@ -2,7 +2,9 @@
 
 Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm. Horn flange with the horn's holes and a pocket for its
 boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends could
-not pass the ring. Length and shape do not depend on the angles: one shaft serves every linkage.
+not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and bearing
+are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do not
+depend on the scan plane: one shaft serves every linkage.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.sizing import SPIGOT, Stack, horn_screw
+from cad.loads import WAIST, waist_radius_mm
+from cad.sizing import Stack, horn_screw
 from cad.solids import building, checked
 from design.scanner import Scanner
 
@@ -62,10 +65,12 @@ def servo_shaft(p: ServoShaft) -> cq.Solid:
         body = body.fuse(solids.upright(radius, horn, stack.spigot_top))
         body = checked(body, PART, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm")
     with building(PART, "holes, flat and marks", "horn_circle_mm", p.circle):
-        low = (-2 * radius, stack.flat, stack.spigot_top - SPIGOT)
+        low = (-2 * radius, stack.flat, stack.hub_bottom)
         cuts = [solids.box(low, (2 * radius, 2 * radius, stack.spigot_top + 1.0)), *_holes(p), _index_groove(p)]
         if p.boss_radius > 0.2:
             cuts.append(solids.upright(p.boss_radius, horn - 1.0, horn + p.boss_depth))
+        if stack.bearing is not None:
+            cuts.append(_waist(stack))
         return checked(body.cut(*cuts).clean(), PART, "holes, flat and marks", "horn_circle_mm", p.circle)
 
 
@@ -74,6 +79,16 @@ def _holes(p: ServoShaft) -> list[cq.Solid]:
     first = math.radians(90.0 + p.first_hole_deg)
     centres = solids.polygon(p.circle / 2, p.holes, first)
     return [solids.upright(p.hole / 2, low, high, float(x), float(y)) for x, y in centres]
+
+
+def _waist(stack: Stack) -> cq.Solid:
+    """What is turned off: its ends slope at 45 deg, an edge would crack."""
+    radius, waist = stack.shaft_diameter / 2, waist_radius_mm(stack)
+    slope = radius - waist
+    low = stack.horn + stack.collar_height
+    high = low + WAIST + slope
+    outer = radius + 1.0
+    return solids.lathe([[outer, low], [waist, low], [waist, low + WAIST], [outer, high + 1.0]])
 
 
 def _index_groove(p: ServoShaft) -> cq.Solid:

@@ -1,0 +1,66 @@
+"""One check: what was measured, against what, and where; and `checks.json`, the list of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+Severity = Literal["pass", "note", "warning", "error"]
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One measured value.
+
+    Attributes:
+        kind: what was checked.
+        severity: pass; note, where there is nothing to pass; warning, where a person should look; error, where it
+            failed.
+        value: measured, None where it could not be.
+        limit: what the value must keep, None where it only informs.
+        unit: of both.
+        where: part, or parts.
+        message: one line for a person.
+    """
+
+    kind: str
+    severity: Severity
+    value: float | None
+    limit: float | None
+    unit: str
+    where: str
+    message: str
+
+
+def at_most(kind: str, value: float, limit: float, unit: str, where: str, what: str) -> Check:
+    """A check that fails above its limit."""
+    fails = value > limit
+    relation = "over" if fails else "of"
+    message = f"{where}: {what}: {value:.3g} {unit}, {relation} {limit:.3g}"
+    return Check(kind, "error" if fails else "pass", tidy(value), tidy(limit), unit, where, message)
+
+
+def at_least(kind: str, value: float, limit: float, unit: str, where: str, what: str) -> Check:
+    """A check that fails below its limit."""
+    fails = value < limit
+    message = f"{where}: {what}: {value:.3g} {unit}, {'under' if fails else 'at least'} {limit:.3g}"
+    return Check(kind, "error" if fails else "pass", tidy(value), tidy(limit), unit, where, message)
+
+
+def note(kind: str, value: float | None, unit: str, where: str, what: str) -> Check:
+    """A value to know."""
+    shown = "not known" if value is None else f"{value:.3g} {unit}"
+    return Check(kind, "note", None if value is None else tidy(value), None, unit, where, f"{where}: {what}: {shown}")
+
+
+def checks_text(checks: Iterable[Check]) -> str:
+    """`checks.json`."""
+    content = {"schema": "scanwright/checks/1", "checks": [asdict(check) for check in checks]}
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def tidy(value: float) -> float:
+    """Four digits: the last bits of a kernel's volumes are no measurement."""
+    return float(f"{value:.4g}") + 0.0

@@ -1,0 +1,169 @@
+"""That nothing meets anything, in any position of the servo. Millimetres.
+
+A turning body and a standing one meet at some axis angle if and only if their images (r, z) in the half plane about
+the axis overlap, and the distance of the images is the least distance over a whole turn: no stepping. The image of a
+triangle is drawn by its horizontal chords, so that it is right within CHORD. Bodies that move together are intersected
+as solids.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import manifold3d
+import numpy as np
+import shapely  # type: ignore[import-untyped]
+
+from cad.assembly import turns
+from cad.checks.check import Check, at_least, at_most
+from cad.mesh import Mesh
+from design.frames import Array
+
+CHORD = 0.01  # error of an image's edges
+LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
+CLEARANCE = 0.4  # between what turns and what stands still
+FAR = 5.0  # distances beyond it are not worked out
+SHARED_MM3 = 0.05  # of two bodies that touch: the noise of their meshes
+UNITS = (("servo_case", "servo_horn"), ("ring_stator", "ring_rotor"), ("bearing_outer", "bearing_inner"))
+
+
+def clearance_checks(meshes: Mapping[str, Mesh]) -> list[Check]:
+    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together."""
+    return [_turning(meshes), _together(meshes)]
+
+
+def distance_over_a_turn(one: Mesh, other: Mesh) -> float:
+    """Least distance of a turning and a standing body at any axis angle; 0 where they meet."""
+    if _holds(one, other) or _holds(other, one):
+        return 0.0
+    return _distance(_image(one), _image(other))
+
+
+def _turning(meshes: Mapping[str, Mesh]) -> Check:
+    images = {name: _image(mesh) for name, mesh in meshes.items()}
+    nearest, where = FAR, "everything that turns"
+    for rotor in sorted(name for name in meshes if turns(name)):
+        for stator in sorted(name for name in meshes if not turns(name)):
+            if (stator, rotor) in UNITS:
+                continue
+            inside = _holds(meshes[rotor], meshes[stator]) or _holds(meshes[stator], meshes[rotor])
+            distance = 0.0 if inside else _distance(images[rotor], images[stator])
+            if distance < nearest:
+                nearest, where = distance, f"{rotor} and {stator}"
+    return at_least("clearance", nearest, CLEARANCE, "mm", where, "least distance over a whole turn")
+
+
+def _together(meshes: Mapping[str, Mesh]) -> Check:
+    most, where = 0.0, "parts that move together"
+    bodies = {name: _manifold(mesh) for name, mesh in meshes.items()}
+    names = sorted(meshes)
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            if turns(one) != turns(other) or _apart(meshes[one], meshes[other]):
+                continue
+            volume = float((bodies[one] ^ bodies[other]).volume())
+            if volume > most:
+                most, where = volume, f"{one} and {other}"
+    return at_most("interference", most, SHARED_MM3, "mm3", where, "room that two parts share")
+
+
+def _distance(one: Array, other: Array) -> float:
+    """Least distance of two sets of shapes in the half plane, FAR where it is more."""
+    low, high = shapely.total_bounds(one), shapely.total_bounds(other)
+    gap = np.maximum(0.0, np.maximum(low[:2] - high[2:], high[:2] - low[2:]))
+    if float(np.hypot(*gap)) >= FAR:
+        return FAR
+    tree = shapely.STRtree(other)
+    _, distances = tree.query_nearest(one, max_distance=FAR, return_distance=True, all_matches=False)
+    return float(distances.min(initial=FAR))
+
+
+def _image(mesh: Mesh) -> Array:
+    """Shapes in the half plane that cover the surface at every axis angle, each once."""
+    corners = mesh.vertices[mesh.faces]
+    radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
+    across = np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1)
+    # the chord of an arc of radius r and length s is off by s^2 / 8 r; r of the nearest corner, seldom of the inside
+    wanted = 1.0 + across / np.sqrt(8 * CHORD * np.maximum(radius.min(axis=1) - across / 2, 0.5))
+    shapes: list[Array] = []
+    for few, many in zip((0, *LEVELS), LEVELS, strict=False):
+        chosen = (wanted > few) & ((wanted <= many) | (many == LEVELS[-1]))
+        if chosen.any():
+            outlines = _outlines(corners[chosen], many)
+            shapes.append(np.unique(np.round(outlines, 3).reshape(len(outlines), -1), axis=0).reshape(-1, 2 * many, 2))
+    found = np.concatenate([shapely.linearrings(rings) for rings in shapes])
+    return np.asarray(shapely.make_valid(shapely.polygons(found)))
+
+
+def _outlines(corners: Array, levels: int) -> Array:
+    """Outlines (r, z) of triangles: at each level from lowest to highest the nearest and furthest point, (m, 2n, 2)."""
+    order = np.argsort(corners[:, :, 2], axis=1, kind="stable")
+    low, middle, high = (np.take_along_axis(corners, order[:, i, None, None], axis=1)[:, 0] for i in range(3))
+    share = np.linspace(0.0, 1.0, levels)
+    z = low[:, None, 2] + share * (high - low)[:, None, 2]
+    flat = (high[:, 2] - low[:, 2]) < 1e-9
+    one = low[:, None] + share[:, None] * (high - low)[:, None]  # on the long edge
+    other = _on_short_edges(low, middle, high, z)
+    far = np.maximum(np.hypot(one[..., 0], one[..., 1]), np.hypot(other[..., 0], other[..., 1]))
+    along = other[..., :2] - one[..., :2]
+    square = np.einsum("mnk,mnk->mn", along, along)
+    foot = -np.einsum("mnk,mnk->mn", one[..., :2], along) / np.where(square > 0, square, 1.0)
+    point = one[..., :2] + np.clip(foot, 0.0, 1.0)[..., None] * along
+    near = np.hypot(point[..., 0], point[..., 1])
+    if flat.any():
+        near[flat], far[flat], z[flat] = _flat(corners[flat], levels)
+    return np.concatenate([np.stack([near, z], axis=2), np.stack([far, z], axis=2)[:, ::-1]], axis=1)
+
+
+def _on_short_edges(low: Array, middle: Array, high: Array, z: Array) -> Array:
+    """Points at heights z on the path low - middle - high."""
+    below = z <= middle[:, None, 2]
+    start = np.where(below[..., None], low[:, None], middle[:, None])
+    end = np.where(below[..., None], middle[:, None], high[:, None])
+    rise = end[..., 2] - start[..., 2]
+    share = np.where(rise > 1e-12, (z - start[..., 2]) / np.where(rise > 1e-12, rise, 1.0), 0.0)
+    return start + share[..., None] * (end - start)
+
+
+def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
+    """A horizontal triangle is a line in the half plane."""
+    ends = np.roll(corners, -1, axis=1)
+    along = ends[..., :2] - corners[..., :2]
+    square = np.einsum("mek,mek->me", along, along)
+    foot = np.clip(-np.einsum("mek,mek->me", corners[..., :2], along) / np.maximum(square, 1e-18), 0.0, 1.0)
+    reach = np.linalg.norm(corners[..., :2] + foot[..., None] * along, axis=2).min(axis=1)
+    cross = along[..., 0] * corners[..., 1] - along[..., 1] * corners[..., 0]
+    around_axis = (cross > 0).all(axis=1) | (cross < 0).all(axis=1)
+    near = np.where(around_axis, 0.0, reach)
+    far = np.linalg.norm(corners[..., :2], axis=2).max(axis=1)
+    return tuple(np.repeat(values[:, None], levels, axis=1) for values in (near, far, corners[:, 0, 2]))
+
+
+def _holds(outer: Mesh, inner: Mesh) -> bool:
+    """Whether a corner of `inner` lies in `outer`: crossings of one ray, counted."""
+    point = inner.vertices[0]
+    low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
+    if not ((point > low) & (point < high)).all():
+        return False
+    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
+    ray = np.array([0.5377, 0.3021, math.sqrt(1 - 0.5377**2 - 0.3021**2)])  # along no edge of any part
+    p = np.cross(ray, c - a)
+    det = np.einsum("ij,ij->i", b - a, p)
+    safe = np.where(np.abs(det) > 1e-12, det, 1.0)
+    u = np.einsum("ij,ij->i", point - a, p) / safe
+    q = np.cross(point - a, b - a)
+    v, t = q @ ray / safe, np.einsum("ij,ij->i", c - a, q) / safe
+    crossed = (np.abs(det) > 1e-12) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+    return bool(crossed.sum() % 2)
+
+
+def _apart(one: Mesh, other: Mesh) -> bool:
+    gap = np.maximum(
+        one.vertices.min(axis=0) - other.vertices.max(axis=0), other.vertices.min(axis=0) - one.vertices.max(axis=0)
+    )
+    return bool(gap.max() > 0)
+
+
+def _manifold(mesh: Mesh) -> manifold3d.Manifold:
+    return manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))

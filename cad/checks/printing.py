@@ -1,0 +1,81 @@
+"""Whether each printed part can be printed as it lies on the bed. Millimetres.
+
+A wall is measured from points all over the surface straight through to the other side, and counts where the other side
+is parallel: a wedge thins to nothing at its edge on every sharp corner, and prints. A thin spot is a flaw; where they
+make up more than THIN_SHARE of the surface, the part is not what was meant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import cadquery as cq
+import numpy as np
+
+from cad.checks.check import Check, at_least, at_most, note, tidy
+from cad.holes import rounds_of
+from cad.mesh import Mesh
+from cad.print_pose import PrintPose, print_pose
+from design import scene
+from design.catalogue import Printer
+from design.frames import Array
+
+POINTS = 6000  # per part
+THIN_SHARE = 0.01
+PARALLEL = math.cos(math.radians(15.0))
+SMALLEST_HOLE = 1.5  # diameter; smaller ones close
+
+
+def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, Mesh]) -> list[Check]:
+    """Bed, support, walls and holes of every printed part, as it lies on the bed."""
+    checks = []
+    for name, solid in printed.items():
+        pose = print_pose(meshes[name], printer.bed_mm)
+        checks.append(_bed(name, pose, printer))
+        checks.append(note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg"))
+        checks.append(_walls(name, meshes[name], printer))
+        holes = [feature.diameter for feature in rounds_of(solid) if feature.hole]
+        if holes:
+            checks.append(at_least("smallest_hole", min(holes), SMALLEST_HOLE, "mm", name, "smallest hole"))
+    return checks
+
+
+def thin_walls(mesh: Mesh, least_mm: float) -> tuple[float, float]:
+    """Area of parallel walls thinner than a least thickness, and the whole surface [mm2]."""
+    points, normals, area = _surface(mesh)
+    solid = scene.scene_of(mesh.vertices[mesh.faces] / 1000)
+    inside = 1e-6  # m, below the surface
+    hits = scene.cast(solid, points / 1000 - inside * normals, -normals)
+    parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL)
+    thin = parallel & (1000 * (hits.range_m + inside) < least_mm)
+    return area * int(thin.sum()) / POINTS, area
+
+
+def _walls(name: str, mesh: Mesh, printer: Printer) -> Check:
+    thin, whole = thin_walls(mesh, printer.min_wall_mm)
+    what = f"walls thinner than {printer.min_wall_mm:g} mm"
+    check = at_most("wall", thin, THIN_SHARE * whole, "mm2", name, what)
+    return replace(check, severity="warning") if check.severity == "pass" and thin > 0 else check
+
+
+def _bed(name: str, pose: PrintPose, printer: Printer) -> Check:
+    worst = max(range(3), key=lambda i: pose.size_mm[i] / printer.bed_mm[i])
+    size = " x ".join(f"{edge:.0f}" for edge in pose.size_mm)
+    return at_most("bed", tidy(pose.size_mm[worst]), printer.bed_mm[worst], "mm", name, f"{size} mm on {printer.name}")
+
+
+def _surface(mesh: Mesh) -> tuple[Array, Array, float]:
+    """Points spread over the surface by area, their normals, and the whole area: the same ones every time."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    cross = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(cross, axis=1)
+    upto = np.cumsum(doubled)
+    where = (np.arange(POINTS) + 0.5) / POINTS * upto[-1]
+    face = np.searchsorted(upto, where)
+    # a low-discrepancy pair inside each triangle
+    u = np.sqrt((0.5 + np.arange(POINTS) * 0.7548776662466927) % 1.0)
+    v = (0.5 + np.arange(POINTS) * 0.5698402909980532) % 1.0
+    points = (1 - u)[:, None] * a[face] + (u * (1 - v))[:, None] * b[face] + (u * v)[:, None] * c[face]
+    return points, cross[face] / doubled[face, None], float(upto[-1] / 2)

@@ -1,0 +1,1 @@
+"""One sheet per part: three views, an isometric, views onto inclined hole patterns, dimensions; PDF, DXF and SVG."""

@@ -1,0 +1,117 @@
+"""`drawings/<part>.pdf`, `.dxf` and `.svg` of every made part."""
+
+from __future__ import annotations
+
+import math
+
+from cad.assembly import Assembly
+from cad.bom import drawing_number
+from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
+from cad.drawings.patterns import number
+from cad.drawings.sheet import Sheet, Title, sheet_of
+from cad.drawings.views import views_of
+from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.holes import Round
+from cad.joints import Joint
+from design.scanner import Scanner
+
+AT_M = 10.0  # distance at which a wrong angle is judged
+
+
+def drawing_files(
+    scanner: Scanner,
+    assembly: Assembly,
+    rounds: dict[str, list[Round]],
+    joints: list[Joint],
+    masses_g: dict[str, float],
+    turned: set[str],
+    config_hash: str,
+) -> dict[str, bytes]:
+    """Draw every made part; `rounds` are its cylinders, the other arguments those of `bom.items_of`."""
+    files: dict[str, bytes] = {}
+    for name in assembly.made:
+        sheet = drawing_of(name, scanner, assembly, rounds[name], joints, masses_g[name], turned, config_hash)
+        files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
+        files[f"drawings/{name}.svg"] = svg_bytes(sheet)
+        files[f"drawings/{name}.dxf"] = dxf_text(sheet).encode("utf-8")
+    return files
+
+
+def drawing_of(
+    name: str,
+    scanner: Scanner,
+    assembly: Assembly,
+    rounds: list[Round],
+    joints: list[Joint],
+    mass_g: float,
+    turned: set[str],
+    config_hash: str,
+) -> Sheet:
+    """The sheet of one part."""
+    lidar_axis = assembly.stack.R()[:, 2] if name in _carriers(joints) else None
+    metal = name in turned
+    half_fit = number(scanner.printer.fit_clearance_mm / 2)
+    part = part_of(assembly.made[name], rounds, lidar_axis, f"  0/-{half_fit}" if metal else "")
+    views = views_of(part)
+    material = "aluminium or steel, turned" if metal else f"{scanner.printer.name}, solid"
+    cells = (
+        ("part", name),
+        ("task", scanner.angles.task),
+        ("drawing number", drawing_number(config_hash, name, assembly)),
+        ("material", material),
+        ("mass", f"{mass_g:.1f} g"),
+        ("configuration", config_hash),
+        ("general tolerances", "ISO 2768-m" if metal else "ISO 2768-c"),
+        ("made by", "scanwright"),
+    )
+    notes = _notes(scanner, part, metal)
+    return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
+
+
+def _carriers(joints: list[Joint]) -> set[str]:
+    """The part that the lidar is screwed to, and the one that this is screwed to in turn."""
+    seats = {joint.part for joint in joints if joint.onto.startswith("lidar")}
+    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing == "thread"} - {"lidar_body"}
+
+
+def _notes(scanner: Scanner, part: Part, metal: bool) -> list[str]:
+    printer, angles = scanner.printer, scanner.angles.angles_deg
+    box = part.solid.BoundingBox()
+    notes = [
+        "Millimetres. Ordinates run from the rotation axis (X, Y) and the lowest point (Z), azimuths from +Y.",
+        f"Z 0 is {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
+        f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
+    ]
+    if metal:
+        notes.append(f"Outer diameters 0/-{number(printer.fit_clearance_mm / 2)}: half of the fit in the printed hub.")
+    else:
+        notes.append(
+            f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
+            f"fits {number(printer.fit_clearance_mm)} on the diameter."
+        )
+    inclined = [p for p in part.patterns if len(p.holes) >= 3 and abs(p.direction[2]) < 1 - 1e-6]
+    for pattern in inclined[:1]:
+        x, y, z = (number(float(c)) for c in pattern.centre - [0.0, 0.0, part.datum])
+        notes.append(f"Middle of {pattern.words()}, lower ends: X {x}, Y {y}, Z {z}.")
+    if part.lidar_axis is not None:
+        normal = part.lidar_axis
+        tilt = math.degrees(math.acos(min(1.0, float(normal[2]))))
+        limit = math.degrees(math.atan2(scanner.lidar.range_sigma_mm, AT_M * 1000))
+        notes.append(
+            f"alpha_laser {angles.alpha_laser:g}°, beta_laser {angles.beta_laser:g}°: tilt {number(tilt)}°"
+            + (
+                f" towards {number(azimuth_deg(normal))}° from +Y, counter-clockwise from above."
+                if tilt > 0.01
+                else "."
+            )
+        )
+        seat = -planes_across(part.solid, normal)[0]
+        notes.append(f"The largest face across the lidar's axis lies {number(seat)} below the optical centre.")
+        if any(item.hole for item in part.axial):
+            notes.append(
+                f"Seat to bore within {limit:.2f}°: more moves a point at {AT_M:g} m by the noise of "
+                f"{scanner.lidar.name} ({scanner.lidar.range_sigma_mm:g} mm)."
+            )
+    elif inclined:
+        notes.append(f"alpha_rot {angles.alpha_rot:g}°, beta_rot {angles.beta_rot:g}°: the axis on the deck.")
+    return notes

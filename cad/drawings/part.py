@@ -1,0 +1,66 @@
+"""What a drawing knows of a part: its solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+
+from cad.drawings.patterns import Pattern, on_axis, patterns_of
+from cad.holes import Round
+from design.frames import Array
+
+STRAIGHT = 1e-4  # two directions closer than this are parallel
+PLANE_MM2 = 3.0  # smaller faces get no ordinate
+PLANES = 9  # the largest faces of one direction that do
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a drawing knows of a part.
+
+    Attributes:
+        solid: rotation frame.
+        patterns: its holes beside the axis.
+        axial: its cylinders about the rotation axis.
+        datum: height of the lowest point.
+        lidar_axis: z of the lidar that it carries; None for other parts.
+        tolerance: appended to outer diameters about the axis.
+    """
+
+    solid: cq.Solid
+    patterns: list[Pattern]
+    axial: list[Round]
+    datum: float
+    lidar_axis: Array | None
+    tolerance: str
+
+
+def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, tolerance: str) -> Part:
+    """Read a solid, whose cylinders are known."""
+    axial = [item for item in rounds if on_axis(item)]
+    datum = float(solid.BoundingBox().zmin)
+    return Part(solid, patterns_of(rounds), axial, datum, lidar_axis, tolerance)
+
+
+def parallel(a: Array, b: Array) -> bool:
+    """Whether two unit vectors lie along one line."""
+    return float(np.linalg.norm(np.cross(a, b))) < STRAIGHT
+
+
+def azimuth_deg(direction: Array) -> float:
+    """Of a direction about the rotation axis: from +Y, counter-clockwise from above, 0 to 360."""
+    return round(math.degrees(math.atan2(-direction[0], direction[1])) % 360, 6) % 360
+
+
+def planes_across(solid: cq.Solid, normal: Array) -> list[float]:
+    """Positions of the larger plane faces across a direction, the largest first."""
+    areas: dict[float, float] = {}
+    for face in solid.Faces():
+        if face.geomType() == "PLANE" and parallel(np.array(face.normalAt().toTuple()), normal):
+            place = round(float(np.array(face.Center().toTuple()) @ normal), 2) + 0.0
+            areas[place] = areas.get(place, 0.0) + face.Area()
+    kept = sorted((place for place in areas if areas[place] >= PLANE_MM2), key=lambda place: (-areas[place], place))
+    return kept[:PLANES]

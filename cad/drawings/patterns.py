@@ -1,0 +1,106 @@
+"""Holes that belong together, and what a drawing says of them. Millimetres, rotation frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cad.holes import Round
+from design.frames import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Equal parallel holes.
+
+    Attributes:
+        holes: all of one diameter, direction and height along it.
+        circle: diameter of the circle that they share at equal steps; 0 if none.
+        heads: diameter of the recesses of their screws' heads; 0 if none.
+    """
+
+    holes: tuple[Round, ...]
+    circle: float
+    heads: float = 0.0
+
+    @property
+    def direction(self) -> Array:
+        """Along the holes."""
+        return np.array(self.holes[0].direction)
+
+    @property
+    def centre(self) -> Array:
+        """Middle of the holes' lower ends."""
+        return np.array([hole.low for hole in self.holes]).mean(axis=0)
+
+    def words(self) -> str:
+        """The call-out."""
+        hole = self.holes[0]
+        count = f"{len(self.holes)}x " if len(self.holes) > 1 else ""
+        depth = "THRU" if hole.through else f"x {number(hole.length)} DEEP"
+        circle = f" ON Ø{number(self.circle)}" if self.circle else ""
+        heads = f", Ø{number(self.heads)} FOR HEADS" if self.heads else ""
+        return f"{count}Ø{number(hole.diameter)} {depth}{circle}{heads}"
+
+
+def number(value: float) -> str:
+    """A length or an angle as drawings write it: two decimals at most, no trailing zeros."""
+    text = f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def patterns_of(rounds: list[Round], axis_bore: bool = False) -> list[Pattern]:
+    """Holes grouped by diameter, direction and height; those about the rotation axis only with `axis_bore`."""
+    groups: dict[tuple[float, ...], list[Round]] = {}
+    for hole in rounds:
+        if hole.hole and on_axis(hole) == axis_bore:
+            direction = np.array(hole.direction)
+            height = round(float(np.array(hole.low) @ direction), 1) + 0.0
+            key = (hole.diameter, *np.round(direction, 3).tolist(), height, hole.through)
+            groups.setdefault(key, []).append(hole)
+    return _with_heads([Pattern(tuple(holes), _circle(holes)) for _, holes in sorted(groups.items())])
+
+
+def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
+    """Patterns of screw holes take in the wider holes in line with them."""
+    out: list[Pattern] = []
+    for pattern in patterns:  # by diameter, smallest first
+        carrier = next((other for other in out if all(_in_line(hole, other) for hole in pattern.holes)), None)
+        if carrier is None:
+            out.append(pattern)
+        else:
+            wider = max(carrier.heads, pattern.holes[0].diameter)
+            out[out.index(carrier)] = replace(carrier, heads=wider)
+    return sorted(out, key=lambda pattern: -len(pattern.holes))
+
+
+def _in_line(hole: Round, pattern: Pattern) -> bool:
+    direction = pattern.direction
+    if float(direction @ hole.direction) < 1 - 1e-5:
+        return False
+    aside = [np.array(hole.low) - other.low for other in pattern.holes]
+    return min(float(np.linalg.norm(a - (a @ direction) * direction)) for a in aside) < 0.01
+
+
+def on_axis(item: Round) -> bool:
+    """Whether a cylinder lies about the rotation axis."""
+    return abs(item.direction[2]) > 1 - 1e-6 and math.hypot(item.low[0], item.low[1]) < 1e-3
+
+
+def _circle(holes: list[Round]) -> float:
+    if len(holes) < 3:
+        return 0.0
+    points = np.array([hole.low for hole in holes])
+    centre = points.mean(axis=0)
+    arms = points - centre
+    radii = np.linalg.norm(arms, axis=1)
+    if np.ptp(radii) > 0.01:
+        return 0.0
+    first = arms[0] / radii[0]
+    second = np.cross(holes[0].direction, first)
+    turns = np.sort(np.arctan2(arms @ second, arms @ first))
+    steps = np.diff([*turns, turns[0] + 2 * math.pi])
+    # four on a square are told by their sides
+    return float(2 * radii.mean()) if np.ptp(steps) < 1e-3 and len(holes) != 4 else 0.0

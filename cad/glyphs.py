@@ -1,0 +1,98 @@
+"""Engraved lettering of straight strokes, drawn here: no font file, so the same text is the same groove everywhere.
+
+A glyph is a list of chains on a grid 4 wide and 6 high; grooves are as wide as the stroke, square at their ends.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import cadquery as cq
+import numpy as np
+
+from cad import solids
+from design.frames import Array
+
+ADVANCE = 6.0  # grid units from glyph to glyph
+STROKE = 0.8  # mm: two lines of a 0.4 mm nozzle
+
+# Each chain is a run of grid points, x then y, chains parted by a space.
+GLYPHS = {
+    "0": "0006464000",
+    "1": "152620 1030",
+    "2": "064643030040",
+    "3": "06464000 0343",
+    "4": "060343 4640",
+    "5": "460603434000",
+    "6": "460600404303",
+    "7": "064620",
+    "8": "0006464000 0343",
+    "9": "004046060343",
+    "A": "0004264440 0242",
+    "B": "00063645443303 3342413000",
+    "C": "46060040",
+    "D": "00062644422000",
+    "E": "46060040 0333",
+    "F": "460600 0333",
+    "G": "460600404323",
+    "H": "0006 4046 0343",
+    "I": "2026 1030 1636",
+    "J": "4641301001",
+    "K": "0006 460340",
+    "L": "060040",
+    "M": "0006234640",
+    "N": "00064046",
+    "O": "0006464000",
+    "P": "0006464303",
+    "Q": "0006464000 2240",
+    "R": "0006464303 2340",
+    "S": "460603434000",
+    "T": "0646 2620",
+    "U": "06004046",
+    "V": "062046",
+    "W": "0610243046",
+    "X": "0046 0640",
+    "Y": "062346 2320",
+    "Z": "06460040",
+    ".": "2021",
+    "-": "0343",
+    "+": "0343 2125",
+    "_": "0040",
+    "/": "0046",
+    " ": "",
+}
+
+
+def text_width(text: str, height: float) -> float:
+    """Length of a line of text [mm]."""
+    return (len(text) * ADVANCE - (ADVANCE - 4)) * height / 6 if text else 0.0
+
+
+def grooves(text: str, height: float, x: float, y: float, top: float, depth: float) -> list[cq.Solid]:
+    """What to cut from a face at z = top for one line of text whose lower left corner is at (x, y).
+
+    Args:
+        text: letters, digits and ". - + _ /"; anything else is a blank.
+        height: of capitals [mm].
+        x: left edge.
+        y: base line.
+        top: height of the face.
+        depth: of the grooves.
+    """
+    unit = height / 6
+    cuts = []
+    for i, letter in enumerate(text.upper()):
+        origin = np.array([x + i * ADVANCE * unit, y])
+        for chain in GLYPHS.get(letter, "").split():
+            points = [origin + unit * np.array([int(chain[k]), int(chain[k + 1])]) for k in range(0, len(chain), 2)]
+            cuts += [_groove(a, b, top, depth) for a, b in pairwise(points)]
+    return cuts
+
+
+def _groove(start: Array, end: Array, top: float, depth: float) -> cq.Solid:
+    along = (end - start) / math.dist(start, end)
+    half = STROKE / 2
+    side, over = half * np.array([-along[1], along[0]]), half * along
+    outline = [start - over - side, end + over - side, end + over + side, start - over + side]
+    return solids.prism(outline, top - depth, top + 1.0)

@@ -1,0 +1,122 @@
+"""Round features of a solid, read from its faces: what drawings dimension and screws go through. Millimetres."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.gp import gp_Dir, gp_Lin, gp_Pnt
+from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
+from OCP.TopAbs import TopAbs_REVERSED
+
+from design.frames import Array
+
+LEAST_TURN = math.pi * 1.02  # an arc of less than about half a turn holds no screw and has no diameter to measure
+SAME = 1e-3  # mm, and for directions
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """A hole, or a boss, of one diameter.
+
+    Attributes:
+        diameter: of the cylinder.
+        direction: unit vector along the axis; its largest component is positive.
+        low: end of the axis where `direction` starts.
+        high: the other end.
+        hole: whether the material is outside.
+        through: whether both ends of a hole are open.
+    """
+
+    diameter: float
+    direction: tuple[float, float, float]
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    hole: bool
+    through: bool
+
+    @property
+    def length(self) -> float:
+        """Along the axis."""
+        return math.dist(self.low, self.high)
+
+
+class Piercing:
+    """Where straight lines pierce the surface of a solid; the kernel prepares this once per solid."""
+
+    def __init__(self, solid: cq.Solid) -> None:
+        self._intersector = IntCurvesFace_ShapeIntersector()
+        self._intersector.Load(solid.wrapped, 1e-6)
+
+    def between(self, start: Array, end: Array) -> bool:
+        """Whether the straight way from start to end meets the surface."""
+        along = end - start
+        line = gp_Lin(gp_Pnt(*start.tolist()), gp_Dir(*along.tolist()))
+        self._intersector.Perform(line, 0.0, float(np.linalg.norm(along)))
+        return bool(self._intersector.NbPnt() > 0)
+
+
+def rounds_of(solid: cq.Solid) -> list[Round]:
+    """All cylinders of a solid that go at least half around, in a fixed order."""
+    groups: dict[tuple[float, ...], list[tuple[float, float, float]]] = {}
+    axes: dict[tuple[float, ...], tuple[Array, Array]] = {}
+    for face in solid.Faces():
+        if face.geomType() != "CYLINDER":
+            continue
+        surface = BRepAdaptor_Surface(face.wrapped)
+        cylinder = surface.Cylinder()
+        axis = cylinder.Axis()
+        along = np.array([axis.Direction().X(), axis.Direction().Y(), axis.Direction().Z()])
+        point = np.array([axis.Location().X(), axis.Location().Y(), axis.Location().Z()])
+        direction = _positive(along)
+        foot = point - (point @ direction) * direction
+        base, sense = float(point @ direction), float(along @ direction)
+        low, high = sorted(base + sense * v for v in (surface.FirstVParameter(), surface.LastVParameter()))
+        hole = (face.wrapped.Orientation() == TopAbs_REVERSED) == cylinder.Position().Direct()
+        key = (float(hole), round(2 * cylinder.Radius(), 3), *(np.round([*direction, *foot], 3) + 0.0).tolist())
+        groups.setdefault(key, []).append((low, high, surface.LastUParameter() - surface.FirstUParameter()))
+        axes.setdefault(key, (direction, foot))
+    piercing = Piercing(solid)
+    found = []
+    for key, pieces in sorted(groups.items()):
+        direction, foot = axes[key]
+        hole = bool(key[0])
+        for low, high, turn in _joined(pieces):
+            if turn < LEAST_TURN or high - low < SAME:
+                continue
+            beyond = foot + (low - 0.05) * direction, foot + (high + 0.05) * direction
+            through = hole and not piercing.between(*beyond)
+            ends = _triple(foot + low * direction), _triple(foot + high * direction)
+            found.append(Round(key[1], _triple(direction), *ends, hole, through))
+    return found
+
+
+def _joined(pieces: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:
+    """Faces of one cylinder that touch along its axis, as (low, high, turn): the turn of the widest height."""
+    joined: list[list[tuple[float, float, float]]] = []
+    for piece in sorted(pieces):
+        if joined and piece[0] <= max(other[1] for other in joined[-1]) + SAME:
+            joined[-1].append(piece)
+        else:
+            joined.append([piece])
+    out = []
+    for group in joined:
+        heights = [(low + high) / 2 for low, high, _ in group]
+        turn = max(sum(t for low, high, t in group if low <= z <= high) for z in heights)
+        out.append((min(p[0] for p in group), max(p[1] for p in group), turn))
+    return out
+
+
+def _positive(direction: Array) -> Array:
+    """The direction or its opposite: the largest component is positive, of equal ones the last."""
+    sizes = np.round(np.abs(direction), 6)
+    largest = int(np.flatnonzero(sizes == sizes.max())[-1])
+    return direction if direction[largest] > 0 else -direction
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 6) + 0.0 for v in values)
+    return x, y, z

@@ -1,0 +1,73 @@
+"""Fins: thin skins that a convex neck, tapering to an edge, leaves beside what is cut out of it. Laser frame, mm."""
+
+from __future__ import annotations
+
+import math
+
+import cadquery as cq
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from cad import solids
+from cad.sizing import Box
+from design.frames import Array
+
+FAR = 200.0  # beyond any linkage
+THIN = 3.0  # what would stand thinner than this is cut off
+
+
+def fins_beside(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> list[cq.Shape]:
+    """What the tapering hull would leave thinner than THIN beside the lidar and outside its cables.
+
+    On each side: all beyond it, less the prism over where the hull is thicker than THIN there. No face lies in one of
+    the hull or of the lidar's room: the prism is drawn in a little, the room reached into.
+
+    Args:
+        top: height of the plate.
+        body: room of the lidar.
+        cables: rooms of its cables.
+        corners: of the neck, shape (n, 3).
+    """
+    planes = np.unique(np.round(ConvexHull(corners).equations, 7), axis=0)
+    (x0, y0, _), (x1, y1, _) = body
+    everywhere = (-FAR, FAR)
+    sides = [(axis, edge, everywhere, top + 0.3) for axis, edge in ((0, x0), (0, x1), (1, y0), (1, y1))]
+    for (cx0, cy0, cz0), (cx1, cy1, _) in cables:
+        sides.append((1, cy0 if cy0 < 0 else cy1, (cx0, cx1 - 1.4), cz0 + 0.3))
+    cuts: list[cq.Shape] = []
+    for axis, edge, reach, above in sides:
+        outward, up = math.copysign(1.0, edge) * np.eye(3)[axis], np.array([0.0, 0.0, 1.0])
+        along = np.cross(up, outward)
+        first, last = sorted(float(along[1 - axis]) * end for end in reach)
+        beside: cq.Shape = solids.box((first, above, -0.5), (last, FAR, FAR))
+        thick = _thick(planes, outward, abs(edge), np.stack([along, up], axis=1))
+        if thick is not None:
+            beside = beside.cut(solids.prism(thick, -1.0, FAR + 1.0))
+        frame = np.stack([along, up, outward], axis=1)
+        cuts.append(beside.moved(solids.location(frame, edge * np.eye(3)[axis])))
+    return cuts
+
+
+def _thick(planes: Array, outward: Array, edge: float, onto: Array) -> Array | None:
+    """Outline, 0.3 mm drawn in, of where a hull goes on for THIN beyond an edge, shape (n, 2); None where nowhere.
+
+    That is the shadow of the hull, itself moved by THIN, and the half space beyond the edge, all cut with each other.
+
+    Args:
+        planes: of the hull.
+        outward: unit vector away from the lidar.
+        edge: distance of the edge from the lidar's axis.
+        onto: the two directions of the shadow, shape (3, 2).
+    """
+    moved = planes + np.outer(THIN * planes[:, :3] @ outward, [0.0, 0.0, 0.0, 1.0])
+    sides = np.vstack([planes, moved, [*-outward, edge]])
+    # the largest ball inside
+    rows = np.column_stack([sides[:, :3], np.ones(len(sides))])
+    best = linprog([0.0, 0.0, 0.0, -1.0], A_ub=rows, b_ub=-sides[:, 3], bounds=[(None, None)] * 3 + [(0, None)])
+    if not best.success or best.x[3] < THIN / 6:
+        return None
+    shadow = np.asarray(HalfspaceIntersection(sides, best.x[:3]).intersections) @ onto
+    drawn_in = ConvexHull(shadow).equations + np.array([0.0, 0.0, 0.3])
+    corners = np.asarray(HalfspaceIntersection(drawn_in, best.x[:3] @ onto).intersections)
+    return np.asarray(corners[ConvexHull(corners).vertices])

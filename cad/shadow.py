@@ -1,0 +1,150 @@
+"""What the parts hide of the fan: rays against their meshes, and the closed form that bounds it from below.
+
+A beam is a bundle: its middle and BEAM_RAYS around it, on the rim of what the laser sends out, which widens with the
+distance. A beam counts as hidden if any of the bundle is: what is cut partly answers partly from the own body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cad.sizing import CAGE_SEAT_WALL, WINDOWS_REACH, Stack, stack_of
+from design import scene
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+from design.shadow import AXIS_STEPS, Mask, Refused, Shadow
+
+if TYPE_CHECKING:
+    from cad.mesh import Mesh
+
+APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
+SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
+BEAM_RAYS = 6
+STRIP = 0.3  # mm under the top of a ring's stator that its drawing does not vouch for
+
+
+@dataclass(frozen=True, slots=True)
+class PartsWorkshop:
+    """The `Workshop` of `design/shadow.py` for one set of products: `scanner.angles` are replaced by each setting."""
+
+    scanner: Scanner
+
+    def bound(self, setting_rad: Array) -> Shadow | Refused:
+        """The cone that ring, bearing and cage fill in any case."""
+        try:
+            stack = stack_of(_at(self.scanner, setting_rad))
+        except BuildError as error:
+            return Refused(str(error))
+        bearings = self.scanner.lidar.bearings_rad()
+        return Shadow(beams_in_cone(stack, bearings), None)
+
+    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+        """From the solids of that setting."""
+        from cad.assembly import make_parts
+        from cad.mesh import mesh_of
+
+        scanner = _at(self.scanner, setting_rad)
+        try:
+            assembly = make_parts(scanner)
+        except BuildError as error:
+            return Refused(str(error))
+        meshes = {name: mesh_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+        return shadow_of(scanner, triangles_of(meshes))
+
+
+def triangles_of(meshes: Mapping[str, Mesh]) -> dict[str, Array]:
+    """Corners [m] of every part that stops a beam, shape (t, 3, 3): all but the lidar's window."""
+    return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in meshes.items() if name != "lidar_window"}
+
+
+def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array]) -> Shadow:
+    """What the parts of one scanner hide.
+
+    Args:
+        scanner: angles and lidar.
+        triangles_m: of `triangles_of` every part, made and bought, rotation frame at gamma = 0.
+    """
+    from cad.assembly import turns
+
+    by_motion: dict[bool, list[Array]] = {True: [], False: []}
+    for name, triangles in triangles_m.items():
+        by_motion[turns(name)].append(triangles)
+    origins, directions = bundles(scanner)
+    rotor = _hidden(scene.scene_of(np.concatenate(by_motion[True])), origins, directions)
+    return Shadow(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
+
+
+def bundles(scanner: Scanner) -> tuple[Array, Array]:
+    """Starts [m] and directions of the rays of every beam in the rotation frame at gamma = 0, shape (B, rays, 3)."""
+    bearings = scanner.lidar.bearings_rad()
+    R = scanner.angles.R_rot_laser()
+    along = np.stack([np.cos(bearings), np.sin(bearings), np.zeros_like(bearings)], axis=1) @ R.T
+    across = np.stack([-np.sin(bearings), np.cos(bearings), np.zeros_like(bearings)], axis=1) @ R.T
+    turn = 2 * np.pi * np.arange(BEAM_RAYS) / BEAM_RAYS
+    rim = np.cos(turn)[None, :, None] * across[:, None, :] + np.sin(turn)[None, :, None] * R[:, 2]
+    off = np.concatenate([np.zeros((len(bearings), 1, 3)), rim], axis=1)
+    directions = along[:, None, :] + math.tan(SPREAD_RAD) * off
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    return APERTURE_M * off + scanner.angles.T_rot_laser()[:3, 3], directions
+
+
+def beams_in_cone(stack: Stack, bearings_rad: Array) -> Mask:
+    """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
+    q = stack.R()[2]
+    down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))
+    return np.asarray(down > math.cos(sure_half_angle(stack)))
+
+
+def sure_half_angle(stack: Stack) -> float:
+    """Half angle [rad] of that cone: of solids of revolution only, a little inside their edges."""
+    rims = []
+    if stack.ring_radius > 0:
+        rims.append((stack.ring_radius, stack.ring_top - 1.0 - STRIP))
+    if stack.bearing is not None:
+        rims.append((stack.bearing.outer_mm / 2 + CAGE_SEAT_WALL, stack.cage_top))
+        rims.append((stack.cage_outer - WINDOWS_REACH, stack.cage_roof + WINDOWS_REACH))
+    return max((math.atan2(radius, -z) for radius, z in rims), default=0.0)
+
+
+def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:
+    """Rays that keep farther from -z than all that stands still can never meet it: only the others are cast."""
+    corners = triangles_m.reshape(-1, 3)
+    reach = np.hypot(corners[:, 0], corners[:, 1])
+    widest = float(np.arctan2(reach, -corners[:, 2]).max())
+    nearest = float(np.linalg.norm(corners, axis=1).min())
+    margin = math.asin(min(1.0, float(np.linalg.norm(origins, axis=2).max()) / nearest))
+    polar = np.arccos(np.clip(-directions[:, :, 2], -1.0, 1.0)).min(axis=1)
+    near = np.flatnonzero(polar < widest + margin)
+    hidden = np.zeros((len(directions), AXIS_STEPS), bool)
+    solid = scene.scene_of(triangles_m)
+    for k in range(AXIS_STEPS):
+        gamma = 2 * math.pi * k / AXIS_STEPS
+        c, s = math.cos(gamma), math.sin(gamma)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T
+        hidden[near, k] = _hidden(solid, origins[near] @ turn, directions[near] @ turn)
+    return hidden
+
+
+def _hidden(solid: scene.Scene, origins: Array, directions: Array) -> Mask:
+    """Whether any ray of each bundle meets the solid, shape (B,)."""
+    hits = scene.cast(solid, origins.reshape(-1, 3), directions.reshape(-1, 3))
+    return np.asarray(np.isfinite(hits.range_m).reshape(directions.shape[:2]).any(axis=1))
+
+
+def _at(scanner: Scanner, setting_rad: Array) -> Scanner:
+    """The scanner at another setting, its angles rounded as those that parts are built from."""
+    names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    given = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}
+    angles = scanner.angles.model_copy(
+        update={
+            "angles_deg": scanner.angles.angles_deg.model_copy(update=given),
+            "t_world_rot_mm": (0.0, 0.0, 0.0),
+        }
+    )
+    return replace(scanner, angles=angles)
