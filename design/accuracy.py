@@ -10,20 +10,22 @@ from __future__ import annotations
 import time
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from design.ball_count import ball_count
 from design.beams import beam_directions_rot, polar_and_azimuth, simulated_scan
 from design.density import ball_search, mean_count, zones
-from design.errors import ScanwrightError
+from design.errors import ScanwrightError, TaskError
 from design.frames import Array, R_world_rot
+from design.motion import Sweep
 from design.objective import quick_J
 from design.objectives import log_density
 from design.problem import Problem
 from design.quadrature import breaks_of, rule_of
 from design.sphere import equal_angle_grid
+from design.task import LoadedTask
 
 REPEATS = 5
 SLOW_S = 2.0  # a point slower than this is timed once
@@ -65,6 +67,21 @@ class Reference:
 
     J: float
     J_error: float
+
+
+def as_log(loaded: LoadedTask) -> LoadedTask:
+    """The task with the objective `log`: the report is about densities and their quadrature, whatever is minimised.
+
+    Raises:
+        TaskError: the servo sweeps; the ways compared here are those for axes that turn all around.
+    """
+    if isinstance(loaded.task.motion, Sweep):
+        raise TaskError(
+            f"{loaded.source}: motion.mode = 'sweep': the report compares ways to compute J of a turning scanner; of a "
+            "sweep, `evaluate` prints the spread of J beside its ball search"
+        )
+    density = loaded.task.density.model_copy(update={"objective": "log"})
+    return replace(loaded, task=loaded.task.model_copy(update={"density": density}))
 
 
 def reference(problem: Problem, angles_rad: Array) -> Reference:

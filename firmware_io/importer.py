@@ -19,7 +19,7 @@ from design.errors import RecordingError
 from firmware_io import ros
 from firmware_io.bags import Bag, Source, laser_scan_at, number_at, open_bag, parse_source
 from firmware_io.clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
-from firmware_io.recording import RecordingWriter
+from firmware_io.recording import MessageWriter, RecordingWriter
 from firmware_io.samples import Floats, JointLog, Times
 
 AngleUnit = Literal["deg", "rad"]
@@ -218,7 +218,7 @@ def _scan_warnings(survey: _Survey, clock: OneClock) -> Iterator[str]:
         yield f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
 
 
-def _write(bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: RecordingWriter) -> None:
+def _write(bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: MessageWriter) -> None:
     """Second pass: copy the scans, with the joint samples between them by time."""
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     written = 0

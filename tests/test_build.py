@@ -10,20 +10,28 @@ import scanwright
 from design.angles import load_angles
 from design.build import rounded_to_error
 from design.errors import BuildError
-from design.folder import fresh_folder, is_current
+from design.folder import first_difference, fresh_folder, is_current
 from design.task import load_task
 
+PARTS = ("servo_shaft", "alignment_linkage", "slip_ring_adapter", "base_mount")
 FILES = {
     "task.toml",
     "angles.json",
     "search.csv",
     "density.png",
     "assembly.step",
+    "assembly.glb",
+    "exploded.glb",
+    "assembly.md",
+    "bom.csv",
     "scanner.urdf",
     "left_out.json",
+    "checks.json",
+    "own_body.npz",
     "manifest.json",
-    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in ("servo_shaft", "alignment_linkage")),
-    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in ("slip_ring_adapter", "base_mount")),
+    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
+    *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
+    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part != "servo_shaft"),
 }
 
 
@@ -80,6 +88,46 @@ def test_a_touched_file_is_no_current_build(ceiling):
     assert not is_current(ceiling, loaded)
     table.write_bytes(kept)
     assert is_current(ceiling, loaded)
+
+
+def test_building_again_elsewhere_finds_the_one_file_that_was_touched(ceiling, monkeypatch, capsys):
+    table = ceiling / "task.toml"
+    kept = table.read_bytes()
+    table.write_bytes(kept + b"# mine\n")  # the last of all files by name: every other one is compared before it
+    assert max(FILES - {"manifest.json"}) == "task.toml"
+    monkeypatch.setattr(sys, "argv", ["scanwright", "build", "--check", str(ceiling)])
+    with pytest.raises(SystemExit) as stop:
+        scanwright.run()
+    table.write_bytes(kept)
+    assert stop.value.code == 1
+    assert f"{ceiling}: task.toml: sha256 " in capsys.readouterr().out
+
+
+def _written(folder, files):
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    manifest = {"files": {name: {} for name in files}}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    return folder
+
+
+def test_the_first_difference_of_two_builds_is_named(tmp_path):
+    first = _written(tmp_path / "first", {"a.txt": "a", "parts/b.stl": "b"})
+    assert first_difference(first, _written(tmp_path / "same", {"a.txt": "a", "parts/b.stl": "b"})) is None
+    other = _written(tmp_path / "other", {"a.txt": "a", "parts/b.stl": "B"})
+    assert first_difference(first, other).startswith("parts/b.stl: sha256 ")
+    more = _written(tmp_path / "more", {"a.txt": "a", "b.txt": "b", "parts/b.stl": "b"})
+    assert first_difference(first, more) == "b.txt: missing"
+    assert first_difference(more, first) == "b.txt: the second build has no such file"
+    (first / "a.txt").unlink()
+    assert first_difference(first, other) == "a.txt: missing"
+
+
+def test_a_folder_without_a_manifest_is_no_build(tmp_path):
+    with pytest.raises(BuildError, match=r"manifest\.json: missing or unreadable"):
+        first_difference(tmp_path, _written(tmp_path / "again", {}))
 
 
 def test_a_build_that_fails_leaves_the_last_one_alone(tmp_path):

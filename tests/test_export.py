@@ -18,6 +18,7 @@ BUILD = """
 import hashlib, json, sys
 from pathlib import Path
 from cad.build import build_parts
+from cad.exports import export_scanner
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -28,7 +29,9 @@ scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
 if sys.argv[2] == "again":
     build_parts(scanner, folder, lambda _: None)  # a second build in a process must not count on
 result = build_parts(scanner, folder, lambda _: None)
-print(json.dumps({f: hashlib.sha256((folder / f).read_bytes()).hexdigest() for f in result.files}))
+exports = export_scanner(scanner, result, folder, lambda _: None)
+files = [*result.files, *exports.files]
+print(json.dumps({f: hashlib.sha256((folder / f).read_bytes()).hexdigest() for f in files}))
 """
 
 
@@ -42,8 +45,10 @@ def test_two_processes_write_the_same_bytes(tmp_path):
         )
         for seed, mode in (("1", "once"), ("4242", "again"))
     ]
-    one, other = (json.loads(run.communicate(timeout=100)[0]) for run in runs)
-    assert len(one) == 10  # four parts as STEP and STL, assembly, URDF
+    one, other = (json.loads(run.communicate(timeout=300)[0]) for run in runs)
+    parts = {name.removesuffix(".step") for name in one if name.startswith("parts/") and name.endswith(".step")}
+    assert len(parts) >= 4 and {"assembly.step", "scanner.urdf", "bom.csv", "assembly.md", "assembly.glb"} <= one.keys()
+    assert len(one) == 5 * len(parts) + len(parts) - 1 + 7  # STEP, STL, three drawings; print files of all but one
     assert one == other
 
 
