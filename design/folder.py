@@ -116,11 +116,11 @@ def first_difference(folder: Path, again: Path) -> str | None:
 
 
 def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:
-    """Digest every file in the folder; the last thing a build does."""
+    """Digest every other file in the folder; the last thing a build does."""
     files = {
         path.relative_to(folder).as_posix(): {"sha256": _sha256(path), "bytes": path.stat().st_size}
         for path in sorted(folder.rglob("*"))
-        if path.is_file()
+        if path.is_file() and path != folder / MANIFEST
     }
     manifest = {
         "schema": "scanwright/manifest/1",

@@ -149,7 +149,7 @@ def _share(azimuths: Array, beams: int, half_rad: float, below: Array) -> float:
     first, last = around[: len(azimuths)], around[beams - 1 :]
     start, end = last - half_rad, first + half_rad
     start, end = start[end > start], end[end > start]
-    # both rise, so each interval adds what lies behind the ends of those before it, and before the first one's next turn
+    # both rise: each interval adds what lies behind the end of the one before, and before the first one's next turn
     if not len(start):
         return 0.0
     start = np.maximum(start, np.concatenate([start[:1], end[:-1]]))

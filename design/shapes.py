@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, Strict, field_validator, model_validator
+from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from design.record import Record
 
@@ -17,6 +17,15 @@ Number = Annotated[float, Strict()]
 Span = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 Value = Annotated[Number, Field(ge=0)]
+
+
+def _divides_the_half_circle(step: float) -> float:
+    if abs(180 / step - round(180 / step)) > 1e-9:
+        raise ValueError("the grid reaches theta = 180 only with a step that divides 180")
+    return step
+
+
+GridStep = Annotated[Number, Field(ge=0.25, le=10), AfterValidator(_divides_the_half_circle)]
 Required = Annotated[Number | None, Field(gt=0, description="beams per ball, for objective = 'required'")]
 
 
@@ -85,14 +94,7 @@ class Placed(Record):
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
     sensor_m: Triple = (0.0, 0.0, 0.0)
     rpy_deg: Triple = (0.0, 0.0, 0.0)
-    step_deg: Number = Field(default=2.0, ge=0.25, le=10, description="between the rays that are cast at it")
-
-    @field_validator("step_deg")
-    @classmethod
-    def _divides_the_half_circle(cls, step: float) -> float:
-        if abs(180 / step - round(180 / step)) > 1e-9:
-            raise ValueError("rows of rays reach theta = 180 only with a step that divides 180")
-        return step
+    step_deg: GridStep = Field(default=2.0, description="between the rays that are cast at it")
 
 
 class Mesh(Placed):

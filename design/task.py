@@ -19,7 +19,7 @@ from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record, explain
-from design.shapes import Box, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
+from design.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
 from design.surface import Surface, surface_of
 
 SHIPPED = Path(__file__).parent / "tasks"
@@ -69,16 +69,9 @@ class DensityRules(Record):
     required: Required = None
     background: Value = 0.0
     quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
-    grid_step_deg: Number = Field(default=1.0, ge=0.25, le=10)
+    grid_step_deg: GridStep = 1.0
     tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
     budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
-
-    @field_validator("grid_step_deg")
-    @classmethod
-    def _divides_the_half_circle(cls, step: float) -> float:
-        if abs(180 / step - round(180 / step)) > 1e-9:
-            raise ValueError("the grid reaches theta = 180 only with a step that divides 180")
-        return step
 
 
 class Limits(Record):

@@ -42,7 +42,7 @@ def test_a_trapezoid_is_its_accelerations_integrated_twice(sweep):
     t = np.linspace(0, sweep.period_s, 20_001)
     half, ramp, a = sweep.period_s / 2, sweep.ramp_s, sweep.accel_deg_s2
     corners = [0, ramp, half - ramp, half, half + ramp, 2 * half - ramp, 2 * half]
-    speed = a * sum(s * np.maximum(t - c, 0) for s, c in zip([1, -1, -1, 0, -1, 1, 1], corners, strict=True))
+    speed = a * sum(s * np.maximum(t - c, 0) for s, c in zip([1, -1, -1, 0, 1, 1, -1], corners, strict=True))
     middle = sweep.limits_deg[0] + np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
     assume(np.ptp(sweep.limits_deg) > 1e-6)
     step = a * (t[1] * t[1])  # what one step of the integration may miss at a corner

@@ -1,0 +1,30 @@
+"""The assembly steps as HTML: just the Markdown that `assembly.md` is written in.
+
+Headings, paragraphs, lists with `-`, and in a line `**bold**` and backticks; anything else stays the text it is.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+
+
+def steps_html(text: str) -> str:
+    """HTML of the steps, without the title: the page has one; headings begin at the third level."""
+    blocks = []
+    for block in re.split(r"\n\s*\n", text.strip()):
+        heading = re.fullmatch(r"(#+) (.*)", block)
+        if heading is None:
+            lines = block.splitlines()
+            listed = all(line.startswith("- ") for line in lines)
+            items = "".join(f"<li>{_inline(line[2:])}</li>" for line in lines)
+            blocks.append(f"<ul>{items}</ul>" if listed else f"<p>{_inline(' '.join(lines))}</p>")
+        elif len(heading[1]) > 1:
+            level = min(len(heading[1]) + 1, 6)
+            blocks.append(f"<h{level}>{_inline(heading[2])}</h{level}>")
+    return "\n".join(blocks)
+
+
+def _inline(text: str) -> str:
+    escaped = html.escape(text)
+    return re.sub(r"`(.+?)`", r"<code>\1</code>", re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", escaped))
