@@ -104,6 +104,7 @@ def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Sc
     from design import build as writer
     from design.folder import fresh_folder, write_manifest
     from design.picture import density_picture
+    from design.report.page import write_report
     from design.scanner import scanner_of
     from design.shadowed import choose
 
@@ -134,7 +135,11 @@ def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Sc
         writer.write_search(work, result)
         left_out = [*result.left_out, *made.left_out, *exported.left_out]
         writer.write_left_out(work, [*writer.directions_left_out(problem), *left_out])
-        write_manifest(work, asked, [asdict(part) for part in made.parts])
+        parts = [asdict(part) for part in made.parts]
+        write_manifest(work, asked, parts)
+        _say("writing report.html")
+        write_report(work)
+        write_manifest(work, asked, parts)  # once more: the report reads it, and is in it
     return result, standard, chosen, made.findings
 
 
@@ -154,6 +159,14 @@ def _check_build(folder: Path) -> None:
         print(f"{folder}: {difference}")
         raise typer.Exit(1)
     print(f"{folder}: built again, all {len(manifest_of(folder)['files'])} files are the same")
+
+
+@app.command()
+def report(out: BuildFolder) -> None:
+    """Write report.html of a build folder from the files in it: the answer, 3D view, checks, parts, steps, drawings."""
+    from design.report.page import write_report
+
+    print(f"wrote {write_report(out)}")
 
 
 @app.command()

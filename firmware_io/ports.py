@@ -1,0 +1,94 @@
+"""Where the devices are: the ports of an emulated scanner, or of the hardware that is plugged in."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from serial.tools import list_ports
+
+from design.errors import DeviceError
+
+_FILE = "emulated.json"
+_HOKUYO = (0x15D1,)  # USB vendors
+_SERVO_ADAPTERS = (0x0403, 0x16D0, 0x1A86, 0x10C4)  # FTDI (U2D2, USB2Dynamixel), Xevelabs, QinHeng, Silicon Labs
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """Addresses of the two devices, as `open_lidar` and `open_servo` take them; `pid` is who emulates them, or 0."""
+
+    lidar: str
+    servo: str
+    pid: int = 0
+
+
+@contextmanager
+def announced(out: Path, ports: Ports) -> Iterator[None]:
+    """Leave the ports of an emulated scanner in its build folder, so that `scan` finds them; take them away after.
+
+    Raises:
+        DeviceError: the folder cannot be written, or this scanner is being emulated already.
+    """
+    running = emulated(out)
+    if running is not None:
+        raise DeviceError(f"{out}: process {running.pid} emulates this scanner already: stop it first")
+    file = out / _FILE
+    try:
+        file.write_text(json.dumps(asdict(ports), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise DeviceError(f"{file}: cannot write: {error.strerror}") from error
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)
+
+
+def emulated(out: Path) -> Ports | None:
+    """Ports of the emulated scanner of this folder; None where nobody emulates it now."""
+    try:
+        found = Ports(**json.loads((out / _FILE).read_text(encoding="utf-8")))
+        os.kill(found.pid, 0)
+    except (OSError, ValueError, TypeError):  # no file, one of another program, or its process is gone
+        return None
+    return found
+
+
+def lidar_ports() -> list[str]:
+    """Serial ports of the Hokuyo sensors that are plugged in."""
+    return _plugged(_HOKUYO)
+
+
+def servo_ports() -> list[str]:
+    """Serial ports of the adapters that a servo may hang on."""
+    return _plugged(_SERVO_ADAPTERS)
+
+
+def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
+    """The ports that were named, else those of the emulated scanner, else the only ones that are plugged in.
+
+    Raises:
+        DeviceError: a port is not named, and not one but none or several could be meant.
+    """
+    twins = emulated(out)
+    if twins is not None and lidar is None and servo is None:
+        return twins
+    return Ports(
+        lidar=lidar or _only("--lidar", "Hokuyo sensor", lidar_ports()),
+        servo=servo or _only("--servo", "serial adapter of a servo", servo_ports()),
+    )
+
+
+def _plugged(vendors: tuple[int, ...]) -> list[str]:
+    return sorted(port.device for port in list_ports.comports() if port.vid in vendors)
+
+
+def _only(option: str, what: str, found: list[str]) -> str:
+    if len(found) == 1:
+        return found[0]
+    seen = f"found {', '.join(found)}" if found else "found none"
+    raise DeviceError(f"{option}: which {what}? {seen}; name it, or run `scanwright emulate` for one without hardware")
