@@ -135,11 +135,9 @@ def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Sc
         writer.write_search(work, result)
         left_out = [*result.left_out, *made.left_out, *exported.left_out]
         writer.write_left_out(work, [*writer.directions_left_out(problem), *left_out])
-        parts = [asdict(part) for part in made.parts]
-        write_manifest(work, asked, parts)
+        write_manifest(work, asked, [asdict(part) for part in made.parts])
         _say("writing report.html")
         write_report(work)
-        write_manifest(work, asked, parts)  # once more: the report reads it, and is in it
     return result, standard, chosen, made.findings
 
 
@@ -257,8 +255,9 @@ def evaluate(
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
     import numpy as np
 
+    from design.beams import scan_at
     from design.coverage import coverage, on_surfaces
-    from design.gaps import gaps
+    from design.gaps import empty_cap, gaps, interlaced_period_s
     from design.objective import score
     from design.oracle import ball_score
     from design.poles import pole_chances, pole_of
@@ -274,6 +273,11 @@ def evaluate(
     result = score(problem, setting)
     seen = coverage(problem, setting)
     lines = gaps(problem, setting)
+    motion = loaded.task.motion
+    interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
+    cap = None
+    if problem.sweep is not None:
+        cap = empty_cap(scan_at(problem.bearings_rad, problem.sweep.angles_rad(0.5), setting))
     suffers = sensitivity(problem, setting, np.radians(1.0))
     surfaces = None if loaded.surface is None else on_surfaces(problem, setting, loaded.surface)
     _say("ball search, 8 start phases")
@@ -290,11 +294,12 @@ def evaluate(
         "masked_fraction": seen.masked_fraction,
         "min_density": result.least,
         **asdict(lines),
+        **({} if cap is None else {"empty_cap": asdict(cap)}),
+        **({} if interlaced_s is None else {"interlaced_period_s": interlaced_s}),
         "J_rises_1_deg_off": suffers,
         **({} if hit is None else {"pole": asdict(hit)}),
     }
     if cloud is not None:
-        from design.beams import scan_at
         from firmware_io.cloud import write_points
 
         note = f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"
@@ -313,6 +318,11 @@ def evaluate(
     for cone in lines.blind_cones:
         x, y, z = cone.axis_world
         print(f"blind cone     {cone.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})")
+    if cap is not None:
+        x, y, z = cap.axis_world
+        print(
+            f"empty cap      {cap.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f}), the largest without a beam"
+        )
     print(f"line gap       {lines.line_gap_deg:.3f} deg at the widest, {lines.line_gap_mm(10):.0f} mm at 10 m")
     crossing = "" if lines.crossing_deg is None else f", lines crossing at {lines.crossing_deg:.0f} deg on average"
     print(f"seen twice     {lines.seen_twice:.1%} of the weight{crossing}")
@@ -327,6 +337,8 @@ def evaluate(
     if surfaces is not None:
         low, middle = surfaces["lowest_points_per_m2"], surfaces["median_points_per_m2"]
         print(f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest")
+    if interlaced_s is not None:
+        print(f"interlaced     {interlaced_s:g} s a turn: the next one's lines come halfway between those of this one")
     print("1 deg off      J rises by " + ", ".join(f"{rise:.4f} ({name})" for name, rise in suffers.items()))
     if cloud is not None:
         print(f"wrote {len(points):,} points to {cloud}")

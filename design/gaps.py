@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from design.beams import Lines, beam_directions_rot, polar_and_azimuth
 from design.density import zones
@@ -80,6 +81,17 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
         crossing_deg=float(np.degrees(weights @ (crossing * twice) / weight_twice)) if weight_twice > 0 else None,
         half_turn_misses=float(weights @ misses / total) if problem.sweep is None else None,
     )
+
+
+def empty_cap(scan: Array) -> BlindCone:
+    """The largest cap that holds no beam of a simulated scan, unit vectors (n, 3): exact, from the convex hull.
+
+    The plane of a facet cuts a cap off the sphere, and no beam lies beyond it.
+    """
+    planes = ConvexHull(scan).equations
+    widest = int(planes[:, 3].argmax())
+    x, y, z = (float(value) + 0.0 for value in planes[widest, :3])
+    return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
 
 
 def shortest_period_s(problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int) -> float:

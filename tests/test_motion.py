@@ -7,12 +7,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from scipy.spatial import cKDTree
 
 from design.beams import beam_directions_rot, scan_at
 from design.coverage import coverage
 from design.density import ball_search
 from design.frames import R_world_rot
-from design.gaps import gaps
+from design.gaps import empty_cap, gaps
 from design.motion import StopAndGo, Sweep
 from design.objective import score
 from design.oracle import ball_score
@@ -127,6 +128,11 @@ def test_what_a_sweep_leaves_blind(indoor):
     steps = np.degrees(np.diff(indoor.sweep.angles_rad(0.5)))
     assert found.line_gap_deg == pytest.approx(np.abs(steps).max(), rel=1e-3)  # the fan reaches the equator
     assert found.half_turn_misses is None
+    cap = empty_cap(scan)
+    beams = np.degrees(np.arccos(np.clip(scan @ np.array(cap.axis_world), -1, 1)))
+    assert beams.min() == pytest.approx(cap.half_angle_deg, abs=1e-6)  # nothing inside
+    nearest = cKDTree(scan).query(spiral(20_000))[0].max()  # and nowhere a wider one
+    assert np.degrees(2 * np.arcsin(nearest / 2)) <= cap.half_angle_deg + 1e-6
 
 
 def test_stop_and_go_measures_each_line_again_and_again():
