@@ -23,6 +23,7 @@ WRITERS = (
     "cadquery",
     "cadquery-ocp",
     "ezdxf",
+    "jinja2",
     "matplotlib",
     "numba",
     "numpy",
@@ -116,12 +117,8 @@ def first_difference(folder: Path, again: Path) -> str | None:
 
 
 def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:
-    """Digest every other file in the folder; the last thing a build does."""
-    files = {
-        path.relative_to(folder).as_posix(): {"sha256": _sha256(path), "bytes": path.stat().st_size}
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path != folder / MANIFEST
-    }
+    """Digest every file in the folder; what is made later enters itself."""
+    files = {path.relative_to(folder).as_posix(): _facts(path) for path in sorted(folder.rglob("*")) if path.is_file()}
     manifest = {
         "schema": "scanwright/manifest/1",
         "task": loaded.task.name,
@@ -133,9 +130,22 @@ def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]
     write_json(folder / MANIFEST, manifest)
 
 
+def enter(folder: Path, name: str) -> None:
+    """Digest a file that was made from a build into the manifest of that build; nothing to do where there is none."""
+    manifest = manifest_of(folder)
+    if manifest:
+        files = manifest["files"] | {name: _facts(folder / name)}
+        manifest["files"] = dict(sorted(files.items(), key=lambda entry: Path(entry[0])))
+        write_json(folder / MANIFEST, manifest)
+
+
 def write_json(path: Path, value: Any) -> None:
     """One JSON file as all of them are written: two spaces, keys in their order, a line feed at the end."""
     path.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    return {"sha256": _sha256(path), "bytes": path.stat().st_size}
 
 
 def _sha256(path: Path) -> str:

@@ -28,6 +28,7 @@ FILES = {
     "left_out.json",
     "checks.json",
     "own_body.npz",
+    "report.html",
     "manifest.json",
     *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
     *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),

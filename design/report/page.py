@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from design.angles import AngleSet, load_angles
 from design.build import standard_settings
 from design.errors import BuildError
-from design.folder import MANIFEST
+from design.folder import MANIFEST, enter
 from design.frames import Array
 from design.landscape_picture import draw_landscape
 from design.report.answer import as_built, hidden_by, load_own_body, sight_of
@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 def write_report(folder: Path) -> Path:
-    """Write `report.html` into a build folder.
+    """Write `report.html` into a build folder, and its digest into the manifest.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
@@ -44,6 +44,7 @@ def write_report(folder: Path) -> Path:
     """
     path = folder / REPORT
     path.write_text(report_html(folder), encoding="utf-8")
+    enter(folder, REPORT)
     return path
 
 

@@ -21,6 +21,7 @@ from design.shadow import AXIS_STEPS, Shadow
 
 LARGEST_BYTES = 4_500_000  # of assembly.glb: in base64 two thirds of the 8 MB that a report may have
 FULL_TURN_DEG = (0.0, 360.0)
+A_TURN_S = 10.0  # shown where the motion is not known
 FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
 FRAMES = ("rot", "laser")
@@ -41,7 +42,7 @@ def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | No
     apart = _load(exploded) if exploded.is_file() else None
     turning = assembly.graph.transforms.successors("rot")
     bodies, together, spread = [], [], []
-    for node in set(assembly.graph.nodes_geometry):
+    for node in sorted(assembly.graph.nodes_geometry):
         T_world_body, mesh = _pose(assembly, node), assembly.geometry[assembly.graph.get(node)[1]]
         T_apart = T_world_body if apart is None else _pose(apart, node)
         together.append(mesh.vertices @ T_world_body[:3, :3].T + T_world_body[:3, 3])
@@ -72,7 +73,7 @@ def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | No
         "axis_inverse": _columns(np.linalg.inv(T_world_rot)),
         "reach": round(reach, 6),
         "limits_deg": list(angles.motion.limits_deg if isinstance(angles.motion, Sweep) else FULL_TURN_DEG),
-        "period_s": 18.0 if angles.motion is None else angles.motion.duration_s,
+        "period_s": A_TURN_S if angles.motion is None else angles.motion.duration_s,
         "to_and_fro": isinstance(angles.motion, Sweep),
         "laser": _columns(T_world_laser),
         "fan": None if own_body is None else _fan(*own_body),

@@ -121,7 +121,7 @@
 
   // ---- what the person chose ----
 
-  const camera = { yaw: 40 * DEG, pitch: 22 * DEG, zoom: 1.15 };
+  const camera = { yaw: 40 * DEG, pitch: 22 * DEG, zoom: 1 };
   const axis = element("axis");
   const apart = element("apart");
   const fanShown = element("fan");
