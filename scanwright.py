@@ -211,7 +211,6 @@ def optimise(
     if picture is not None:
         from design.landscape_picture import landscape_picture
 
-        picture.parent.mkdir(parents=True, exist_ok=True)
         landscape_picture(picture, result, f"{loaded.task.name}: {_title(loaded)}{shortest}")
     if as_json:
         best = [

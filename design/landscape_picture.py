@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from design.angles import STANDARD_DEG
-from design.errors import TaskError
+from design.errors import BuildError, TaskError
 from design.frames import Array
 from design.picture import INK
 from design.search import SearchResult
@@ -53,7 +53,11 @@ def landscape_picture(path: Path, result: SearchResult, title: str) -> None:
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     figure.suptitle(title, fontsize=11)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=110, metadata={"Software": None})
+    except (OSError, ValueError) as error:  # no such place, or no picture by its suffix
+        raise BuildError(f"{path}: cannot write the picture: {error}") from error
 
 
 def draw_landscape(
