@@ -10,7 +10,7 @@ from cad.build import build_parts
 from cad.deck import mount_offset_mm
 from cad.urdf import roll_pitch_yaw
 from design.angles import Angles, AngleSet
-from design.catalogue import load_catalogue
+from design.catalogue import Bearing, load_catalogue
 from design.errors import BuildError
 from design.scanner import scanner_of
 
@@ -82,10 +82,14 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(built):
         )
         assert principal[0] > 0 and principal[2] <= principal[0] + principal[1]
     own = {part.name: part.mass_g / 1000 for part in result.parts}
-    assert mass["rot"] == pytest.approx(own["servo_shaft"] + own["alignment_linkage"] + 0.1, abs=1e-5)
-    assert mass["servo"] == pytest.approx(own["slip_ring_adapter"] + own["base_mount"] + 0.1 + 0.126, abs=1e-5)
+    bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
+    turning = own["servo_shaft"] + own["alignment_linkage"] + 0.1 + bearing / 2
+    standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
+    assert mass["rot"] == pytest.approx(turning, abs=1e-5)
+    assert mass["servo"] == pytest.approx(standing + 0.126, abs=1e-5)
     assert mass["laser"] == pytest.approx(0.370)
-    assert own["servo_shaft"] == pytest.approx(2.7e-6 * 10354, rel=0.01)  # turned from aluminium
+    shaft = next(part for part in result.parts if part.name == "servo_shaft")
+    assert own["servo_shaft"] == pytest.approx(2.7e-6 * shaft.volume_mm3, rel=1e-4)  # turned from aluminium
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, 0.4])
