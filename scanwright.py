@@ -11,7 +11,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
 from types import FrameType
@@ -249,6 +249,10 @@ def evaluate(
         str | None,
         typer.Option(metavar="WIDTH_MM,HEIGHT_MM,RANGE_M", help="Tell the chance to hit a thin upright pole."),
     ] = None,
+    lever: Annotated[
+        str | None,
+        typer.Option(metavar="X_MM,Y_MM,RANGE_M", help="Optical centre off the axis by (x, y), as seen at a range."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
@@ -267,7 +271,7 @@ def evaluate(
     loaded = load_task(task)
     setting = np.radians(_four_angles(angles))
     asked = None if pole is None else pole_of(pole, loaded.lidar)
-    problem = problem_of(loaded)
+    problem = problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_lever(lever))
     _say("closed form")
     result = score(problem, setting)
     seen = coverage(problem, setting)
@@ -276,7 +280,7 @@ def evaluate(
     interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
     cap = None
     if problem.sweep is not None:
-        cap = empty_cap(scan_at(problem.bearings_rad, problem.sweep.angles_rad(0.5), setting))
+        cap = empty_cap(scan_at(problem.bearings_rad, problem.sweep.angles_rad(0.5), setting, problem.lever))
     suffers = sensitivity(problem, setting, np.radians(1.0))
     surfaces = None if loaded.surface is None else on_surfaces(problem, setting, loaded.surface)
     _say("ball search, 8 start phases")
@@ -303,7 +307,7 @@ def evaluate(
 
         note = f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"
         joint = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-        points = scan_at(problem.bearings_rad, joint, setting)
+        points = scan_at(problem.bearings_rad, joint, setting, problem.lever)
         write_points(cloud, points, [note])
     if as_json:
         _print_json({"task": loaded.task.name, "angles_deg": np.degrees(setting).round(6).tolist(), **facts})
@@ -835,6 +839,20 @@ def _say_in_place(line: str) -> None:
         print(f"\r\033[K  .. {line}", end="" if "%" in line else "\n", file=sys.stderr, flush=True)
     else:
         _say(line)
+
+
+def _lever(text: str) -> tuple[float, float, float]:
+    from design.errors import TaskError
+
+    try:
+        x_mm, y_mm, range_m = (float(part) for part in text.split(","))
+    except ValueError:
+        x_mm = y_mm = range_m = 0.0
+    if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
+        raise TaskError(
+            f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
+        )
+    return x_mm / 1000 / range_m, y_mm / 1000 / range_m, 0.0
 
 
 def _say(line: str) -> None:

@@ -38,10 +38,23 @@ def scan_lines(period_s: float, scan_rate_hz: float) -> Lines:
     return Lines(count=int(np.ceil(turns)), step_rad=2 * np.pi / turns)
 
 
-def beam_directions_rot(bearings_rad: Array, alpha_laser_rad: float, beta_laser_rad: float) -> Array:
-    """Unit vectors of all beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`."""
+NO_LEVER = (0.0, 0.0, 0.0)
+
+
+def beam_directions_rot(
+    bearings_rad: Array, alpha_laser_rad: float, beta_laser_rad: float, lever: ArrayLike = NO_LEVER
+) -> Array:
+    """Unit vectors of all beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`.
+
+    With a lever arm, `t_rot_laser / range`, they point from the axis to where the beams end at that range. The arm
+    turns with the laser, so the density stays the same all around the axis.
+    """
     in_laser = np.stack([np.cos(bearings_rad), np.sin(bearings_rad), np.zeros_like(bearings_rad)], axis=1)
-    return in_laser @ frames.R_rot_laser(alpha_laser_rad, beta_laser_rad).T
+    beams = in_laser @ frames.R_rot_laser(alpha_laser_rad, beta_laser_rad).T
+    if not np.any(lever):
+        return beams
+    ends = beams + np.asarray(lever, dtype=float)
+    return ends / np.linalg.norm(ends, axis=1, keepdims=True)
 
 
 def polar_of_planes(bearings_rad: Array, planes_rad: Array) -> Array:
@@ -69,9 +82,9 @@ def simulated_scan(bearings_rad: Array, lines: Lines, angles_rad: ArrayLike, sta
     return scan_at(bearings_rad, lines.angles_rad + start_phase_rad, angles_rad)
 
 
-def scan_at(bearings_rad: Array, joint_rad: Array, angles_rad: ArrayLike) -> Array:
+def scan_at(bearings_rad: Array, joint_rad: Array, angles_rad: ArrayLike, lever: ArrayLike = NO_LEVER) -> Array:
     """Directions in the world of all beams at each joint angle, shape (joint angles * beams, 3), line after line."""
     alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
-    beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser)
+    beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser, lever)
     R = frames.R_world_rot(alpha_rot, beta_rot, joint_rad)
     return np.einsum("kij,bj->kbi", R, beams).reshape(-1, 3)

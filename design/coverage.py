@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.beams import beam_directions_rot, polar_and_azimuth
+from design.beams import polar_and_azimuth
 from design.density import mean_count
 from design.frames import Array, R_world_rot
 from design.problem import Problem
@@ -36,7 +36,7 @@ def coverage(problem: Problem, angles_rad: Array) -> Coverage:
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     if problem.sweep is not None:
         return _swept(problem, angles_rad)
-    polar, _ = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
+    polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     up = np.array([0.0, 0.0, 1.0])
     open_share = _unmasked(problem, up, 0.0, np.pi)
     blind = sum(_unmasked(problem, axis, a, b) for a, b in blind_zones(polar, problem.ball_rad))
@@ -52,7 +52,7 @@ def _swept(problem: Problem, angles_rad: Array) -> Coverage:
     directions = spiral(CIRCLES)
     masked = problem.field.masked_at(directions)
     in_rot = directions[~masked] @ R_world_rot(angles_rad[0], angles_rad[1])
-    beams = beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3])
+    beams = problem.beams_rot(angles_rad[2:])
     seen = mean_count_swept(in_rot, beams, problem.sweep, problem.ball_rad) > 0
     return Coverage(float((~seen).mean()) if len(seen) else 0.0, float(masked.mean()))
 
@@ -60,7 +60,7 @@ def _swept(problem: Problem, angles_rad: Array) -> Coverage:
 def mean_density_at(problem: Problem, angles_rad: Array, directions: Array) -> Array:
     """Mean beams per ball at unit vectors (n, 3), from a table over the polar angle where the axis turns all around."""
     R = R_world_rot(angles_rad[0], angles_rad[1])
-    beams = beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3])
+    beams = problem.beams_rot(angles_rad[2:])
     if problem.sweep is not None:
         return mean_count_swept(directions @ R, beams, problem.sweep, problem.ball_rad)
     table = np.linspace(0, np.pi, TABLE)

@@ -63,7 +63,7 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
         TaskError: no direction has a weight.
     """
     u = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    beams = beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3])
+    beams = problem.beams_rot(angles_rad[2:])
     normal = R_rot_laser(angles_rad[2], angles_rad[3])[:, 2]
     across = np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal)
     polar_rad, weights, families = (_around if problem.sweep is None else _within_limits)(problem, angles_rad)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.beams import beam_directions_rot
 from design.density import Zones, zones
 from design.frames import Array, R_world_rot
 from design.objectives import Moment
@@ -131,7 +130,7 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Array, nodes
     assert problem.sweep is not None
     moment = problem.objective.moments[index]
     R = R_world_rot(angles_rad[0], angles_rad[1])
-    beams = beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3])
+    beams = problem.beams_rot(angles_rad[2:])
     sets = [sample_set(moment.field, problem.grid_step_deg, nodes // SETS, k) for k in range(SETS)]
     found = []
     for samples in sets:

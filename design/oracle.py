@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from design.beams import scan_at, simulated_scan
+from design.beams import scan_at
 from design.frames import Array, R_world_rot, rotvec_to_matrix
 from design.problem import Problem
 from design.sphere import sample_set
@@ -38,7 +38,7 @@ def ball_score(problem: Problem, angles_rad: Array, directions: int = DIRECTIONS
 
 def scan_tree(problem: Problem, angles_rad: Array) -> cKDTree:
     """The simulated full scan of a setting, ready to be searched; it depends on beams and lines only."""
-    return _tree(simulated_scan(problem.bearings_rad, problem.lines, angles_rad))
+    return _tree(scan_at(problem.bearings_rad, problem.lines.angles_rad, angles_rad, problem.lever))
 
 
 def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
@@ -66,7 +66,7 @@ def _swept_score(problem: Problem, angles_rad: Array, directions: int) -> BallSc
     estimates = []
     for i in range(PHASES):
         joint = problem.sweep.angles_rad((i + 0.5) / PHASES)
-        tree = _tree(scan_at(problem.bearings_rad, joint, angles_rad))
+        tree = _tree(scan_at(problem.bearings_rad, joint, angles_rad, problem.lever))
         for k in range(SETS):
             estimates.append(_estimate(tree, problem, np.eye(3), directions // SETS, SETS * i + k))
     return _score(problem, estimates)

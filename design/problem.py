@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from design.beams import Lines, scan_lines
+from design.beams import NO_LEVER, Lines, beam_directions_rot, scan_lines
 from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, StopAndGo, Sweep
@@ -36,6 +36,7 @@ class Problem:
         grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
         nodes: quadrature nodes that a score starts with, from the task's `tolerance` or `budget_s`.
         tolerance: a score takes more nodes as long as it states a larger error.
+        lever: of the optical centre off the axis, `t_rot_laser / range`. By design 0; the search takes it for 0.
     """
 
     bearings_rad: Array
@@ -47,6 +48,11 @@ class Problem:
     grid_step_deg: float | None
     nodes: int = NODES
     tolerance: float = 1e-3
+    lever: tuple[float, float, float] = NO_LEVER
+
+    def beams_rot(self, plane_rad: Array) -> Array:
+        """Unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser), shape (beams, 3)."""
+        return beam_directions_rot(self.bearings_rad, plane_rad[0], plane_rad[1], self.lever)
 
     @property
     def field(self) -> Field:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from design.beams import beam_directions_rot, polar_and_azimuth
+from design.beams import polar_and_azimuth
 from design.errors import TaskError
 from design.frames import Array, R_world_rot
 from design.problem import Problem
@@ -49,7 +49,7 @@ def rule_of(
     """
     field = field or problem.field
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
+    polar, azimuth = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     step = problem.grid_step_deg
     rule = _grid_rule(field, step, axis) if step else _circle_rule(field, problem.ball_rad, axis, polar, nodes)
     if not rule.fine.sum() > 0:

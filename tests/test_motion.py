@@ -1,5 +1,6 @@
 """Motions: the trapezoid against numerical integration, a sweep's density against simulated scans."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +147,21 @@ def test_stop_and_go_measures_each_line_again_and_again():
     assert four.least == 4 * once.least
     assert abs(four.J - ball.J) < four.J_error + ball.J_error
     assert once.J - np.log(4) < four.J < once.J
+
+
+def test_a_lever_arm_at_a_range_is_where_the_beams_end():
+    """A simulated scan with the optical centre off the axis, its points at one range seen from the axis."""
+    problem = replace(problem_of(load_task(Path("uniform"))), lever=(0.02, -0.01, 0.0))
+    setting = np.radians([20, -40, 60, 20])
+    lines = problem.lines.angles_rad[::40]
+    R = R_world_rot(*setting[:2], lines)
+    beams = beam_directions_rot(problem.bearings_rad, *setting[2:])
+    ends = np.einsum("kij,bj->kbi", R, beams * 2.0 + np.array([0.04, -0.02, 0.0])).reshape(-1, 3)  # at 2 m
+    np.testing.assert_allclose(
+        scan_at(problem.bearings_rad, lines, setting, problem.lever),
+        ends / np.linalg.norm(ends, axis=1, keepdims=True),
+        atol=1e-12,
+    )
+    found, ball = score(problem, setting), ball_score(problem, setting, 2000)
+    assert abs(found.J - ball.J) < found.J_error + ball.J_error + 1e-3
+    assert abs(found.J - score(replace(problem, lever=(0.0, 0.0, 0.0)), setting).J) > found.J_error
