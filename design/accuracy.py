@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from design.ball_count import ball_count
 from design.beams import beam_directions_rot, polar_and_azimuth, simulated_scan
@@ -95,7 +96,7 @@ def reference(problem: Problem, angles_rad: Array) -> Reference:
     breaks = breaks_of(problem.field, axis, np.concatenate([polar - problem.ball_rad, polar + problem.ball_rad]))
     J = []
     for order in ORDERS:
-        x, w = np.polynomial.legendre.leggauss(order)
+        x, w = roots_legendre(order)
         s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
         a, b = breaks[:-1, None], breaks[1:, None]
         t = (a + (b - a) * np.sin(s / 2) ** 2).ravel()
@@ -135,14 +136,14 @@ def by_rings_single(problem: Problem, angles_rad: Array, rings: int) -> float:
 
 def by_gauss(problem: Problem, angles_rad: Array, nodes: int) -> float:
     """Exact counts on Gauss-Legendre nodes of the whole polar axis: best for smooth densities, which these are not."""
-    z, w = np.polynomial.legendre.leggauss(nodes)
+    z, w = roots_legendre(nodes)
     return _from_rings(problem, angles_rad, np.arccos(z), w)
 
 
 def by_harmonics(problem: Problem, angles_rad: Array, band: int) -> float:
     """Zonal harmonics of density and weight up to a degree (Funk-Hecke), their coefficients from Gauss nodes."""
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    z, w = np.polynomial.legendre.leggauss(2 * band + 2)
+    z, w = roots_legendre(2 * band + 2)
     t = np.arccos(z)
     basis = np.polynomial.legendre.legvander(z, band)
     of_g = basis.T @ (w * _zonal(problem, angles_rad, t))

@@ -35,12 +35,14 @@ class Family:
         score: its J, rescored exactly.
         members: grid settings of the search that stand behind it.
         word: what the others are, for a person.
+        grid_deg: the setting of the grid that it was refined from.
     """
 
     angles_deg: tuple[float, float, float, float]
     score: Score
     members: int
     word: str
+    grid_deg: tuple[float, float, float, float] | None = None
 
     @property
     def angles_rad(self) -> Array:
@@ -173,9 +175,13 @@ def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> t
 
 
 def _family(angles_deg: Array, exact: Score, leader: Leader) -> Family:
-    alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
     word = "any axis" if leader.every_axis else f"{leader.axes} axes" if leader.axes > 1 else ""
-    return Family((alpha_rot, beta_rot, alpha_laser, beta_laser), exact, leader.members, word)
+    return Family(_four(angles_deg), exact, leader.members, word, _four(leader.angles_deg))
+
+
+def _four(angles_deg: Array) -> tuple[float, float, float, float]:
+    alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
+    return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
 def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:

@@ -28,9 +28,7 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
     if limits.max_line_gap_deg is None and limits.max_blind_cone_deg is None:
         return planes
     shown = np.radians(planes.settings_deg[planes.first])
-    gap = line_gaps_deg(problem, shown)
-    polar = polar_of_planes(problem.bearings_rad, shown)
-    cone = np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
+    gap, cone = line_gaps_deg(problem, shown), blind_cones_deg(problem, shown)
     for name, values, limit in (
         ("max_line_gap_deg", gap, limits.max_line_gap_deg),
         ("max_blind_cone_deg", cone, limits.max_blind_cone_deg),
@@ -38,15 +36,31 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
         if limit is not None and values.min() > limit:
             hint = "; a longer period narrows it" if name == "max_line_gap_deg" else ""
             raise TaskError(f"limits.{name} = {limit:g}: the scan planes of this task reach {values.min():.3g}{hint}")
-    keep = (gap <= (limits.max_line_gap_deg or np.inf)) & (cone <= (limits.max_blind_cone_deg or np.inf))
+    keep = planes_keep(problem, shown, limits)
     if not keep.any():
         raise TaskError("limits: no scan plane keeps max_line_gap_deg and max_blind_cone_deg at once")
     return _only(planes, keep)
 
 
+def planes_keep(problem: Problem, planes_rad: Array, limits: Limits) -> Mask:
+    """Whether scan planes (n, 2) keep the limits on gaps and blind cones, shape (n,)."""
+    keep = np.ones(len(planes_rad), dtype=bool)
+    if limits.max_line_gap_deg is not None:
+        keep &= line_gaps_deg(problem, planes_rad) <= limits.max_line_gap_deg * (1 + 1e-9)
+    if limits.max_blind_cone_deg is not None:
+        keep &= blind_cones_deg(problem, planes_rad) <= limits.max_blind_cone_deg + 1e-9
+    return keep
+
+
 def keeps(score: Score, limits: Limits) -> bool:
     """Whether a scored setting keeps the limits that depend on the axis too."""
     return score.least >= (limits.min_density or 0) and score.blind_weight <= (limits.max_blind_weight or 1.0)
+
+
+def blind_cones_deg(problem: Problem, planes_rad: Array) -> Array:
+    """Half angle of the wider blind cone about the axis, of scan planes (n, 2), shape (n,)."""
+    polar = polar_of_planes(problem.bearings_rad, planes_rad)
+    return np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
 
 
 def line_gaps_deg(problem: Problem, planes_rad: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from design.folding import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.frames import Array
 from design.landscape import Landscape, Progress, landscape_of
 from design.left_out import LeftOut
-from design.limits import allowed_planes, keeps, line_gaps_deg
+from design.limits import allowed_planes, keeps, planes_keep
+from design.objective import score
 from design.problem import Problem
 from design.swept_landscape import swept_landscape_of
 from design.task import NAMES, AngleRanges, Limits
@@ -91,22 +92,30 @@ def search(
 
 
 def _kept(families: tuple[Family, ...], problem: Problem, limits: Limits) -> tuple[Family, ...]:
-    """The families that keep the limits; a refined setting may have left those of the grid.
+    """The families that keep the limits; where refining has left them, the setting of the grid stands again.
 
     Raises:
         TaskError: none does.
     """
-    gaps = line_gaps_deg(problem, np.array([family.angles_rad[2:] for family in families]))
-    within = gaps <= (limits.max_line_gap_deg or np.inf) * (1 + 1e-9)
-    kept = tuple(f for f, near in zip(families, within, strict=True) if near and keeps(f.score, limits))
+    planes_rad = np.array([family.angles_rad[2:] for family in families])
+    within = planes_keep(problem, planes_rad, limits)
+    families = tuple(f if keep else _on_the_grid(problem, f) for f, keep in zip(families, within, strict=True))
+    kept = tuple(family for family in families if keeps(family.score, limits))
+    if not within.all():
+        kept = tuple(sorted(kept, key=lambda family: family.score.J))
     if not kept:
         least = max(family.score.least for family in families)
         blind = min(family.score.blind_weight for family in families)
         raise TaskError(
             f"limits: none of the {len(families)} best families keeps them: min_density reaches {least}, "
-            f"max_blind_weight {blind:.2g}, max_line_gap_deg {gaps.min():.3g}; a longer period helps"
+            f"max_blind_weight {blind:.2g}; a longer period helps, or a smaller region"
         )
     return kept
+
+
+def _on_the_grid(problem: Problem, family: Family) -> Family:
+    assert family.grid_deg is not None
+    return replace(family, angles_deg=family.grid_deg, score=score(problem, np.radians(family.grid_deg)))
 
 
 def _different(planes: Folded, axes: Folded) -> int:

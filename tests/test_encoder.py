@@ -50,7 +50,7 @@ def test_smoothing_is_nearer_than_straight_lines_and_says_by_how_much(speed, rat
         return
     error = off_rad(found.curve, log, truth)
     assert error < 1.05 * off_rad(straight(log), log, truth)  # a fast servo read rarely: hardly better, never worse
-    assert error / 3 < found.error_rad < 4 * error
+    assert error / 3 < found.error_rad < 8 * error  # on the safe side where steps last for many samples
     assert found.residual_rad == pytest.approx(STEP / np.sqrt(12), rel=0.25)
 
 

@@ -53,17 +53,17 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_each_objective_is_what_the_ball_search_finds(name):
     p = CASES[name]()
-    for setting in np.radians(SETTINGS[1:3]):  # no focus point inside: few samples would hit it, and d^2 is all there
-        found, ball = score(p, setting), ball_score(p, setting, 2000)
-        assert abs(found.J - ball.J) < found.J_error + ball.J_error + 5e-4, name
-        assert found.J_lower <= found.J + 1e-9
-        assert found.J_error <= 1e-3
-        assert quick_J(p, setting, 6561) == pytest.approx(found.J, abs=1e-3)
+    setting = np.radians(SETTINGS[1])  # no focus point inside: few samples would hit it, and d^2 is all there
+    found, ball = score(p, setting), ball_score(p, setting, 2000)
+    assert abs(found.J - ball.J) < found.J_error + ball.J_error + 5e-4, name
+    assert found.J_lower <= found.J + 1e-9
+    assert found.J_error <= 1e-3
+    assert quick_J(p, setting, 6561) == pytest.approx(found.J, abs=1e-3)
 
 
 def test_the_worst_density_is_the_lowest_of_many_phases_and_directions():
     p = problem("worst")
-    for setting in np.radians(SETTINGS):
+    for setting in np.radians(SETTINGS[1:3]):
         found, ball = score(p, setting), ball_score(p, setting, 400)
         assert found.J == -np.log1p(found.least)
         assert found.J >= ball.J - 1e-12  # the ball search looks at fewer places
