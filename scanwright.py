@@ -11,7 +11,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
 from types import FrameType
@@ -21,9 +21,7 @@ import typer
 
 if TYPE_CHECKING:
     from cad.findings import Finding
-    from design.objective import Score
-    from design.problem import Problem
-    from design.search import SearchResult
+    from design.optimum import Optimum
     from design.shadowed import Chosen
     from design.task import LoadedTask
 
@@ -86,9 +84,9 @@ def build(
     if is_current(target, loaded):
         print(f"{target}: nothing has changed, no work to do ({len(manifest_of(target)['files'])} files)")
         return
-    result, standard, chosen, findings = _build(loaded, target)
-    _print_optimum(result, standard)
-    _print_chosen(chosen)
+    optimum, chosen, findings = _build(loaded, target)
+    for line in [*optimum.table(), *chosen.lines()]:
+        print(line)
     for warning in loaded.warnings():
         print(f"warning: {warning}")
     for finding in findings:
@@ -96,21 +94,23 @@ def build(
     print(f"wrote {len(manifest_of(target)['files'])} files to {target}")
 
 
-def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Score], Chosen, tuple[Finding, ...]]:
+def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Finding, ...]]:
     """Make the build folder of a task."""
     from cad.build import build_parts
     from cad.deck import mount_offset_mm
     from cad.kernel import require_kernel
     from design import build as writer
     from design.folder import fresh_folder, write_manifest
+    from design.optimum import optimum_of
     from design.picture import density_picture
     from design.report.page import write_report
     from design.scanner import scanner_of
     from design.shadowed import choose
 
-    asked = loaded  # with `period_s = "shortest"` the search changes the motion, and a rebuild must ask for it again
     with fresh_folder(target) as work:
-        loaded, problem, standard, result = _optimise(asked)
+        optimum = optimum_of(asked, _say)
+        # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
+        loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         require_kernel()
         from cad.checks.run import check_parts
         from cad.exports import export_scanner
@@ -128,17 +128,16 @@ def _build(loaded: LoadedTask, target: Path) -> tuple[SearchResult, dict[str, Sc
         check_parts(scanner, made, work, _say)
         _say("drawing density.png")
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
-        settings |= {f"{name}: J = {s.J:.3f}": writer.standard_settings()[name] for name, s in standard.items()}
-        density_picture(work / "density.png", problem, settings, _title(loaded))
+        settings |= {f"{name}: J = {s.J:.3f}": writer.standard_settings()[name] for name, s in optimum.standard.items()}
+        density_picture(work / "density.png", problem, settings, optimum.title)
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         writer.write_task(work, asked)
         writer.write_search(work, result)
-        left_out = [*result.left_out, *made.left_out, *exported.left_out]
-        writer.write_left_out(work, [*writer.directions_left_out(problem), *left_out])
+        writer.write_left_out(work, [*optimum.left_out, *made.left_out, *exported.left_out])
         write_manifest(work, asked, [asdict(part) for part in made.parts])
         _say("writing report.html")
         write_report(work)
-    return result, standard, chosen, made.findings
+    return optimum, chosen, made.findings
 
 
 def _check_build(folder: Path) -> None:
@@ -201,40 +200,22 @@ def optimise(
     as_json: AsJson = False,
 ) -> None:
     """Search all mounting angles of a task and print the best ten families of settings."""
-    from design.build import directions_left_out
-    from design.task import NAMES, load_task
+    from design.optimum import optimum_of
+    from design.task import load_task
 
-    loaded = load_task(task)
-    shortest = ", the shortest found that keeps the limits" if loaded.task.motion.mode == "shortest" else ""
-    loaded, problem, standard, result = _optimise(loaded)
-    left_out = [*directions_left_out(problem), *result.left_out]
+    optimum = optimum_of(load_task(task), _say)
     if picture is not None:
         from design.landscape_picture import landscape_picture
 
-        landscape_picture(picture, result, f"{loaded.task.name}: {_title(loaded)}{shortest}")
+        landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
     if as_json:
-        best = [
-            {f"{name}_deg": angle for name, angle in zip(NAMES, family.angles_deg, strict=True)}
-            | {"J": family.score.J, "J_error": family.score.J_error, "settings": family.members, "note": family.word}
-            for family in result.best
-        ]
-        _print_json(
-            {
-                "task": loaded.task.name,
-                "duration_s": loaded.task.motion.duration_s,
-                "best": best,
-                "standard": {name: {"J": s.J, "J_error": s.J_error} for name, s in standard.items()},
-                "covered": result.covered,
-                "evaluated": result.evaluated,
-                "seconds": round(result.seconds, 3),
-                "left_out": [asdict(entry) for entry in left_out],
-            }
-        )
+        _print_json(optimum.facts())
         return
-    _print_optimum(result, standard)
-    print(f"{_title(loaded)}{shortest}")
+    for line in [*optimum.table(), optimum.long_title]:
+        print(line)
+    result = optimum.search
     print(f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s")
-    for entry in left_out:
+    for entry in optimum.left_out:
         print(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})")
 
 
@@ -258,93 +239,28 @@ def evaluate(
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
     import numpy as np
 
-    from design.beams import scan_at
-    from design.coverage import coverage, on_surfaces
-    from design.gaps import empty_cap, gaps, interlaced_period_s
-    from design.objective import score
-    from design.oracle import ball_score
-    from design.poles import pole_chances, pole_of
-    from design.problem import problem_of
-    from design.robust import sensitivity
+    from design import evaluation
     from design.task import load_task
 
     loaded = load_task(task)
-    setting = np.radians(_four_angles(angles))
-    asked = None if pole is None else pole_of(pole, loaded.lidar)
-    problem = problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_lever(lever))
-    _say("closed form")
-    result = score(problem, setting)
-    seen = coverage(problem, setting)
-    lines = gaps(problem, setting)
-    motion = loaded.task.motion
-    interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
-    cap = None
-    if problem.sweep is not None:
-        cap = empty_cap(scan_at(problem.bearings_rad, problem.sweep.angles_rad(0.5), setting, problem.lever))
-    suffers = sensitivity(problem, setting, np.radians(1.0))
-    surfaces = None if loaded.surface is None else on_surfaces(problem, setting, loaded.surface)
-    _say("ball search, 8 start phases")
-    ball = ball_score(problem, setting)
-    hit = None if asked is None else pole_chances(problem, setting, asked)
-    facts = {
-        "J": result.J,
-        "J_error": result.J_error,
-        "J_lower": result.J_lower,
-        "J_ball": ball.J,
-        "J_ball_error": ball.J_error,
-        "blind_fraction": seen.blind_fraction,
-        "blind_weight_fraction": result.blind_weight,
-        "masked_fraction": seen.masked_fraction,
-        "min_density": result.least,
-        **asdict(lines),
-        **({} if cap is None else {"empty_cap": asdict(cap)}),
-        **({} if interlaced_s is None else {"interlaced_period_s": interlaced_s}),
-        "J_rises_1_deg_off": suffers,
-        **({} if hit is None else {"pole": asdict(hit)}),
-    }
+    setting = evaluation.setting_of(angles)
+    problem = evaluation.problem_to_judge(loaded, lever)
+    found = evaluation.evaluate(loaded, problem, setting, pole, _say)
+    points = 0
     if cloud is not None:
         from firmware_io.cloud import write_points
 
-        note = f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"
-        joint = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-        points = scan_at(problem.bearings_rad, joint, setting, problem.lever)
-        write_points(cloud, points, [note])
+        beams = evaluation.simulated_beams(problem, setting)
+        write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
+        points = len(beams)
     if as_json:
-        _print_json({"task": loaded.task.name, "angles_deg": np.degrees(setting).round(6).tolist(), **facts})
+        name, angles_deg = loaded.task.name, np.degrees(setting).round(6).tolist()
+        _print_json({"task": name, "angles_deg": angles_deg, **found.facts()})
         return
-    print(f"J              {result.J:.5f} +- {result.J_error:.1e}   mean of g(true count) over the start phase")
-    print(f"J_lower        {result.J_lower:.5f}             g of the mean count: a lower bound")
-    print(f"J_ball         {ball.J:.5f} +- {ball.J_error:.1e}   ball search over 8 simulated scans")
-    print(f"blind          {seen.blind_fraction:.2%} of the unmasked sphere, {result.blind_weight:.2%} of the weight")
-    print(f"masked         {seen.masked_fraction:.2%} of the sphere")
-    print(f"min_density    {result.least} beams per ball, lowest in the weighted region at any start phase")
-    for cone in lines.blind_cones:
-        x, y, z = cone.axis_world
-        print(f"blind cone     {cone.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})")
-    if cap is not None:
-        x, y, z = cap.axis_world
-        print(
-            f"empty cap      {cap.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f}), the largest without a beam"
-        )
-    print(f"line gap       {lines.line_gap_deg:.3f} deg at the widest, {lines.line_gap_mm(10):.0f} mm at 10 m")
-    crossing = "" if lines.crossing_deg is None else f", lines crossing at {lines.crossing_deg:.0f} deg on average"
-    print(f"seen twice     {lines.seen_twice:.1%} of the weight{crossing}")
-    if lines.half_turn_misses is not None:
-        print(f"half a turn    misses {lines.half_turn_misses:.1%} of the weight that a full turn sees")
-    if hit is not None:
-        for found in hit.chances:
-            beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
-            print(
-                f"pole           {found.chance:.2%} +- {found.error:.2%} get at least {beams} ({hit.stands} azimuths)"
-            )
-    if surfaces is not None:
-        low, middle = surfaces["lowest_points_per_m2"], surfaces["median_points_per_m2"]
-        print(f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest")
-    if interlaced_s is not None:
-        print(f"interlaced     {interlaced_s:g} s a turn: the next one's lines come halfway between those of this one")
-    print("1 deg off      J rises by " + ", ".join(f"{rise:.4f} ({name})" for name, rise in suffers.items()))
+    for line in found.lines():
+        print(line)
     if cloud is not None:
-        print(f"wrote {len(points):,} points to {cloud}")
+        print(f"wrote {points:,} points to {cloud}")
 
 
 @app.command()
@@ -358,6 +274,7 @@ def accuracy(
     """Report error against run time of every way to compute J, at the optimum of a task."""
     from design import accuracy_report as report
     from design.accuracy import as_log, measure, on_front
+    from design.optimum import optimum_of
     from design.problem import problem_of
     from design.stress import stress_rows
     from design.task import load_task
@@ -375,11 +292,11 @@ def accuracy(
         failed = sum(not row.passed for row in rows)
         print(f"{len(rows) - failed} of {len(rows)} within what is allowed; wrote {folder / 'stress.csv'}")
         raise typer.Exit(1 if failed else 0)
-    loaded, problem, _, result = _optimise(loaded)
-    truth, points = measure(problem, result.best[0].angles_rad, _say)
+    optimum = optimum_of(loaded, _say)
+    truth, points = measure(optimum.problem, optimum.search.best[0].angles_rad, _say)
     folder.mkdir(parents=True, exist_ok=True)
     report.write_points(folder / "work_precision.csv", points, truth)
-    report.work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {_title(loaded)}")
+    report.work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
     print(f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}")
     for point, front in zip(points, on_front(points, truth.J_error), strict=True):
         seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
@@ -398,18 +315,20 @@ def compare(
     """Put the optimum of a task beside the usual mounts and ready-made scanners: table, CSV and picture."""
     from design import compare as comparison
     from design.compare_picture import compare_picture
+    from design.optimum import optimum_of
     from design.task import load_task
 
     loaded = load_task(task)
     with comparison.report_folder(out / loaded.task.name) as folder:
-        loaded, problem, _, result = _optimise(loaded)
-        rows = comparison.compare(loaded, problem, result.best[0], _say)
+        optimum = optimum_of(loaded, _say)
+        rows = comparison.compare(optimum.loaded, optimum.problem, optimum.search.best[0], _say)
         comparison.write_csv(folder / "compare.csv", rows)
-        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {_title(loaded)}, and what else there is")
+        title = f"{loaded.task.name}: {optimum.title}, and what else there is"
+        compare_picture(folder / "compare.png", rows, title)
     if as_json:
         _print_json({"task": loaded.task.name, "rows": [asdict(row) for row in rows]})
         return
-    for line in [*comparison.table(rows), *comparison.notes(loaded)]:
+    for line in [*comparison.table(rows), *comparison.notes(optimum.loaded)]:
         print(line)
     print(f"wrote compare.csv and compare.png to {out / loaded.task.name}")
 
@@ -711,6 +630,64 @@ def calibrate(
 
 
 @app.command()
+def study(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file, or the name of a shipped study.")],
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="A running Dask scheduler; else this computer works.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of tables and winners; default: out/STUDY.")
+    ] = None,
+    results: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Results, shared with the workers or not; default: OUT/results.")
+    ] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="Of this computer; default: one for each core.")] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Say what it would cost, and stop.")] = False,
+) -> None:
+    """Cross tasks with products, judge every candidate with its parts, and build the winners of the trade-off."""
+    from design.study.crossing import Crossing
+    from design.study.study import load_study
+
+    crossing = Crossing(load_study(study))
+    folder = out or Path("out") / crossing.loaded.study.name
+    kept = results or folder / "results"
+    if plan:
+        from design.study.plan import plan_of
+
+        for line in plan_of(crossing, kept, _say_in_place).lines():
+            print(line)
+        return
+    from cad.candidate import judge
+    from design.study.answer import write_answer
+    from design.study.cluster import cluster
+    from design.study.session import Session
+    from design.study.store import open_store
+
+    session = Session(crossing, open_store(kept), judge)
+    try:
+        with cluster(scheduler, processes) as client:
+            session.run(client, _say_in_place)
+        for line in write_answer(session, folder):
+            print(line)
+        for combination, loaded in session.winners():
+            _build_winner(loaded, folder / combination.name)
+    except KeyboardInterrupt:
+        print("scanwright: stopped; the same command goes on where it was", file=sys.stderr)
+        raise typer.Exit(130) from None
+    print(f"wrote study.csv, study.parquet and front.png to {folder}")
+
+
+def _build_winner(loaded: LoadedTask, target: Path) -> None:
+    from design.folder import is_current
+
+    if is_current(target, loaded):
+        print(f"{target}: nothing has changed, no work to do")
+        return
+    _build(loaded, target)
+    print(f"built {target}")
+
+
+@app.command()
 def catalogue(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
 ) -> None:
@@ -751,71 +728,6 @@ def run() -> None:
         sys.exit(2)
 
 
-def _optimise(loaded: LoadedTask) -> tuple[LoadedTask, Problem, dict[str, Score], SearchResult]:
-    """The task, its period found if it asks for the shortest, its numbers, the standard alignments, the search."""
-    from design.build import standard_settings
-    from design.fastest import fastest
-    from design.motion import Shortest
-    from design.objective import score
-    from design.problem import problem_of
-    from design.search import search
-
-    _say("reading the task (the first run compiles the numerics: some 20 s)")
-    if isinstance(loaded.task.motion, Shortest):
-        loaded, problem, result = fastest(loaded, _say)
-        _say(f"one turn in {loaded.task.motion.duration_s:g} s: the shortest found that keeps the limits")
-    else:
-        problem = problem_of(loaded)
-        result = search(problem, loaded.task.angles, _say, loaded.task.limits)
-    return loaded, problem, {name: score(problem, setting) for name, setting in standard_settings().items()}, result
-
-
-def _print_optimum(result: SearchResult, standard: dict[str, Score]) -> None:
-    import math
-
-    print("  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings")
-    for family in result.best:
-        a, b, c, d = family.angles_deg
-        error = f"{family.score.J_error:.0e}"
-        print(
-            f"{a:11.2f} {b:9.2f} {c:12.2f} {d:11.2f} {family.score.J:9.4f}   {error} {family.members:9} {family.word}"
-        )
-    best = result.best[0].score
-    for name, other in standard.items():
-        print(f"beams per ball over the weighted region: {math.exp(other.J - best.J):.2f} x {name} (J = {other.J:.4f})")
-
-
-def _print_chosen(chosen: Chosen) -> None:
-    setting = ", ".join(f"{angle:g}" for angle in chosen.family.angles_deg)
-    print(
-        f"built ({setting}): J = {chosen.family.score.J:.4f} with its parts, which hide {chosen.hidden:.1%} of the "
-        f"beams ({chosen.bare.J:.4f} without); of {chosen.bounded} settings bounded, {chosen.built} made, "
-        f"{len(chosen.refused)} refused"
-    )
-    for reason in chosen.refused:
-        print(f"refused {reason}")
-    if chosen.open:
-        print(f"{chosen.open} more families might be better with their parts: not made")
-
-
-def _title(loaded: LoadedTask) -> str:
-    task = loaded.task
-    verb = "out and back" if task.motion.mode == "sweep" else "one turn"
-    return f"{task.sensor}, {verb} in {task.motion.duration_s:g} s"
-
-
-def _four_angles(text: str) -> list[float]:
-    from design.errors import TaskError
-
-    try:
-        angles = [float(part) for part in text.split(",")]
-    except ValueError:
-        angles = []
-    if len(angles) != 4 or not all(abs(angle) <= 360 for angle in angles):
-        raise TaskError(f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling")
-    return angles
-
-
 @contextmanager
 def _on_duty() -> Iterator[None]:
     """Go first where the system allows it (times get blurred on a busy computer), and end well on every signal."""
@@ -839,20 +751,6 @@ def _say_in_place(line: str) -> None:
         print(f"\r\033[K  .. {line}", end="" if "%" in line else "\n", file=sys.stderr, flush=True)
     else:
         _say(line)
-
-
-def _lever(text: str) -> tuple[float, float, float]:
-    from design.errors import TaskError
-
-    try:
-        x_mm, y_mm, range_m = (float(part) for part in text.split(","))
-    except ValueError:
-        x_mm = y_mm = range_m = 0.0
-    if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
-        raise TaskError(
-            f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
-        )
-    return x_mm / 1000 / range_m, y_mm / 1000 / range_m, 0.0
 
 
 def _say(line: str) -> None:

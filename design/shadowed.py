@@ -51,6 +51,19 @@ class Chosen:
     refused: tuple[str, ...]
     open: int
 
+    def lines(self) -> list[str]:
+        """What was chosen, and what was not and why."""
+        setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
+        lines = [
+            f"built ({setting}): J = {self.family.score.J:.4f} with its parts, which hide {self.hidden:.1%} of the "
+            f"beams ({self.bare.J:.4f} without); of {self.bounded} settings bounded, {self.built} made, "
+            f"{len(self.refused)} refused",
+            *(f"refused {reason}" for reason in self.refused),
+        ]
+        if self.open:
+            lines.append(f"{self.open} more families might be better with their parts: not made")
+        return lines
+
 
 def choose(
     problem: Problem,

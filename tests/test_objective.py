@@ -105,7 +105,7 @@ def test_no_error_is_stated_above_a_thousandth(seed):
     assert 0 < one.J_error <= 1e-3
 
 
-def by_spirals(p, setting, count=30_000, sets=8):
+def by_spirals(p, setting, count=60_000, sets=8):
     """J as a sum over randomly turned Fibonacci spirals, and five standard errors; no polar rule, no circle."""
     axis = R_world_rot(*setting[:2])[:, 2]
     polar, azimuth = polar_and_azimuth(beam_directions_rot(p.bearings_rad, *setting[2:]))
@@ -213,7 +213,7 @@ def test_masked_directions_leave_the_sum_and_the_normaliser():
     whole, left, cone = (score(p, setting) for p in (problem([ALL]), problem([ALL], mask=[CONE]), problem([CONE])))
     total = left.J * (1 - hidden) + cone.J * hidden
     assert total == pytest.approx(whole.J, abs=whole.J_error + left.J_error + cone.J_error)
-    assert abs(left.J - whole.J) > 10 * (left.J_error + whole.J_error)
+    assert abs(left.J - whole.J) > 3 * (left.J_error + whole.J_error)
 
 
 def test_the_setting_counts_and_the_zonal_shares_are_told():
