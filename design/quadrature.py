@@ -7,6 +7,7 @@ an edge of the region or passes a corner of it, and where a density starts, ends
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,10 +121,17 @@ def _breaks(field: Field, axis: Array) -> Array:
     planes = np.concatenate([field.weight.planes, field.mask.planes])
     if len(planes) > MANY_EDGES:
         return np.radians(np.arange(0, 181.0))
-    points = np.concatenate([_touched(planes, axis), _corners(planes)])
-    points = points[_is_edge(field, points)]
+    touched = _touched(planes, axis)
+    points = np.concatenate([touched[_is_edge(field, touched)], _edge_corners(field)])
     passing = np.arctan2(np.linalg.norm(np.cross(points, axis), axis=1), points @ axis)
     return np.concatenate([[0.0, np.pi], passing])
+
+
+@lru_cache(maxsize=64)
+def _edge_corners(field: Field) -> Array:
+    """Corners of the region, the same about every axis."""
+    corners = _corners(np.concatenate([field.weight.planes, field.mask.planes]))
+    return corners[_is_edge(field, corners)]
 
 
 def _is_edge(field: Field, points: Array) -> NDArray[np.bool_]:

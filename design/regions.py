@@ -40,9 +40,9 @@ class Layers:
     caps: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """Weight and mask of a task."""
+    """Weight and mask of a task; equal to itself only, so that what is computed of one can be kept with it."""
 
     weight: Layers
     mask: Layers
