@@ -23,9 +23,12 @@ class Samples:
     weights: Array
 
 
-def spiral(count: int, turn_rad: float = 0.0, cap_rad: float = np.pi) -> Array:
-    """Fibonacci spiral: `count` directions of equal solid angle within `cap_rad` of z, shape (count, 3)."""
-    k = np.arange(count) + 0.5
+def spiral(count: int, turn_rad: float = 0.0, cap_rad: float = np.pi, shift: float = 0.5) -> Array:
+    """Fibonacci spiral: `count` directions of equal solid angle within `cap_rad` of z, shape (count, 3).
+
+    Each stands for a slice of the cap; `shift` is where in it, 0 to 1.
+    """
+    k = np.arange(count) + shift
     z = 1 - (1 - np.cos(cap_rad)) * k / count
     r = np.sqrt(np.maximum(1 - z * z, 0.0))
     phi = turn_rad + 2 * np.pi * k / GOLDEN
@@ -41,7 +44,7 @@ def equal_angle_grid(step_deg: float) -> Array:
     return grid.reshape(-1, 3)
 
 
-def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0) -> Samples:
+def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: float = 0.5) -> Samples:
     """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
 
     Every painted region has a cap that holds it, and gets a spiral of its own in what the caps before it leave.
@@ -50,7 +53,7 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0) -> Sample
         TaskError: no direction has a weight.
     """
     caps = field.weight.caps if field.background == 0 else np.vstack([field.weight.caps, SPHERE])
-    found = [_in_cap(field, caps, i, wanted // len(caps) + 1, turn_rad) for i in range(len(caps))]
+    found = [_in_cap(field, caps, i, wanted // len(caps) + 1, turn_rad, shift) for i in range(len(caps))]
     if not any(len(samples.weights) for samples in found):
         raise TaskError(
             f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
@@ -64,6 +67,9 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0) -> Sample
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
     """The set of that number: sets share no ring of the spiral, so no two cut a region's edges alike.
 
+    Nor do they stand at the same place in the slices of a cap: what the middle of each misses of a density that is
+    zonal about the cap would be common to all, and their spread would not tell of it.
+
     With a grid step it is the paper's grid, the same for every number.
 
     Raises:
@@ -73,16 +79,16 @@ def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: in
         grid = equal_angle_grid(grid_step_deg)
         weights = field.weight_at(grid)
         return Samples(grid[weights > 0], weights[weights > 0])
-    return weighted_samples(field, wanted + 17 * index, turn_rad=float(index))
+    return weighted_samples(field, wanted + 17 * index, turn_rad=float(index), shift=(0.5 + index / GOLDEN) % 1)
 
 
-def _in_cap(field: Field, caps: Array, index: int, wanted: int, turn_rad: float) -> Samples:
+def _in_cap(field: Field, caps: Array, index: int, wanted: int, turn_rad: float, shift: float) -> Samples:
     """Weighted directions in one cap and in none before it; denser until there are enough, or it is given up."""
     centre, reach = caps[index, :3], float(caps[index, 3])
     to_centre = frames_about(centre[None])[0]
     count = wanted
     while True:
-        directions = spiral(count, turn_rad, reach) @ to_centre
+        directions = spiral(count, turn_rad, reach, shift) @ to_centre
         new = np.ones(count, dtype=bool)
         for before in caps[:index]:
             new &= directions @ before[:3] < np.cos(before[3])
