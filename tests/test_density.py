@@ -346,6 +346,6 @@ def test_the_oracle_sees_a_density_that_is_a_tenth_off(problems):
 def test_directions_in_rings_about_the_axis_tell_of_the_error_they_share(problems):
     """An upright axis: the density is zonal about the spiral itself, and what one ring misses, all miss."""
     problem, setting = problems["uniform", 2.0, 2.0], np.radians([0, 0, 30, 0])
-    exact, ball = score(problem, setting), oracle.ball_score(problem, setting, directions=1000)
+    exact, ball = score(problem, setting), oracle.ball_score(problem, setting, directions=400)
     assert abs(exact.J - ball.J) <= exact.J_error + ball.J_error
-    assert ball.J_error < 0.01
+    assert ball.J_error < 0.02
