@@ -11,7 +11,6 @@ from design.folding import Folded, Mask
 from design.frames import Array, R_world_rot
 from design.landscape import Landscape
 from design.objective import Score, quick_J, score
-from design.parallel import in_chunks
 from design.problem import NODES, Problem
 from design.robust import worst_within
 from design.task import NAMES, AngleRanges
@@ -142,19 +141,20 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
 
 def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> tuple[Family, ...]:
     """Score leaders exactly and refine the minima, the winner twice; valleys of better ones are dropped."""
-    minima = _scored(problem, [leader for leader in leaders if leader.minimum])
-    refined = _all_refined(problem, ranges, [leader for _, leader in minima])
+    minima = [(score(problem, np.radians(leader.angles_deg)), leader) for leader in leaders if leader.minimum]
+    minima.sort(key=lambda pair: pair[0].J)
     families: list[Family] = []
-    for (grid_score, leader), (angles_deg, again) in zip(minima, refined, strict=True):
+    for grid_score, leader in minima:
         if len(families) == FAMILIES:
             break
-        if any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
-            continue
-        # the rounder angles of the grid are as good
-        if again.J + again.J_error >= grid_score.J and not ranges.tolerance_deg:
-            families.append(_family(leader.angles_deg, grid_score, leader))
-        elif not any(_same_valley(angles_deg, again.J, better) for better in families):
-            families.append(_family(angles_deg, again, leader))
+        if not any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
+            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2])
+            again = score(problem, np.radians(refined))
+            # the rounder angles of the grid are as good
+            if again.J + again.J_error >= grid_score.J and not ranges.tolerance_deg:
+                families.append(_family(leader.angles_deg, grid_score, leader))
+            elif not any(_same_valley(refined, again.J, better) for better in families):
+                families.append(_family(refined, again, leader))
     for leader in leaders:
         if len(families) == FAMILIES:
             break
@@ -163,27 +163,6 @@ def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) ->
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
-
-
-def _scored(problem: Problem, leaders: list[Leader]) -> list[tuple[Score, Leader]]:
-    """Leaders with their scores, best first; each on a core of its own, as it is too small to share."""
-    parts = in_chunks(
-        lambda chunk: [(score(problem, np.radians(leader.angles_deg)), leader) for leader in leaders[chunk]],
-        len(leaders),
-        smallest=1,
-    )
-    return sorted((pair for part in parts for pair in part), key=lambda pair: pair[0].J)
-
-
-def _all_refined(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> list[tuple[Array, Score]]:
-    """Leaders refined and scored there, the first twice; each on a core of its own."""
-
-    def one(i: int) -> tuple[Array, Score]:
-        refined = _refined(problem, ranges, leaders[i], REFINE_ROUNDS[: 1 if i else 2])
-        return refined, score(problem, np.radians(refined))
-
-    parts = in_chunks(lambda chunk: [one(i) for i in range(len(leaders))[chunk]], len(leaders), smallest=1)
-    return [found for part in parts for found in part]
 
 
 def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
