@@ -1,7 +1,7 @@
 """Binary glTF 2.0 from canonical meshes: metres, a tree of named nodes, the same bytes for the same scene.
 
 glTF is y-up and the project z-up: the tree hangs under one node that turns z to y, so every pose below it is the
-project's own. Faces carry no normals; the format has viewers shade them flat then.
+project's own. Normals are those of the surface: round where it is round, sharp at its edges.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cad.mesh import Mesh
 from design.frames import Array
@@ -19,6 +20,8 @@ from design.frames import Array
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
 Z_TO_Y = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]  # quaternion of a quarter turn about -x
+CREASE_RAD = np.radians(25.0)  # faces that meet at more have an edge between them; facets of a round meet at 0.1 rad
+NORMAL_DECIMALS = 4
 QUARTERS = 4  # of a turn: linear interpolation of quaternions is exact between them at constant speed
 
 
@@ -117,13 +120,55 @@ class _Buffer:
 
 
 def _primitive(buffer: _Buffer, mesh: Mesh, material: int) -> dict[str, Any]:
-    points = (mesh.vertices / 1000).astype("<f4")
+    vertices, normals, corners = shaded(mesh)
+    points = (vertices / 1000).astype("<f4")
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     position = buffer.add(points, "VEC3", FLOAT, VERTICES, min=low, max=high)
+    normal = buffer.add(normals.astype("<f4"), "VEC3", FLOAT, VERTICES)
     short = len(points) < 2**16 - 1
-    corners = mesh.faces.ravel().astype("<u2" if short else "<u4")
-    indices = buffer.add(corners, "SCALAR", UINT16 if short else UINT32, INDICES)
-    return {"attributes": {"POSITION": position}, "indices": indices, "material": material}
+    indices = buffer.add(corners.astype("<u2" if short else "<u4"), "SCALAR", UINT16 if short else UINT32, INDICES)
+    return {"attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material}
+
+
+def shaded(mesh: Mesh) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
+
+    A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of
+    the faces about it that have no edge towards this one, each as wide as its corner.
+    """
+    corners = mesh.vertices[mesh.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(cross, axis=1)
+    normal = cross / np.maximum(length, 1e-300)[:, None]
+    vertex = mesh.faces.ravel()
+    one, other = _about_one_vertex(vertex)
+    alike = np.einsum("ij,ij->i", normal[one // 3], normal[other // 3]) > np.cos(CREASE_RAD)
+    alike |= length[one // 3] == 0  # a sliver has no normal of its own
+    weight = np.where(alike, _widths(corners).ravel()[other], 0.0)
+    mean = np.stack([np.bincount(one, weight * normal[other // 3, k], len(vertex)) for k in range(3)], axis=1)
+    unit = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    keys = np.column_stack([vertex, np.round(unit, NORMAL_DECIMALS) + 0.0])
+    distinct, number = np.unique(keys, axis=0, return_inverse=True)
+    return mesh.vertices[distinct[:, 0].astype(int)], distinct[:, 1:], number.ravel()
+
+
+def _about_one_vertex(vertex: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs of corners, a corner with itself included, that are at the same vertex."""
+    order = np.argsort(vertex, kind="stable")
+    counts = np.bincount(vertex)
+    first = np.cumsum(counts) - counts
+    partners = counts[vertex]
+    one = np.repeat(np.arange(len(vertex)), partners)
+    turn = np.arange(len(one)) - np.repeat(np.cumsum(partners) - partners, partners)
+    return one, order[first[vertex[one]] + turn]
+
+
+def _widths(corners: Array) -> Array:
+    """Angles of triangles (m, 3, 3) at their corners [rad], shape (m, 3)."""
+    forth = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(corners, 1, axis=1) - corners
+    across = np.linalg.norm(np.cross(forth, back), axis=2)
+    return np.arctan2(across, np.einsum("mij,mij->mi", forth, back))
 
 
 def _material(node: Node) -> dict[str, Any]:

@@ -26,7 +26,7 @@ SQUARE_DEGREES = 41_253  # on the whole sphere
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
     """`task.toml` with every default written out; files that it names come along, so the folder builds by itself."""
-    table = loaded.task.model_dump(mode="json", exclude_none=True)
+    table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # it makes no part
     for key in ("weight", "mask"):
         for i, region in enumerate(getattr(loaded.task, key)):
             if isinstance(region, Map | Mesh):
@@ -42,10 +42,13 @@ def write_task(folder: Path, loaded: LoadedTask) -> None:
 def write_search(folder: Path, result: SearchResult) -> None:
     """`search.csv`: for every scan-plane setting of the grid the lowest J, and the axis it was found about.
 
-    J is that of the search, on few nodes; where it cannot win it is the bound from the mean density.
+    And `axes.csv`: for every axis of the grid the lowest J of all scan planes. J is that of the search, on few nodes;
+    where it cannot win it is the bound from the mean density.
     """
     header = "alpha_laser_deg,beta_laser_deg,J,alpha_rot_deg,beta_rot_deg"
     np.savetxt(folder / "search.csv", result.planes, delimiter=",", header=header, comments="", fmt="%.5g")
+    header = "alpha_rot_deg,beta_rot_deg,J"
+    np.savetxt(folder / "axes.csv", result.axes, delimiter=",", header=header, comments="", fmt="%.5g")
 
 
 def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:

@@ -118,7 +118,7 @@ def _map(
     axis.set_ylabel(f"{names[1]} [deg]")
     for side, values in ((axis.xaxis, x), (axis.yaxis, y)):
         if np.ptp(values) >= 4 * TICKS_DEG:
-            side.set_major_locator(MultipleLocator(TICKS_DEG))
+            side.set_major_locator(MultipleLocator(TICKS_DEG * (1 + (np.ptp(values) > 180))))
 
 
 def _curve(

@@ -1,6 +1,7 @@
 """What several test files share."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -40,6 +41,70 @@ def command(monkeypatch, capsys):
         return code, printed.out, [line for line in printed.err.splitlines() if not line.startswith("  ..")]
 
     return run
+
+
+CHROMIUM = [
+    "--no-sandbox",  # it refuses to run as root otherwise
+    "--use-angle=swiftshader",  # WebGL 2 without a graphics card
+    "--enable-unsafe-swiftshader",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+]
+AT_HOME = ("file://", "data:", "blob:", "about:", "http://127.0.0.1:", "ws://127.0.0.1:")
+
+
+class Browser:
+    """Chromium with the network off but for 127.0.0.1; what a page asks of anybody else, or complains of, is kept.
+
+    Attributes:
+        complaints: errors and warnings of the console, uncaught errors, dialogs, and requests that leave the machine.
+    """
+
+    def __init__(self, chromium):
+        self.chromium = chromium
+        self.complaints = []
+
+    def open(self, address, width=1400, height=900, **options):
+        """A page of its own, with nothing kept from another one, once it has loaded; options as Playwright has them."""
+        page = self.chromium.new_context(viewport={"width": width, "height": height}, **options).new_page()
+        page.set_default_timeout(60_000)  # for a machine that has much else to do
+        page.on("console", lambda said: said.type in ("error", "warning") and self.complaints.append(said.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda asked: self._seen(asked.url))
+        page.on("dialog", self._asked)
+        page.on("websocket", lambda asked: self._seen(asked.url))
+        page.goto(address)
+        return page
+
+    def _asked(self, dialog):
+        self.complaints.append(f"asked the person: {dialog.message}")
+        dialog.dismiss()
+
+    def _seen(self, url):
+        if not url.startswith(AT_HOME):
+            self.complaints.append(f"asked the network for {url[:200]}")
+
+
+@pytest.fixture(scope="module")  # not longer: while it is open its thread has a running event loop
+def chromium():
+    """Chromium without a screen; tests that need it are skipped on a machine without it."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("chromium is not installed (apt-get install chromium): pages are not driven in a browser")
+    with playwright.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=program, args=CHROMIUM)
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def browser(chromium):
+    """A `Browser`; the test fails when a page of it complained (a test that means to provoke it clears the list)."""
+    browser = Browser(chromium)
+    yield browser
+    for context in chromium.contexts:
+        context.close()
+    assert browser.complaints == []
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ FILES = {
     "task.toml",
     "angles.json",
     "search.csv",
+    "axes.csv",
     "density.png",
     "assembly.step",
     "assembly.glb",
@@ -68,6 +69,13 @@ def test_the_angle_set_is_the_optimum_of_its_task(ceiling):
     assert angles.task_sha256 == load_task(ceiling / "task.toml").sha256() == load_task(_shipped("ceiling")).sha256()
     assert angles.J < -5.5
     assert angles.t_world_rot_mm[2] < -80  # hangs: the deck is above the lidar's sweep
+
+
+def test_the_report_of_a_build_has_a_picture_of_every_place_that_a_check_names(ceiling):
+    checks = json.loads((ceiling / "checks.json").read_text())["checks"]
+    placed = [check for check in checks if check["where"] != "fdm-0.4"]  # a printer is no place
+    text = (ceiling / "report.html").read_text()
+    assert text.count('<button type="button" class="where"') == len(placed) > 20
 
 
 def test_a_second_run_does_no_work_and_says_so(ceiling, monkeypatch, capsys):

@@ -9,6 +9,9 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from cad.glb import shaded
+from cad.mesh import Mesh
+
 SIZE = {5123: ("<u2", 2), 5125: ("<u4", 4), 5126: ("<f4", 4)}
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 BOUGHT = ("servo_case", "servo_horn", "ring_", "lidar_", "bearing_inner", "bearing_outer")
@@ -63,10 +66,33 @@ def test_every_reference_and_every_bound_is_true(scene):
         facts = gltf["accessors"][primitive["attributes"]["POSITION"]]
         np.testing.assert_array_equal(points.min(axis=0), np.float32(facts["min"]))
         np.testing.assert_array_equal(points.max(axis=0), np.float32(facts["max"]))
+        normals = values(gltf, binary, primitive["attributes"]["NORMAL"])
+        assert normals.shape == points.shape
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=3e-4)
         corners = values(gltf, binary, primitive["indices"])
         assert corners.min() == 0 and corners.max() == len(points) - 1 and len(corners) % 3 == 0
         colour = gltf["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorFactor"]
         assert len(colour) == 4 and all(0 <= c <= 1 for c in colour)
+
+
+def canonical(body):
+    return Mesh(np.asarray(body.vertices, float), np.asarray(body.faces))
+
+
+def test_a_ball_is_shaded_round_and_a_box_sharp():
+    """The normals of the bodies that the meshes stand for, not those of their facets."""
+    vertices, normals, corners = shaded(canonical(trimesh.creation.icosphere(3, 10)))
+    assert len(vertices) == 642 and len(corners) == 3 * 1280
+    assert np.degrees(np.arccos(np.clip((vertices / 10 * normals).sum(axis=1), -1, 1))).max() < 1.5
+    vertices, normals, _ = shaded(canonical(trimesh.creation.box((10, 20, 30))))
+    assert len(vertices) == 24
+    np.testing.assert_array_equal(np.abs(normals).sum(axis=1), 1)  # along an axis each, outwards
+    assert ((vertices * normals).sum(axis=1) > 0).all()
+    vertices, normals, corners = shaded(canonical(trimesh.creation.cylinder(10, 30, sections=63)))
+    round_about = np.abs(normals[:, 2]) < 0.5
+    outwards = vertices[round_about] * [0.1, 0.1, 0]
+    np.testing.assert_allclose(normals[round_about], outwards, atol=0.02)  # facets alone would be off by 0.05
+    assert round_about.sum() == 126 and len(vertices) == 126 + 128
 
 
 def test_the_bodies_are_the_parts_in_metres_where_the_frame_chain_puts_them(made):

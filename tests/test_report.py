@@ -1,6 +1,9 @@
 """`report.html`: made of the files alone, whole, the same bytes again, nothing fetched, nothing smuggled in."""
 
 import html
+import io
+import itertools
+import json
 import os
 import re
 import shutil
@@ -15,6 +18,9 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib import colormaps
+from matplotlib.image import imsave
+from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
@@ -22,24 +28,44 @@ import scanwright
 from design import build as writer
 from design.angles import STANDARD_DEG, Angles, AngleSet
 from design.folder import is_current, manifest_of, write_json, write_manifest
+from design.frames import R_world_rot
 from design.left_out import LeftOut
 from design.motion import Sweep
+from design.objective import quick_J
+from design.problem import NODES, problem_of
 from design.report import scene as report_scene
 from design.report.answer import hidden_by, sight_of
 from design.report.page import report_html, write_report
-from design.report.scene import scene_of
+from design.report.scene import bodies_of, scene_of
+from design.report.sphere import SHADES, STEP_DEG, sphere_of
 from design.report.steps import steps_html
+from design.report.where import Body, Pictures, named_in
 from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 from design.task import load_task
 
-SECTIONS = ["answer", "scanner", "density", "settings", "checks", "bom", "steps", "drawings", "left-out", "again"]
+SECTIONS = [
+    "answer",
+    "scanner",
+    "density",
+    "settings",
+    "error",
+    "checks",
+    "bom",
+    "steps",
+    "drawings",
+    "left-out",
+    "again",
+]
 PAGE = Path(report_scene.__file__).parent
+CODE = [PAGE / name for name in ("page.js", "three.js", "scanner.js", "sphere.js")]
 VOID = {"meta", "link", "img", "input", "br"}
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 EVIL = "</script><script>alert(1)</script>"
 ROLLING = Angles(
     **dict(zip(("alpha_rot", "beta_rot", "alpha_laser", "beta_laser"), STANDARD_DEG["rolling"], strict=True))
 )
+ALPHA, BETA = (angle.ravel() for angle in np.meshgrid(np.arange(-180, 181, 15), np.arange(-90, 91, 15)))
+AXES = np.stack([ALPHA, BETA, -4 + ((ALPHA - 60) / 90) ** 2 + ((BETA - 30) / 60) ** 2], axis=1)
 ANGLES = AngleSet(
     task="ground_ahead",
     angles_deg=ROLLING,
@@ -114,20 +140,27 @@ def folder(tmp_path_factory):
     planes = np.stack([a, b, -5 + ((a - 45) ** 2 + (b + 90) ** 2) / 1e4, 0 * a, 90 + 0 * a], axis=1)
     header = "alpha_laser_deg,beta_laser_deg,J,alpha_rot_deg,beta_rot_deg"
     np.savetxt(folder / "search.csv", planes, "%.5g", ",", header=header, comments="")
+    np.savetxt(folder / "axes.csv", AXES, "%.5g", ",", header="alpha_rot_deg,beta_rot_deg,J", comments="")
     writer.write_left_out(folder, [LeftOut("masked directions", EVIL, 12345, "square degrees")])
-    (folder / "density.png").write_bytes(b"\x89PNG, of which the report reads nothing")
+    imsave(folder / "density.png", np.zeros((4, 4, 3)))
     (folder / "own_body.npz").write_bytes(own_body_bytes(*own_body()))
     apart = {"base_mount": (0, 0, -0.1), "lidar_body": (0, 0, 0.2)}
     (folder / "assembly.glb").write_bytes(glb(dict.fromkeys(apart, (0, 0, -0.1))))
     (folder / "exploded.glb").write_bytes(glb(apart))
-    checks = [{"severity": s, "message": f"{s} of {EVIL}"} for s in ("pass", "note", "warning", "error", "pass")]
+    places = {"pass": "rotor", "note": "fdm-0.4", "warning": "base_mount", "error": "base_mount and lidar_body"}
+    checks = [
+        {"severity": s, "message": f"{s} of {EVIL}", "where": places[s]}
+        for s in ("pass", "note", "warning", "error", "pass")
+    ]
     write_json(folder / "checks.json", {"schema": "scanwright/checks/1", "checks": checks})
     rows = ["bought,lidar,UTM-30LX,1,Hokuyo,,5000.0,5000.0,370.0,,yes,", 'total,all rows,,,,,,5438.5,,,,"sum of 4"']
     header = "kind,part,number,quantity,supplier,supplier_number,unit_usd,total_usd,mass_g,source,verified,note"
     (folder / "bom.csv").write_text("\n".join([header, *rows, ""]))
     (folder / "assembly.md").write_text(f"# Title\n\nLook at `exploded.glb`.\n\n## 1. Servo\n\n**4 x M4** {EVIL}\n")
     (folder / "drawings").mkdir()
-    (folder / "drawings" / "base_mount.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{EVIL}</svg>')
+    (folder / "drawings" / "base_mount.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><script>alert(1)</script></svg>'
+    )
     write_manifest(folder, loaded, [])
     write_report(folder)
     return folder
@@ -152,7 +185,7 @@ def test_every_section_is_there_and_every_link_leads_somewhere(page):
 
 def test_nothing_is_fetched(page, text):
     assert all(link.startswith(("#", "data:")) for link in page.links)
-    style, code = (PAGE / "style.css").read_text(), (PAGE / "page.js").read_text() + (PAGE / "viewer.js").read_text()
+    style, code = (PAGE / "style.css").read_text(), "".join(path.read_text() for path in CODE)
     assert not re.search(r"@import|url\(|//", style)
     assert not re.search(r"fetch|XMLHttpRequest|WebSocket|import\b|https?:|\.src\b", code)
     assert not re.search(r"https?://", text)
@@ -215,9 +248,14 @@ def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
     assert pitching.factor == pytest.approx(np.exp(pitching.J - ANGLES.J), abs=1e-3)
     # a blind cone of 45 deg, smaller by the ball of 2 deg; the mask covers part of it
     everywhere = (1 - np.cos(np.radians(43))) / 2
-    assert 0 < sight.blind_fraction < everywhere
+    assert 0 < sight.own.blind_fraction < everywhere
     assert sight.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
-    assert sight.line_gap_deg == pytest.approx(0.5)
+    assert sight.own.line_gap_deg == rolling.view.line_gap_deg == pytest.approx(0.5)
+    assert sight.own == rolling.view != pitching.view
+    assert sight.worst == pytest.approx(1 - np.exp(-max(sight.rises.values())), abs=1e-12)
+    problem = problem_of(load_task(Path("ground_ahead")))
+    off = [quick_J(problem, np.radians([0, 90 + d, 0, -90]), NODES) for d in (-1, 0, 1)]
+    assert sight.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
 
 
 def test_other_motions_and_objectives_make_no_claim_of_factors():
@@ -228,7 +266,7 @@ def test_other_motions_and_objectives_make_no_claim_of_factors():
 
 def test_what_is_in_the_files_stays_text(page, text):
     assert EVIL not in text
-    assert page.scripts == 2  # the data of the scene, and the code
+    assert page.scripts == 3  # the data of scanner and ball, and the code
     for section in ("checks", "steps", "left-out"):
         assert EVIL in page.text[section]
 
@@ -326,18 +364,21 @@ def test_a_scanner_too_large_for_a_page_is_left_out(folder, monkeypatch):
 
 
 def test_the_code_of_the_page_asks_for_what_is_there(folder, page):
-    code = (PAGE / "viewer.js").read_text()
-    assert set(re.findall(r'element\("([\w-]+)"\)', code)) <= set(page.ids)
+    code = (PAGE / "scanner.js").read_text()
+    for path in CODE:
+        assert set(re.findall(r'element\("([\w-]+)"\)', path.read_text())) <= set(page.ids)
     shown = scene_of(folder, ANGLES, own_body())
     assert set(re.findall(r"scene\.(\w+)", code)) <= shown.keys()
     assert set(re.findall(r"scene\.fan\.(\w+)", code)) <= shown["fan"].keys()
     assert set(re.findall(r"\bbody\.(\w+)", code)) <= {*shown["bodies"][0], "array", "count", "type"}
+    ball = sphere_of(load_task(Path("ground_ahead")), ANGLES, None).data()
+    assert set(re.findall(r"scene\.(\w+)", (PAGE / "sphere.js").read_text())) <= ball.keys()
 
 
 def test_the_table_of_settings_names_the_lowest(page):
     settings = " ".join(page.text["settings"].split())
     assert "The lowest J in the table is -5.0, and 1 setting has it" in settings
-    assert "For 25 ways to mount the laser" in settings
+    assert "25 ways to mount the laser on the axis, and 325 ways to mount the axis on the robot" in settings
 
 
 def test_the_manifest_in_the_page_is_that_of_the_folder(folder, page, text):
@@ -358,3 +399,275 @@ def test_steps_are_headings_paragraphs_and_lists():
 @given(st.text(st.characters(exclude_characters="#*`-\r\n", exclude_categories=["C", "Z"]), min_size=1))
 def test_a_step_in_plain_words_comes_through_unchanged(words):
     assert html.unescape(steps_html(words)) == f"<p>{words}</p>"
+
+
+def picture(data):
+    return Image.open(io.BytesIO(b64decode(data.partition(",")[2]))).convert("RGB")
+
+
+def cell(direction):
+    """Column and row of a direction in a picture of the sphere, by another way than the pictures are made."""
+    x, y, z = direction / np.linalg.norm(direction)
+    phi, theta = np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(np.hypot(x, y), z))
+    return int((phi + 180) / STEP_DEG) % int(360 / STEP_DEG), int(theta / STEP_DEG)
+
+
+def test_the_pictures_of_the_sphere_show_what_is_where():
+    loaded = load_task(Path("ground_ahead"))
+    ball = sphere_of(loaded, ANGLES, AXES)
+    assert [view.title for view in ball.views] == [
+        "density of this scanner",
+        "density of rolling",
+        "density of pitching",
+        "J over the direction of the axis",
+    ]
+    own, rolling, pitching, axes = (picture(view.picture) for view in ball.views)
+    assert own.tobytes() == rolling.tobytes() != pitching.tobytes()
+    shades = {tuple((np.array(colormaps["cividis"](i / (SHADES - 1))[:3]) * 255).round()) for i in range(SHADES)}
+    bright = max(shades, key=sum)
+    # rolling is densest along its axis, ahead and behind; behind it sees nothing within 43 deg, and the robot is there
+    assert own.getpixel(cell(np.array([1, 0, 0]))) == bright
+    assert own.getpixel(cell(np.array([-1, 0.2, 0.2]))) == (255, 255, 255)
+    assert own.getpixel(cell(np.array([-1, 0, -0.5]))) in [(221, 221, 221), (119, 119, 119)]
+    assert pitching.getpixel(cell(np.array([0, 1, 0]))) == pitching.getpixel(cell(np.array([0, -1, 0]))) == bright
+    theta, phi = np.radians(95), np.radians(-20)  # on the upper edge of the region
+    edge = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    assert own.getpixel(cell(edge)) == (17, 17, 17)
+    # the best axis is the brightest; its mirror image to the right is not
+    best = R_world_rot(np.radians(60), np.radians(30))[:, 2]
+    assert axes.getpixel(cell(best)) == bright != axes.getpixel(cell(best * [1, -1, 1]))
+    np.testing.assert_allclose(ball.axis_world, [1, 0, 0], atol=1e-6)
+
+
+def test_axes_that_nobody_searched_stay_white():
+    loaded = load_task(Path("ground_ahead"))
+    few = AXES[np.abs(AXES[:, 0] - 60) <= 15]
+    axes = picture(sphere_of(loaded, ANGLES, few).views[-1].picture)
+    assert axes.getpixel(cell(R_world_rot(np.radians(60), 0.0)[:, 2])) != (255, 255, 255)
+    assert axes.getpixel(cell(R_world_rot(np.radians(-60), 0.0)[:, 2])) == (255, 255, 255)
+    assert len(sphere_of(loaded, ANGLES, AXES[:1]).views) == 3
+
+
+def test_a_check_knows_its_bodies():
+    names = ["alignment_linkage", "base_mount", "lidar_body", "lidar_cap", "ring_rotor", "servo_case", "servo_horn"]
+    turning = {"alignment_linkage", "lidar_body", "lidar_cap", "ring_rotor", "servo_horn"}
+    bodies = {name: Body(np.zeros((1, 3, 3)), name in turning) for name in [*names, "servo_shaft"]}
+    bought = {"UTM-30LX": "lidar", "MX-64R": "servo", "UH1256": "slip ring"}
+    for where, expected in {
+        "base_mount": {"base_mount"},
+        "servo_shaft and ring_rotor": {"servo_shaft", "ring_rotor"},
+        "servo": {"servo_case", "servo_horn"},
+        "MX-64R": {"servo_case", "servo_horn"},
+        "UH1256": {"ring_rotor"},
+        "UTM-30LX": {"lidar_body", "lidar_cap"},
+        "beams at -3.00 to 4.50 deg": {"lidar_body", "lidar_cap"},
+        "rotor": turning,
+        "fdm-0.4": set(),
+        "": set(),
+    }.items():
+        assert set(named_in(where, bodies, bought)) == expected, where
+
+
+def test_the_picture_of_a_check_is_dark_where_its_body_is(folder):
+    bodies = bodies_of(folder / "assembly.glb")
+    pictures = Pictures(bodies)
+    yaw, pitch = np.radians(40), np.radians(22)
+    right = np.array([-np.sin(yaw), np.cos(yaw), 0])
+    up = np.array([-np.cos(yaw) * np.sin(pitch), -np.sin(yaw) * np.sin(pitch), np.cos(pitch)])
+    for name, body in bodies.items():
+        shot = np.asarray(picture(pictures.of((name,))), float)
+        named = shot[:, :, 0] - shot[:, :, 2] > 60
+        rows, columns = np.nonzero(named)
+        every = np.concatenate([b.triangles_m.reshape(-1, 3) for b in bodies.values()])
+        own = body.triangles_m.reshape(-1, 3)
+        for axis, pixels, size, sign in ((right, columns, 200, 1), (up, rows, 150, -1)):
+            whole, part = every @ axis, own @ axis
+            pixel = max(np.ptp(every @ right) / 200, np.ptp(every @ up) / 150) * 1.04
+            centre = size / 2 + sign * ((part.min() + part.max()) - (whole.min() + whole.max())) / 2 / pixel
+            assert (pixels.min() + pixels.max() + 1) / 2 == pytest.approx(centre, abs=2)
+            assert np.ptp(pixels) + 1 == pytest.approx(np.ptp(part) / pixel, abs=3)
+
+
+# ---- in a browser ----
+
+
+def shot_of(page, selector):
+    """Colours of what is shown, 0 to 1, once the page has drawn what it was asked for."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return np.asarray(Image.open(io.BytesIO(page.locator(selector).screenshot())).convert("RGB"), float) / 255
+
+
+def lilac(shot):
+    """Where the bodies of the fixture are: red and blue are well above green there, not so in the fan."""
+    return (shot[:, :, 2] - shot[:, :, 1] > 0.25) & (shot[:, :, 0] - shot[:, :, 1] > 0.1)
+
+
+def changed(one, other):
+    """Whether two pictures show different things: more than a pixel of an edge here and there."""
+    return (np.abs(one - other).max(axis=2) > 0.1).mean() > 2e-3
+
+
+def until(page, condition):
+    """Wait for a condition in JavaScript; Playwright's own way needs `eval`, which the page forbids."""
+    look = f"const look = () => ({condition}) ? done(true) : requestAnimationFrame(look)"
+    late = "setTimeout(() => done(false), 60000)"
+    assert page.evaluate(f"() => new Promise((done) => {{ {look}; {late}; look(); }})"), condition
+
+
+@pytest.fixture
+def shown(browser, folder):
+    """The report, wide."""
+    return browser.open((folder / "report.html").as_uri())
+
+
+def test_the_page_is_whole_with_the_network_off(shown):
+    """And the console is silent, nothing is asked of anybody: the fixture holds that for every test with it."""
+    sizes = shown.evaluate("Promise.all([...document.images].map((i) => i.decode().then(() => i.naturalWidth)))")
+    assert len(sizes) >= 12 and min(sizes) > 0
+    assert shown.locator("#hint, #sphere-hint").evaluate_all("all => all.every((hint) => hint.hidden)")
+    assert shown.evaluate("document.documentElement.scrollWidth") <= 1400
+    scanner = shot_of(shown, "#canvas")
+    assert lilac(scanner).mean() > 0.01
+    for key in ("ArrowLeft", "ArrowRight"):  # a second picture is no worse than the first one
+        shown.locator("#canvas").press(key)
+    inside = slice(5, -5), slice(5, -5)  # of the frame that has the focus now
+    assert not changed(shot_of(shown, "#canvas")[inside], scanner[inside])
+
+
+def test_every_control_of_the_scanner_does_what_it_says(shown):
+    shown.uncheck("#fan")
+    start = shot_of(shown, "#canvas")
+    area = lilac(start).sum()
+
+    def middle(shot):
+        return np.argwhere(lilac(shot)).mean(axis=0)
+
+    shown.locator("#axis").fill("90")
+    turned = shot_of(shown, "#canvas")
+    assert changed(turned, start) and shown.inner_text("#axis-shown") == "90.0 deg"
+    shown.locator("#axis").fill("0")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.locator("#apart").fill("1")
+    apart = shot_of(shown, "#canvas")
+    assert changed(apart, start) and 0.1 * area < lilac(apart).sum()
+    shown.locator("#apart").fill("0")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.click("#nearer")
+    assert lilac(shot_of(shown, "#canvas")).sum() > 1.2 * area
+    shown.click("#farther")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.check("#fan")
+    fan = shot_of(shown, "#canvas")
+    light, dark = (np.abs(fan - colour).max(axis=2) < 0.02 for colour in ([0.98, 0.88, 0.64], [0.15] * 3))
+    assert light.mean() > 0.02 < light.sum() / dark.sum() and dark.sum() > 100  # two fifths of it over white
+    for axis, count in (("89.5", 200), ("90", 100), ("359.5", 100), ("0", 200)):
+        shown.locator("#axis").fill(axis)
+        until(shown, f"document.getElementById('fan-shown').textContent == '{count} of 1081 beams hidden'")
+    box = shown.locator("#canvas").bounding_box()
+    shown.mouse.move(box["x"] + 300, box["y"] + 300)
+    shown.mouse.down()
+    shown.mouse.move(box["x"] + 400, box["y"] + 250)
+    shown.mouse.up()
+    assert changed(shot_of(shown, "#canvas"), fan)
+    assert np.abs(middle(shot_of(shown, "#canvas")) - middle(fan)).max() > 1
+
+
+def test_the_axis_spins_as_fast_as_in_a_scan(shown):
+    shown.clock.install(time=0)
+    shown.clock.pause_at(60_000)  # time passes as this test says, however busy the machine is
+    press = "document.getElementById('spin').click()"  # Playwright's own waits for time to pass
+    exact = "Number(document.getElementById('axis').dataset.exact)"
+    shown.evaluate(press)
+    shown.clock.run_for(500)
+    start = shown.evaluate(exact)
+    shown.clock.run_for(3000)
+    assert shown.evaluate(exact) - start == pytest.approx(3 * 360 / 18, abs=0.5)
+    shown.clock.run_for(15_000)
+    assert 0 < shown.evaluate(exact) < 20  # round once
+    shown.evaluate(press)
+    assert shown.get_attribute("#spin", "aria-pressed") == "false"
+
+
+def test_a_check_shows_where(shown):
+    shown.uncheck("#fan")
+    both = lilac(shot_of(shown, "#canvas")).sum()
+    shown.locator("#checks tr.warning button").click()
+    assert shown.inner_text("#picked-shown") == "base_mount"
+    one = shot_of(shown, "#canvas")
+    assert 0.1 * both < lilac(one).sum() < 0.9 * both
+    shown.locator("#checks tr.error button").click()
+    assert lilac(shot_of(shown, "#canvas")).sum() == pytest.approx(both, rel=0.02)
+    shown.locator("#checks tr.warning button").click()
+    shown.click("#everything")
+    assert lilac(shot_of(shown, "#canvas")).sum() == pytest.approx(both, rel=0.02)
+    assert not shown.is_visible("#picked")
+
+
+def test_the_ball_is_wrapped_the_right_way_round(shown):
+    """What is in its middle is what its picture has in the direction of the camera."""
+    seen = []
+    look_deg = json.loads(shown.locator("#sphere").text_content())["look_deg"]
+    assert look_deg[0] == 25 and -45 < look_deg[1] < -25  # the region is ahead and 5 to 60 deg down
+    for number in range(4):
+        shown.select_option("#sphere-choice", str(number))
+        title = shown.locator("#sphere-choice option").nth(number).inner_text()
+        until(shown, f"document.getElementById('sphere-title').textContent == '{title}'")
+        shot = shot_of(shown, "#sphere-canvas")
+        yaw, pitch = np.radians(look_deg[0] + 3), np.radians(look_deg[1])
+        wrapped = picture(shown.get_attribute(f"#sphere-{number}", "src"))
+        towards = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
+        height, width = shot.shape[:2]
+        # a little beside the middle, where a line of the grid is
+        right = int(width / 2 + 0.052 * height / 2 / 1.25 * np.cos(pitch))
+        np.testing.assert_allclose(shot[height // 2, right], np.array(wrapped.getpixel(cell(towards))) / 255, atol=0.05)
+        seen.append(shot)
+    assert [changed(*pair) for pair in itertools.pairwise(seen)] == [False, True, True]
+    shown.locator("#sphere-canvas").press("ArrowUp")
+    assert changed(shot_of(shown, "#sphere-canvas"), seen[3])
+    assert {"ahead", "left", "axis"} <= set(shown.locator(".mark:visible").all_inner_texts())
+
+
+def test_a_phone_needs_no_sideways_scroll(browser, folder):
+    page = browser.open((folder / "report.html").as_uri(), 390, 844, device_scale_factor=2, has_touch=True)
+    page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    assert lilac(shot_of(page, "#canvas")).mean() > 0.01
+    small = page.evaluate(
+        "[...document.querySelectorAll('p, td, dd, dt, li, summary, label, button')]"
+        ".filter((e) => parseFloat(getComputedStyle(e).fontSize) < 12).length"
+    )
+    assert small == 0
+
+
+def test_on_paper_nothing_is_folded_and_no_control_is_left(shown):
+    shown.evaluate(
+        "window.onbeforeprint = () => (window.printed = document.querySelectorAll('details:not([open])').length)"
+    )
+    content = shown.pdf(format="A4")
+    assert content.startswith(b"%PDF") and content.count(b"/Type /Page\n") > 3
+    assert shown.evaluate("window.printed") == 0
+    assert shown.locator("details[open]").count() == 0
+    shown.emulate_media(media="print")
+    for selector in ("#controls", "#sphere-controls", "nav"):
+        assert not shown.is_visible(selector)
+    for selector in ("#canvas", "#sphere-canvas", "#sphere-title", ".ramp"):
+        assert shown.is_visible(selector)
+    assert lilac(shot_of(shown, "#canvas")).mean() > 0.005
+
+
+def test_without_webgl_the_page_says_so_and_the_rest_is_there(browser, folder):
+    page = browser.open("about:blank")
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto((folder / "report.html").as_uri())
+    assert page.is_visible("#hint") and page.is_visible("#sphere-hint")
+    assert not page.is_visible("canvas") and not page.is_visible("#controls")
+    assert page.is_visible("#settings img")
+    assert page.locator("#checks button:disabled").count() == page.locator("#checks button").count() > 0
+
+
+def test_the_browser_tests_would_see_a_request(browser, tmp_path):
+    leaky = tmp_path / "leaky.html"
+    leaky.write_text("<img src='http://192.0.2.1/x.png'><script>console.error('oh')</script>")
+    browser.open(leaky.as_uri())
+    assert "asked the network for http://192.0.2.1/x.png" in browser.complaints and "oh" in browser.complaints
+    browser.complaints.clear()

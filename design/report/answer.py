@@ -16,10 +16,30 @@ from design.coverage import coverage
 from design.errors import BuildError
 from design.frames import Array
 from design.gaps import gaps
-from design.objective import score
-from design.problem import problem_of
+from design.objective import Score, score
+from design.problem import Problem, problem_of
+from design.robust import sensitivity
 from design.shadow import Shadow
 from design.task import NAMES, LoadedTask
+
+OFF_DEG = 1.0  # what a printed and screwed mount may be off by
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What one setting sees, without parts.
+
+    Attributes:
+        blind_fraction: of the sphere outside the masks.
+        blind_weight: of the weight of the task, never seen.
+        least: lowest count of beams per ball in the weighted region, at any start phase.
+        line_gap_deg: widest distance between neighbouring scan lines.
+    """
+
+    blind_fraction: float
+    blind_weight: float
+    least: int
+    line_gap_deg: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +49,14 @@ class Standard:
     Attributes:
         J: rounded to its error.
         factor: of the beams per ball of the scanner over its own, on the geometric mean; None where J is no logarithm.
+        view: what it sees.
     """
 
     name: str
     J: float
     J_error: float
     factor: float | None
+    view: View
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,17 +73,20 @@ class Sight:
     """What a setting sees: computed from `task.toml` and `angles.json`, as `scanwright evaluate` does, without parts.
 
     Attributes:
-        blind_fraction: of the sphere outside the masks.
-        line_gap_deg: widest distance between neighbouring scan lines.
+        own: of the setting itself.
+        rises: by mounting angle, how much J rises when it alone is 1 deg off, the worse of the two ways.
+        worst: the largest of `rises` as the share of beams per direction that it costs; None where J is no logarithm.
     """
 
+    own: View
     standard: tuple[Standard, ...]
     cones: tuple[Cone, ...]
-    blind_fraction: float
     masked_fraction: float
-    line_gap_deg: float
     lines: int
     beams: int
+    nodes: int
+    rises: dict[str, float]
+    worst: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,25 +118,52 @@ def sight_of(loaded: LoadedTask, angles: AngleSet) -> Sight:
     Raises:
         TaskError: no direction of the task has a weight.
     """
-    if angles.motion is not None:  # a task that asks for the shortest period does not hold the one that was found
-        loaded = replace(loaded, task=loaded.task.model_copy(update={"motion": angles.motion}))
-    problem = problem_of(loaded)
-    setting = np.radians([getattr(angles.angles_deg, name) for name in NAMES])
-    logarithmic = problem.objective.name == "log" and angles.J is not None
+    problem, setting = problem_as_built(loaded, angles), setting_of(angles)
+    logarithmic = problem.objective.name == "log"
     standard = []
     for name, other in standard_settings().items():
         found = score(problem, other)
         factor = float(np.exp(found.J - angles.J)) if logarithmic and angles.J is not None else None
-        standard.append(Standard(name, *rounded_to_error(found.J, found.J_error), factor))
-    lines, seen = gaps(problem, setting), coverage(problem, setting)
+        J, J_error = rounded_to_error(found.J, found.J_error)
+        standard.append(Standard(name, J, J_error, factor, _view(problem, other, found)))
+    rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     return Sight(
+        own=_view(problem, setting, score(problem, setting)),
         standard=tuple(standard),
-        cones=tuple(_cone(np.array(cone.axis_world), cone.half_angle_deg) for cone in lines.blind_cones),
-        blind_fraction=seen.blind_fraction,
-        masked_fraction=seen.masked_fraction,
-        line_gap_deg=lines.line_gap_deg,
+        cones=tuple(
+            _cone(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(problem, setting).blind_cones
+        ),
+        masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),
+        nodes=problem.nodes,
+        rises=rises,
+        worst=float(-np.expm1(-max(0.0, *rises.values()))) if logarithmic else None,
+    )
+
+
+def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
+    """The task as numbers, with the motion that was built: `period_s = "shortest"` does not say what was found.
+
+    Raises:
+        TaskError: no direction of the task has a weight.
+    """
+    if angles.motion is not None:
+        loaded = replace(loaded, task=loaded.task.model_copy(update={"motion": angles.motion}))
+    return problem_of(loaded)
+
+
+def setting_of(angles: AngleSet) -> Array:
+    """(alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+    return np.radians([getattr(angles.angles_deg, name) for name in NAMES])
+
+
+def _view(problem: Problem, setting: Array, found: Score) -> View:
+    return View(
+        blind_fraction=coverage(problem, setting).blind_fraction,
+        blind_weight=found.blind_weight,
+        least=found.least,
+        line_gap_deg=gaps(problem, setting).line_gap_deg,
     )
 
 

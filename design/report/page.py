@@ -6,7 +6,6 @@ Whatever a file is missing for is left out with one line that says so; only `ang
 from __future__ import annotations
 
 import csv
-import io
 import json
 from base64 import b64encode
 from collections.abc import Callable
@@ -15,21 +14,31 @@ from typing import Any, TypeVar
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
-from matplotlib.figure import Figure
 
 from design.angles import AngleSet, load_angles
-from design.build import standard_settings
 from design.errors import BuildError
 from design.folder import MANIFEST, enter
 from design.frames import Array
-from design.landscape_picture import draw_landscape
-from design.report.answer import as_built, hidden_by, load_own_body, sight_of
-from design.report.scene import LARGEST_BYTES, scene_of
+from design.report.answer import OFF_DEG, as_built, hidden_by, load_own_body, sight_of
+from design.report.pictures import AXIS, PLANE, landscape
+from design.report.scene import LARGEST_BYTES, bodies_of, scene_of
+from design.report.sphere import sphere_of
 from design.report.steps import steps_html
+from design.report.where import Pictures, named_in
 from design.task import load_task
 
 REPORT = "report.html"
 SEVERITIES = ("error", "warning", "note", "pass")
+PLANES_CSV = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
+AXES_CSV = ("alpha_rot_deg", "beta_rot_deg", "J")
+DIRECTIONS = {
+    "ahead": (1.1, 0, 0),
+    "behind": (-1.1, 0, 0),
+    "left": (0, 1.1, 0),
+    "right": (0, -1.1, 0),
+    "up": (0, 0, 1.1),
+    "down": (0, 0, -1.1),
+}  # of the world, beside the ball
 IMAGES = {".png": "image/png", ".svg": "image/svg+xml"}
 
 T = TypeVar("T")
@@ -59,22 +68,29 @@ def report_html(folder: Path) -> str:
     loaded = _read(folder / "task.toml", load_task)
     own_body = _read(folder / "own_body.npz", load_own_body)
     bom = _read(folder / "bom.csv", _table)
-    planes = _read(folder / "search.csv", _planes)
+    planes = _read(folder / "search.csv", lambda path: _columns(path, PLANES_CSV))
+    axes = _read(folder / "axes.csv", lambda path: _columns(path, AXES_CSV))
     checks = _read(folder / "checks.json", lambda path: _by_severity(_json(path)["checks"]))
     facts = {
         "angles": angles,
         "motion": _motion(angles),
         "objective": None if loaded is None else loaded.task.density.objective,
         "ball_deg": None if loaded is None else loaded.task.density.ball_radius_deg,
+        "off_deg": OFF_DEG,
+        "directions": DIRECTIONS,
         "sight": None if loaded is None else sight_of(loaded, angles),
         "hidden": None if own_body is None else hidden_by(own_body[0]),
         "total": None if bom is None else next((row for row in bom if row.get("kind") == "total"), None),
         "scene": _scene(folder, angles, own_body),
         "density": _read(folder / "density.png", _data_uri),
+        "sphere": None if loaded is None else sphere_of(loaded, angles, axes),
         "planes": planes,
-        "planes_picture": None if planes is None else _planes_picture(planes, angles),
+        "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
+        "axes": axes,
+        "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
         "lowest": None if planes is None else _lowest(planes),
         "checks": checks,
+        "places": {} if checks is None else _places(folder, checks, bom),
         "bom": bom,
         "steps": _read(folder / "assembly.md", lambda path: steps_html(path.read_text(encoding="utf-8"))),
         "drawings": {path.stem: _data_uri(path) for path in sorted((folder / "drawings").glob("*.svg"))},
@@ -161,11 +177,9 @@ def _by_severity(checks: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]
     return known
 
 
-def _planes(path: Path) -> Array:
-    """alpha_laser, beta_laser [deg], lowest J, alpha_rot, beta_rot [deg], one row per scan plane."""
-    rows = _table(path)
-    columns = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
-    return np.array([[float(row[column]) for column in columns] for row in rows]).reshape(-1, len(columns))
+def _columns(path: Path, columns: tuple[str, ...]) -> Array:
+    """Columns of a table of numbers, shape (rows, columns)."""
+    return np.array([[float(row[column]) for column in columns] for row in _table(path)]).reshape(-1, len(columns))
 
 
 def _lowest(planes: Array) -> dict[str, Any] | None:
@@ -177,17 +191,16 @@ def _lowest(planes: Array) -> dict[str, Any] | None:
     return {"J": float(lowest), "rows": open_planes[open_planes[:, 2] == lowest].tolist()}
 
 
-def _planes_picture(planes: Array, angles: AngleSet) -> str | None:
-    """J over the scan-plane settings with the one that was built; None where the task fixes both angles."""
-    if len(planes) < 2 or not np.isfinite(planes[:, 2]).any():
-        return None
-    figure = Figure(figsize=(6.8, 5.6), layout="constrained")
-    axis = figure.subplots()
-    built = (angles.angles_deg.alpha_laser, angles.angles_deg.beta_laser)
-    standard = {name: tuple(np.degrees(setting[2:])) for name, setting in standard_settings().items()}
-    names = ("alpha_laser", "beta_laser")
-    draw_landscape(axis, names, planes[:, :3], built, standard, "lowest J over all axes")
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=130, metadata={"Software": None})
-    return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
+def _places(
+    folder: Path, checks: dict[str, list[dict[str, Any]]], bom: list[dict[str, str]] | None
+) -> dict[str, dict[str, Any]]:
+    """By the `where` of a check the bodies that it names and a picture of them; what is no place is not there."""
+    path = folder / "assembly.glb"
+    if not path.is_file():
+        return {}
+    bodies = bodies_of(path)
+    pictures = Pictures(bodies)
+    bought = {row.get("number", ""): row.get("part", "") for row in bom or () if row.get("kind") == "bought"}
+    wheres = dict.fromkeys(str(check.get("where", "")) for found in checks.values() for check in found)
+    named = {where: named_in(where, bodies, bought) for where in wheres}
+    return {where: {"bodies": names, "picture": pictures.of(names)} for where, names in named.items() if names}
