@@ -6,12 +6,15 @@ point cloud goes through.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 
 import cadquery as cq
 
 from cad import bought, solids
 from cad.deck import Deck, deck_of
+from cad.mesh import Mesh, mesh_of
 from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of
 from cad.parts.bearing_cage import bearing_cage, cage_base, cage_of
@@ -45,6 +48,17 @@ class Assembly:
     linkage: AlignmentLinkage
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
+    _meshes: dict[str, Mesh] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def mesh(self, name: str) -> Mesh:
+        """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
+        if name not in self._meshes:
+            self._meshes[name] = mesh_of((self.made | self.bought)[name])
+        return self._meshes[name]
+
+    def meshes(self) -> dict[str, Mesh]:
+        """Of all parts by name."""
+        return {name: self.mesh(name) for name in (*self.made, *self.bought)}
 
     def standing_parts(self) -> list[str]:
         """Names of the made parts that stand still."""
@@ -60,8 +74,8 @@ def turns(name: str) -> bool:
     return name.startswith(TURNING)
 
 
-def make_parts(scanner: Scanner) -> Assembly:
-    """Make every part that this scanner needs, and the bought ones around them.
+def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True) -> Assembly:
+    """Make every part that this scanner needs, and the bought ones around them; of these, those that are wanted.
 
     Raises:
         BuildError: a part cannot be made; the message names part, feature, parameter and value.
@@ -69,20 +83,20 @@ def make_parts(scanner: Scanner) -> Assembly:
     stack = stack_of(scanner)
     deck = deck_of(scanner, stack)
     shaft, linkage = shaft_of(scanner, stack), linkage_of(scanner, stack)
-    made = {"servo_shaft": servo_shaft(shaft)}
+    made: dict[str, Callable[[], cq.Solid]] = {"servo_shaft": lambda: servo_shaft(shaft)}
     cage = cage_of(scanner, stack)
     if scanner.slip_ring is not None:
-        made["slip_ring_adapter"] = slip_ring_adapter(adapter_of(scanner, stack))
+        made["slip_ring_adapter"] = lambda: slip_ring_adapter(adapter_of(scanner, stack))
     elif cage is not None:
-        made["cage_base"] = cage_base(cage)
+        made["cage_base"] = partial(cage_base, cage)
     if cage is not None:
-        made["bearing_cage"] = bearing_cage(cage)
-    made["alignment_linkage"] = alignment_linkage(linkage)
+        made["bearing_cage"] = partial(bearing_cage, cage)
+    made["alignment_linkage"] = lambda: alignment_linkage(linkage)
     between = sub_plate_of(scanner, stack)
     if between is not None:
-        made["sub_plate"] = sub_plate(between)
+        made["sub_plate"] = partial(sub_plate, between)
     if not deck.flat:
-        made["base_mount"] = base_mount(mount_of(scanner, stack, deck))
+        made["base_mount"] = lambda: base_mount(mount_of(scanner, stack, deck))
     others = {
         "servo_case": bought.servo_case(scanner.servo, stack),
         "servo_horn": bought.servo_horn(scanner.servo, stack, shaft),
@@ -95,7 +109,13 @@ def make_parts(scanner: Scanner) -> Assembly:
     optical = solids.location(stack.R(), T[:3, 3] * 1000)
     base = optical * cq.Location(cq.Vector(0, 0, -scanner.lidar.optical_height_mm))
     others |= {name: solid.moved(base) for name, solid in bought.lidar_solids(scanner.lidar).items()}
-    return Assembly(stack, deck, linkage, made, others)
+    return Assembly(
+        stack,
+        deck,
+        linkage,
+        {name: make() for name, make in made.items() if wanted(name)},
+        {name: solid for name, solid in others.items() if wanted(name)},
+    )
 
 
 def as_tree(assembly: Assembly) -> cq.Assembly:

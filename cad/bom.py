@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 
 from cad.assembly import Assembly
 from cad.joints import Joint
+from cad.screws import INSERT_LENGTH, SCREWS
 from design.catalogue import Bearing, Lidar, Servo, SlipRing
 from design.scanner import Scanner
 
@@ -44,7 +45,7 @@ class Item:
     """One row. Empty texts and None are unknown.
 
     Attributes:
-        kind: printed, turned, bought, screw, nut, wiring or total.
+        kind: printed, turned, bought, screw, nut, insert, wiring or total.
         part: what it is.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
@@ -143,10 +144,13 @@ def _bought(product: Lidar | Servo | SlipRing | Bearing) -> Item:
 def _screws(joints: list[Joint]) -> Iterator[Item]:
     screws: dict[str, list[Joint]] = {}
     nuts: dict[str, int] = {}
+    inserts: dict[str, int] = {}
     for joint in joints:
         screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck"):
             nuts[joint.screw.name] = nuts.get(joint.screw.name, 0) + joint.count
+        if joint.inserts:
+            inserts[joint.screw.name] = inserts.get(joint.screw.name, 0) + joint.count
     for number, used in sorted(screws.items()):
         kind = "grub screw" if number.startswith("ISO 4026") else "cap screw"
         where = ", ".join(f"{joint.count} {joint.part} to {joint.onto or 'deck'}" for joint in used)
@@ -154,6 +158,9 @@ def _screws(joints: list[Joint]) -> Iterator[Item]:
         yield Item("screw", kind, number, total, source="holes of the solids", note=f"{where}; price unknown")
     for name, count in sorted(nuts.items()):
         yield Item("nut", "hexagon nut", f"ISO 4032 {name}", count, source="holes of the solids", note="price unknown")
+    for name, count in sorted(inserts.items()):
+        note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm; price unknown"
+        yield Item("insert", "heat-set insert", name, count, source="holes of the solids", note=note)
 
 
 def _wiring(scanner: Scanner) -> Iterator[Item]:

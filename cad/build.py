@@ -44,7 +44,7 @@ class PartsResult:
 
     Attributes:
         assembly: the solids.
-        meshes: canonical mesh of each made part.
+        meshes: canonical mesh of each made part, with its label.
         t_world_rot_mm: where the optical centre stands in the world.
         parts: facts of each made part.
         findings: what a person should know.
@@ -61,13 +61,16 @@ class PartsResult:
     files: tuple[str, ...]
 
 
-def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None]) -> PartsResult:
+def build_parts(
+    scanner: Scanner, folder: Path, progress: Callable[[str], None], make: Callable[[Scanner], Assembly] | None = None
+) -> PartsResult:
     """Make every part and write it into a build folder.
 
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `deck.mount_offset_mm`, or zero.
         folder: the build folder; `parts/` is made in it.
         progress: called with a line of text before each step.
+        make: who makes the parts, `assembly.make_parts` or one that may have them already.
 
     Raises:
         BuildError: a part cannot be made, or the angle set names another place of the optical centre.
@@ -79,18 +82,22 @@ def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None])
     require_kernel()
     from cad.assembly import alone, as_tree, make_parts
     from cad.export import step_text
-    from cad.mesh import checked_mesh, stl_bytes
+    from cad.label import labelled_parts
+    from cad.mesh import checked, stl_bytes
     from cad.urdf import urdf_text
 
     progress("making the parts")
-    assembly = make_parts(scanner)
+    assembly = (make or make_parts)(scanner)
     digest = config_hash(scanner)
     files: dict[str, bytes] = {}
     reports = []
     meshes_of_parts: dict[str, Mesh] = {}
-    for name, solid in assembly.made.items():
+    progress("engraving the labels")
+    labels = labelled_parts(scanner, assembly, digest)
+    for name, solid in (assembly.made | labels.parts).items():
         progress(f"meshing and writing {name}")
-        mesh = meshes_of_parts[name] = checked_mesh(solid, name)
+        mesh = labels.meshes[name] if name in labels.meshes else checked(assembly.mesh(name), solid, name)
+        meshes_of_parts[name] = mesh
         files[f"parts/{name}.step"] = step_text(alone(name, solid), f"{name} config={digest}").encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
         reports.append(_report(name, solid.Volume(), _density(name, scanner, assembly), mesh))
@@ -106,7 +113,7 @@ def build_parts(scanner: Scanner, folder: Path, progress: Callable[[str], None])
         t_world_rot_mm=deck.t_world_rot,
         parts=tuple(reports),
         findings=findings_of(scanner, assembly, bodies),
-        left_out=left_out_of(scanner, stack, deck),
+        left_out=(*left_out_of(scanner, stack, deck), *(_no_label(name) for name in labels.without)),
         files=tuple(sorted(files)),
     )
 
@@ -120,11 +127,13 @@ def write_files(folder: Path, files: dict[str, bytes]) -> None:
 
 
 def config_hash(scanner: Scanner) -> str:
-    """Twelve hex digits of everything that shapes the parts: angles and products, not J or the task's name."""
+    """Twelve hex digits of everything that shapes the parts: angles, products, and the name on their labels; not J."""
     angles = scanner.angles
     content = {
+        "task": angles.task,
         "angles": angles.angles_deg.model_dump(),
         "delta": angles.delta_rotvec_rot_deg,
+        "deck": None if scanner.deck is None else scanner.deck.model_dump(),
         "products": [
             None if product is None else product.model_dump()
             for product in (scanner.lidar, scanner.servo, scanner.slip_ring, stack_of(scanner).bearing, scanner.printer)
@@ -177,6 +186,10 @@ def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
     return PartReport(name, round(volume, 3), round(volume * density / 1000, 3), box, len(mesh.faces))
+
+
+def _no_label(name: str) -> LeftOut:
+    return LeftOut(f"label of {name}", "none of its flat faces has room for one", 1, "labels")
 
 
 def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:

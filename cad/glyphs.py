@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import cadquery as cq
 import numpy as np
+import shapely  # type: ignore[import-untyped]
 
 from cad import solids
 from design.frames import Array
@@ -90,9 +91,25 @@ def grooves(text: str, height: float, x: float, y: float, top: float, depth: flo
     return cuts
 
 
+def letters(text: str, height: float) -> list[shapely.Polygon]:
+    """Outlines of one line of text, origin at its lower left corner; strokes that meet are one outline."""
+    unit = height / 6
+    strokes = []
+    for i, letter in enumerate(text.upper()):
+        origin = np.array([i * ADVANCE * unit, 0.0])
+        for chain in GLYPHS.get(letter, "").split():
+            points = [origin + unit * np.array([int(chain[k]), int(chain[k + 1])]) for k in range(0, len(chain), 2)]
+            strokes += [shapely.Polygon(_outline(a, b)) for a, b in pairwise(points)]
+    joined = shapely.normalize(shapely.union_all(strokes, grid_size=1e-6))
+    return [part for part in shapely.get_parts(joined) if part.area > 0]
+
+
 def _groove(start: Array, end: Array, top: float, depth: float) -> cq.Solid:
+    return solids.prism(_outline(start, end), top - depth, top + 1.0)
+
+
+def _outline(start: Array, end: Array) -> Array:
     along = (end - start) / math.dist(start, end)
     half = STROKE / 2
     side, over = half * np.array([-along[1], along[0]]), half * along
-    outline = [start - over - side, end + over - side, end + over + side, start - over + side]
-    return solids.prism(outline, top - depth, top + 1.0)
+    return np.stack([start - over - side, end + over - side, end + over + side, start - over + side])

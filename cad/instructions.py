@@ -82,6 +82,8 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
         "all others follow from the parts.",
         "",
     ]
+    if any(joint.inserts for joint in joints):
+        lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
     for number, (title, text) in enumerate(_steps(scanner, assembly, joints), start=1):
         lines += [f"## {number}. {title}", "", text, ""]
     return "\n".join(lines)
@@ -99,7 +101,7 @@ def screws_in_words(joint: Joint) -> str:
     left = ""
     if joint.covered:
         left = f" Leave the other {joint.covered} of the holes empty: no driver reaches them."
-    return f"{what} {where}.{left}"
+    return f"{what} {where}{', in heat-set inserts' if joint.inserts else ''}.{left}"
 
 
 def _steps(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:

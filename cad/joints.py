@@ -1,9 +1,9 @@
 """Which screws hold the scanner together, read from the solids: where a hole of one part meets another body.
 
-A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance, or the core of a
-thread. What lies behind it on the same axis decides: a thread (the screw's own diameter, or its core in a part), a hole
-to pass through to a nut, or the spigot that a grub screw clamps; nothing means the robot's deck. Lengths are the
-shortest of the standards that hold. Millimetres.
+A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance, or one that a screw
+holds on to (the core of a thread, the seat of an insert). What lies behind it on the same axis decides: a thread (the
+screw's own diameter, or such a hole in a part), a hole to pass through to a nut, or the spigot that a grub screw
+clamps; nothing means the robot's deck. Lengths are the shortest of the standards that hold. Millimetres.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 
 from cad.assembly import Assembly, turns
 from cad.holes import Piercing, Round
-from cad.screws import SCREWS, Screw
+from cad.screws import SCREWS, Screw, thread_hole
+from design.catalogue import Printer
 from design.scanner import Scanner
 
 # ISO 4762 and ISO 4026
@@ -24,6 +25,8 @@ LENGTHS = {
     "M2.5": (4, 5, 6, 8, 10, 12, 16, 20, 25),
     "M3": (4, 5, 6, 8, 10, 12, 16, 20, 25, 30),
     "M4": (5, 6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
+    "M5": (6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
+    "M6": (8, 10, 12, 16, 20, 25, 30, 35, 40),
 }
 HOLDS = 2.0  # diameters of thread that hold
 NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
@@ -50,6 +53,7 @@ class Joint:
         count: number of screws.
         grip_mm: what the shank passes before it holds.
         covered: equal holes that no driver reaches, left empty.
+        inserts: whether each screw holds in a heat-set insert.
     """
 
     part: str
@@ -60,6 +64,7 @@ class Joint:
     count: int
     grip_mm: float
     covered: int
+    inserts: bool
 
     @property
     def number(self) -> str:
@@ -75,13 +80,13 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
         assembly: the solids.
         rounds: of `holes.rounds_of`, for every solid, made or bought.
     """
-    clearance = scanner.printer.screw_clearance_mm
+    printer = scanner.printer
     found: dict[tuple[str, str, Fixing, str], list[tuple[float, float, bool]]] = {}
     for part, solid in assembly.made.items():
         piercing = Piercing(solid)
         for hole in rounds[part]:
-            screw, core = _screw_for(hole, clearance)
-            behind = None if screw is None else _behind(assembly, part, hole, screw, core, rounds)
+            screw, core = _screw_for(hole, printer)
+            behind = None if screw is None else _behind(assembly, part, hole, screw, core, rounds, printer)
             if screw is not None and behind is not None:
                 covered = behind.head != 0 and not _reachable(hole, behind.head, piercing)
                 key = (part, behind.onto, behind.fixing, screw.name)
@@ -89,7 +94,11 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
     if "base_mount" not in assembly.made:
         key = ("deck", "servo_case", "nut", scanner.servo.case_screw)
         found[key] = [(DECK, CASE_EAR, False)] * 4
-    return [_joint(*key, holes) for key, holes in found.items() if not all(covered for _, _, covered in holes)]
+    return [
+        _joint(*key, holes, inserts=printer.thread == "insert" and (key[2] == "grub" or key[1] in assembly.made))
+        for key, holes in found.items()
+        if not all(covered for _, _, covered in holes)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,20 +111,28 @@ class _Behind:
     head: int
 
 
-def _joint(part: str, onto: str, fixing: Fixing, name: str, holes: list[tuple[float, float, bool]]) -> Joint:
+def _joint(
+    part: str, onto: str, fixing: Fixing, name: str, holes: list[tuple[float, float, bool]], *, inserts: bool
+) -> Joint:
     """One length for all screws of a joint: that of the thickest place."""
     used = [(grip, depth) for grip, depth, covered in holes if not covered]
     grip, depth = max(grip for grip, _ in used), min(depth for _, depth in used)
     screw = SCREWS[name]
     length = _length(screw, grip, fixing, depth)
-    return Joint(part, onto, fixing, screw, length, len(used), round(grip, 2), len(holes) - len(used))
+    return Joint(part, onto, fixing, screw, length, len(used), round(grip, 2), len(holes) - len(used), inserts)
 
 
 def _behind(
-    assembly: Assembly, part: str, hole: Round, screw: Screw, core: bool, rounds: dict[str, list[Round]]
+    assembly: Assembly,
+    part: str,
+    hole: Round,
+    screw: Screw,
+    core: bool,
+    rounds: dict[str, list[Round]],
+    printer: Printer,
 ) -> _Behind | None:
     """What is behind a screw hole; None where the hole is no joint of its own."""
-    partner = _partner(part, hole, screw, rounds)
+    partner = _partner(part, hole, screw, rounds, printer)
     if core:  # a blind one, or one before another part's hole, is the thread of that part's screw
         if partner is not None or not hole.through or not _ends_in_bore(hole, rounds[part]):
             return None
@@ -125,19 +142,19 @@ def _behind(
     return partner
 
 
-def _screw_for(hole: Round, clearance: float) -> tuple[Screw | None, bool]:
-    """The screw that goes through a hole, and whether the hole is the core of its thread."""
+def _screw_for(hole: Round, printer: Printer) -> tuple[Screw | None, bool]:
+    """The screw that goes through a hole, and whether it holds on to the hole itself."""
     if not hole.hole:
         return None, False
     for screw in SCREWS.values():
-        if abs(hole.diameter - screw.nominal - clearance) < 0.01:
+        if abs(hole.diameter - screw.nominal - printer.screw_clearance_mm) < 0.01:
             return screw, False
-        if abs(hole.diameter - screw.core) < 0.01:
+        if abs(hole.diameter - thread_hole(screw, printer)) < 0.01:
             return screw, True
     return None, False
 
 
-def _partner(part: str, hole: Round, screw: Screw, rounds: dict[str, list[Round]]) -> _Behind | None:
+def _partner(part: str, hole: Round, screw: Screw, rounds: dict[str, list[Round]], printer: Printer) -> _Behind | None:
     """The body with a hole in line: a thread before a plain hole, which may be a pocket for heads; the nearer first."""
     direction, low, high = (np.array(v) for v in (hole.direction, hole.low, hole.high))
     best: tuple[tuple[bool, float], _Behind] | None = None
@@ -156,7 +173,7 @@ def _partner(part: str, hole: Round, screw: Screw, rounds: dict[str, list[Round]
             gap = max(gaps)
             if gap > NEAR or abs(gap) > other.length + 0.1:
                 continue
-            threaded = min(abs(other.diameter - size) for size in (screw.nominal, screw.core)) < 0.01
+            threaded = min(abs(other.diameter - size) for size in (screw.nominal, thread_hole(screw, printer))) < 0.01
             fixing: Fixing = "thread" if threaded else "nut"
             head = 1 if gaps[0] > gaps[1] else -1
             behind = _Behind(name, fixing, other.length if threaded else CASE_EAR, head)

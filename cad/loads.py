@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 STANDARD_GRAVITY = 9.80665
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
+UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/parts.py, rounded up
@@ -84,10 +85,11 @@ def bearing_of(scanner: Scanner, stack: Stack) -> Bearing | None:
     """The bearing that this scanner needs: the smallest that fits, where the horn is not rated for the rotor.
 
     Whether one is needed is decided on the heaviest linkage that any angles give, so that a scanner without a bearing
-    is safe. None as well where nothing in the catalogue fits.
+    is safe. A horn that its maker does not rate is trusted with little. None as well where nothing in the catalogue
+    fits.
     """
     rated = rated_moment_nm(scanner)
-    if rated is None or _heaviest(scanner, stack).moment_nm <= rated:
+    if _heaviest(scanner, stack).moment_nm <= (UNRATED_NM if rated is None else rated):
         return None
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * WIRE_DEPTH)
     most = 2 * (stack.hub_radius - HUB_STEP)

@@ -60,7 +60,15 @@ def checked_mesh(solid: cq.Solid, part: str) -> Mesh:
     Raises:
         BuildError: the mesh is open, or its volume is off by more than 0.1 %.
     """
-    mesh = mesh_of(solid)
+    return checked(mesh_of(solid), solid, part)
+
+
+def checked(mesh: Mesh, solid: cq.Solid, part: str) -> Mesh:
+    """The same mesh, found closed and of the volume of its solid.
+
+    Raises:
+        BuildError: as `checked_mesh`.
+    """
     if not mesh.is_closed():
         raise BuildError(f"{part}: mesh: tolerance = {CHORD_ERROR} mm: the surface is not closed")
     off = mesh.volume() / solid.Volume() - 1

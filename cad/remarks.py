@@ -92,7 +92,7 @@ def left_out_of(scanner: Scanner, stack: Stack, deck: Deck) -> tuple[LeftOut, ..
     if stack.bearing is None:
         why = f"the horn of {scanner.servo.name} carries an axis this upright alone"
         if scanner.servo.radial_load_n is None:
-            why = f"the maker of {scanner.servo.name} rates no radial load that would ask for one"
+            why = f"{why}, by what such a horn is trusted with: its maker rates none"
         out.append(LeftOut("bearing_cage", why, 1, "parts"))
     if deck.flat:
         out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))

@@ -14,7 +14,7 @@ import numpy as np
 
 from cad.assembly import Assembly, colour_of, turns
 from cad.glb import Node, glb_bytes
-from cad.mesh import Mesh, mesh_of
+from cad.mesh import Mesh
 from design.frames import Array
 from design.scanner import Scanner
 
@@ -64,9 +64,9 @@ def scene_files(
         Node("rot", "servo", np.eye(4)),
         Node("laser", "rot", T),
     ]
-    for name, solid in (assembly.made | assembly.bought).items():
+    for name in (*assembly.made, *assembly.bought):
         frame = frame_of(name, assembly)
-        mesh = meshes[name] if name in meshes else mesh_of(solid)
+        mesh = meshes[name] if name in meshes else assembly.mesh(name)
         if frame == "laser":
             mesh = Mesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
         nodes.append(Node(name, frame, np.eye(4), mesh, colour_of(name), name in turned))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,7 @@ from design.scanner import Scanner
 from design.shadow import AXIS_STEPS, Mask, Refused, Shadow
 
 if TYPE_CHECKING:
+    from cad.assembly import Assembly
     from cad.mesh import Mesh
 
 APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
@@ -34,11 +35,12 @@ class PartsWorkshop:
     """The `Workshop` of `design/shadow.py` for one set of products: `scanner.angles` are replaced by each setting."""
 
     scanner: Scanner
+    _made: dict[str, Assembly] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def bound(self, setting_rad: Array) -> Shadow | Refused:
         """The cone that ring, bearing and cage fill in any case."""
         try:
-            stack = stack_of(_at(self.scanner, setting_rad))
+            stack = stack_of(at_setting(self.scanner, setting_rad))
         except BuildError as error:
             return Refused(str(error))
         bearings = self.scanner.lidar.bearings_rad()
@@ -46,16 +48,26 @@ class PartsWorkshop:
 
     def shadow(self, setting_rad: Array) -> Shadow | Refused:
         """From the solids of that setting."""
-        from cad.assembly import make_parts
-        from cad.mesh import mesh_of
-
-        scanner = _at(self.scanner, setting_rad)
+        scanner = at_setting(self.scanner, setting_rad)
         try:
-            assembly = make_parts(scanner)
+            assembly = self.assembly(scanner)
         except BuildError as error:
             return Refused(str(error))
-        meshes = {name: mesh_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-        return shadow_of(scanner, triangles_of(meshes))
+        return shadow_of(scanner, triangles_of(assembly.meshes()))
+
+    def assembly(self, scanner: Scanner) -> Assembly:
+        """Parts of these products at the angles of `scanner`; those that were made for a shadow are kept.
+
+        Raises:
+            BuildError: a part cannot be made.
+        """
+        from cad.assembly import make_parts
+        from cad.build import config_hash
+
+        key = f"{config_hash(scanner)} {scanner.angles.t_rot_laser_mm}"
+        if key not in self._made:
+            self._made[key] = make_parts(scanner)
+        return self._made[key]
 
 
 def triangles_of(meshes: Mapping[str, Mesh]) -> dict[str, Array]:
@@ -137,7 +149,7 @@ def _hidden(solid: scene.Scene, origins: Array, directions: Array) -> Mask:
     return np.asarray(np.isfinite(hits.range_m).reshape(directions.shape[:2]).any(axis=1))
 
 
-def _at(scanner: Scanner, setting_rad: Array) -> Scanner:
+def at_setting(scanner: Scanner, setting_rad: Array) -> Scanner:
     """The scanner at another setting, its angles rounded as those that parts are built from."""
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
     given = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}

@@ -188,6 +188,8 @@ class Printer(Product):
     min_wall_mm: float = Field(gt=0)
     bed_mm: Triple
     density_g_cm3: float = Field(gt=0)
+    modulus_gpa: float = Field(gt=0, description="of elasticity, printed solid")
+    thread: Literal["cut", "insert"] = Field(default="cut", description="what screws that end in a part hold on to")
 
 
 P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Printer, Multibeam)

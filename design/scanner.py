@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from design.angles import AngleSet
 from design.catalogue import Bearing, Catalogue, Lidar, Printer, Servo, SlipRing
+from design.deck_holes import Circle, Rectangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +15,7 @@ class Scanner:
 
     Attributes:
         bearings: those that a tilted axis may choose from, smallest bore first.
+        deck: holes that the base mount is screwed to; None where the mount may choose them.
     """
 
     angles: AngleSet
@@ -22,9 +24,10 @@ class Scanner:
     slip_ring: SlipRing | None
     printer: Printer
     bearings: tuple[Bearing, ...]
+    deck: Rectangle | Circle | None = None
 
 
-def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue) -> Scanner:
+def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue, deck: Rectangle | Circle | None = None) -> Scanner:
     """Look up the products that an angle set names.
 
     Raises:
@@ -37,4 +40,5 @@ def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue) -> Scanner:
         slip_ring=None if angles.slip_ring is None else catalogue.get(angles.slip_ring, SlipRing),
         printer=catalogue.get(printer, Printer),
         bearings=catalogue.bearings(),
+        deck=deck,
     )

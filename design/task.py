@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from design.camera import Camera
 from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
+from design.deck_holes import DeckHoles
 from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
@@ -93,6 +95,7 @@ class Task(Record):
     slip_ring: str | None = None
     printer: str = "fdm-0.4"
     catalogue: tuple[str, ...] = ()
+    deck: DeckHoles | None = None
     motion: Annotated[Motion | Shortest, Field(discriminator="mode")]
     angles: AngleRanges = AngleRanges()
     density: DensityRules = DensityRules()
@@ -100,6 +103,7 @@ class Task(Record):
     weight: tuple[Region, ...] = ()
     mask: tuple[MaskRegion, ...] = ()
     scene: Placed | None = None
+    camera: Camera | None = None
 
     @model_validator(mode="after")
     def _boxes_stand_in_a_scene(self) -> Task:
@@ -160,7 +164,7 @@ class LoadedTask:
 
     def sha256(self) -> str:
         """Digest of all that decides the result: the task, its maps, and the records of its products."""
-        task = self.task.model_dump(mode="json", exclude={"catalogue"})
+        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # it only looks on
         for region in [*task["weight"], *task["mask"]]:
             region.pop("file", None)  # what is in it counts, not what it is called
         if task["scene"]:
@@ -190,7 +194,7 @@ def load_task(path: Path) -> LoadedTask:
     except ValidationError as error:
         raise TaskError(explain(error, source, Task)) from error
     products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
-    _check_products(task, products, source)
+    check_products(task, products, source)
     limits = task.limits
     if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
         raise TaskError(
@@ -217,7 +221,12 @@ def _find(path: Path) -> Path:
     raise TaskError(f"{path}: no such task file, and no shipped task of that name: {', '.join(shipped_tasks())}")
 
 
-def _check_products(task: Task, products: Catalogue, source: Path) -> None:
+def check_products(task: Task, products: Catalogue, source: Path) -> None:
+    """Whether the products of a task exist and can do its motion.
+
+    Raises:
+        TaskError: they cannot.
+    """
     field = "sensor"
     try:
         products.get(task.sensor, Lidar)

@@ -13,8 +13,9 @@ from cad.bom import bom_text, items_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
 from cad.joints import LENGTHS, _length, joints_of
-from cad.screws import SCREWS
+from cad.screws import INSERT_LENGTH, SCREWS
 from design.angles import Angles
+from design.catalogue import load_catalogue
 
 
 @pytest.fixture(scope="module")
@@ -133,3 +134,28 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
     assert (seat.part, seat.count, seat.covered) == ("sub_plate", 4, 0)
+
+
+def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
+    printer = load_catalogue().products["fdm-0.4-insert"]
+    scanner = replace(made.scanner, printer=printer)
+    assembly = make_parts(scanner)
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    joints = joints_of(scanner, assembly, rounds)
+    held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}
+    cage = held.pop(("bearing_cage", "slip_ring_adapter"))
+    grub = held.pop(("alignment_linkage", "servo_shaft"))
+    assert not held and (cage.count, grub.count, grub.fixing) == (4, 2, "grub")
+    for part, count in (("slip_ring_adapter", 4), ("alignment_linkage", 2)):
+        seats = [hole for hole in rounds[part] if hole.hole and hole.diameter == 4.0]
+        assert len(seats) == count and min(hole.length for hole in seats) > INSERT_LENGTH
+    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.scanner, *_solids(made))}
+    assert {(joint.part, joint.onto) for joint in joints} == by_threads
+    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), set(), "0123456789ab")
+    assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 6)]
+    assert "Melt the inserts in" in instructions_text(scanner, assembly, joints, "0123456789ab")
+
+
+def _solids(made):
+    assembly = made.result.assembly
+    return assembly, {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}

@@ -36,7 +36,7 @@ def test_all_products_of_the_issue_are_there(shipped):
     assert by_kind[Lidar] == {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX", "LMS 200"}
     assert by_kind[Servo] == {"MX-64R", "MX-28", "XM430-W350", "AX-12A"}
     assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210"}
-    assert by_kind[Printer] == {"fdm-0.4", "sla", "cnc"}
+    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "sla", "cnc"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

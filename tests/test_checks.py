@@ -1,6 +1,7 @@
 """The checks: that each sees what it is there for, measured on bodies whose answer is known."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 import cad.checks.run as room
 from cad.checks.check import at_least, at_most, checks_text
 from cad.checks.clearance import clearance_checks, distance_over_a_turn
+from cad.checks.islands import islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
 from cad.mass import Inertial
@@ -119,6 +121,16 @@ def test_printing_tells_bed_wall_and_hole():
     assert all(check.where == "part" for check in checks.values())
 
 
+def test_a_layer_that_starts_in_the_air_is_found_where_it_starts():
+    table = box((0, 0, 0), (6, 20, 30)).fuse(box((0, 0, 30), (40, 20, 34)), box((0, 0, 0), (40, 20, 4)))
+    assert islands_of(mesh_of(table.Solids()[0])) == []  # a ledge hangs on its layer
+    gallows = table.fuse(box((34, 5, 12), (40, 15, 30))).Solids()[0]
+    (island,) = islands_of(mesh_of(gallows))
+    assert island.height == pytest.approx(12, abs=0.4) and island.area_mm2 == pytest.approx(60, rel=1e-3)
+    two = gallows.fuse(box((20, 5, 20.3), (24, 15, 30))).Solids()[0]
+    assert sorted(round(i.area_mm2) for i in islands_of(mesh_of(two))) == [40, 60]
+
+
 def bodies(mass, z):
     inertia = mass * 0.03**2 * np.eye(3)
     return {
@@ -144,6 +156,23 @@ def test_loads_against_hand_calculation():
     assert held["tilt_moment"].severity == "pass" and held["bearing_load"].value > weight
     heavy = {c.kind: c.severity for c in mechanics_checks(scanner_for(0, 0, 30, -30), stack, bodies(3.0, -0.030))}
     assert heavy["axial_load"] == "error"
+
+
+def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
+    scanner = scanner_for(0, 90, 30, -30)
+    found = {c.kind: c for c in mechanics_checks(scanner, stack_of(scanner), bodies(0.5, -0.030))}["flanks"]
+    assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
+    grams, at, azimuth = (
+        float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.message).groups()
+    )
+    assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
+    upright = scanner_for(0, 0, 30, -30)
+    found = {c.kind: c for c in mechanics_checks(upright, stack_of(upright), bodies(0.5, -0.030))}["flanks"]
+    assert found.severity == "pass"
+    exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
+    assert {c.kind: c.severity for c in mechanics_checks(exact, stack_of(exact), bodies(0.5, -0.03))}[
+        "flanks"
+    ] == "note"
 
 
 def test_a_servo_without_a_rating_is_noted_not_passed():
@@ -194,6 +223,7 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     lines = out.splitlines()
     assert lines[-1].endswith("without a failure") and any(line.startswith("pass") for line in lines)
     assert any("sub_plate" in line for line in lines)
+    assert sum(" mm at 10 m), " in line and "bend" in line and "+-" in line for line in lines) == 2
 
     answer = [at_least("clearance", 0.1, 0.4, "mm", "a and b", "gap")]
     monkeypatch.setattr(room, "check_scanner", lambda _scanner, _say: answer)

@@ -26,7 +26,7 @@ SETTINGS = {
     "leaning": (110, 20, -80, -10, "UST-10LX", "MX-64R"),
     "small": (20, -50, 33, 12, "URG-04LX", "AX-12A"),
 }
-BEARING = {"rolling", "pitching", "tilted"}  # a UST-10LX is light, and the horn of an AX-12A has no rating to exceed
+BEARING = {"rolling", "pitching", "tilted", "small"}  # a UST-10LX is light
 SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0), "UST-10LX": (47.4, 20.0)}  # optical height, hole offset
 SCREW_HOLE = 3.4  # M3 on fdm-0.4
 

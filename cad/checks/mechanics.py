@@ -1,7 +1,7 @@
 """Forces and torques against what servo and bearings are rated for, and how far the shaft bends. SI units.
 
-The bend of the shaft is that of a beam, the cage a spring known within a factor of two (`stiffness_n_per_m`). The
-linkage is taken for rigid: its own bend is not checked.
+The bend of the shaft is that of a beam, the cage a spring known within a factor of two (`stiffness_n_per_m`). How far
+the linkage bends is `deflection.py`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cad.checks.check import Check, at_most, note
+from cad.checks.check import Check, at_most, note, tidy
 from cad.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
 from cad.mass import Inertial, together
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
@@ -21,6 +21,8 @@ from design.scanner import Scanner
 TORQUE_SHARE = 0.2  # of the stall torque that a servo gives all day
 SPIN_UP_S = 0.2
 SLOWEST_PERIOD_S = 1.0  # where the angle set names no motion
+BALANCE_AT_MM = 50.0  # from the axis, where a counterweight is worked out
+NO_TORQUE_NM = 1e-3  # less than any ring or bearing rubs with
 
 
 def mechanics_checks(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> list[Check]:
@@ -37,6 +39,7 @@ def mechanics_checks(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", "centre of mass off the axis"),
         *_torques(scanner, rotor, weight),
+        _flanks(scanner, rotor, weight),
         *_forces(scanner, stack, weight, shared),
         _slope(scanner, shared),
     ]
@@ -60,6 +63,31 @@ def _torques(scanner: Scanner, rotor: Inertial, weight: Weight) -> list[Check]:
         at_most("static_torque", static, limit, "N m", "servo", f"torque that holds the imbalance, {what}"),
         at_most("spin_up_torque", spin_up, limit, "N m", "servo", f"torque to full speed in {SPIN_UP_S:g} s, {what}"),
     ]
+
+
+def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight) -> Check:
+    """Where gravity swings the load from one flank of the gears to the other, twice a turn, by the play between them.
+
+    The friction of ring and bearing, which would hold one flank, is in no data sheet: taken for none.
+    """
+    servo, torque = scanner.servo, weight.across_n * weight.off_axis_m
+    if torque <= NO_TORQUE_NM:
+        return Check("flanks", "pass", tidy(torque), NO_TORQUE_NM, "N m", "servo", "servo: gravity does not turn it")
+    grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
+    x, y = rotor.centre_m[:2]
+    azimuth = round(math.degrees(math.atan2(-y, -x))) % 360
+    play = "by a play that its maker does not tell"
+    small = False
+    if servo.backlash_deg is not None:
+        off = math.radians(servo.backlash_deg) * 10_000
+        small = off <= scanner.lidar.range_sigma_mm
+        play = f"by {servo.backlash_deg:g} deg of play ({off:.0f} mm at 10 m)"
+    message = (
+        f"servo: gravity turns {servo.name} with {torque:.2g} N m to and fro and changes the flank of its gears twice "
+        f"a turn, {play}: an encoder on the output shaft sees that, one on the motor does not; {grams:.0f} g at "
+        f"{BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x, would balance it"
+    )
+    return Check("flanks", "note" if small else "warning", tidy(torque), NO_TORQUE_NM, "N m", "servo", message)
 
 
 def _forces(scanner: Scanner, stack: Stack, weight: Weight, shared: Supported) -> list[Check]:

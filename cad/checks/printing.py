@@ -15,6 +15,7 @@ import cadquery as cq
 import numpy as np
 
 from cad.checks.check import Check, at_least, at_most, note, tidy
+from cad.checks.islands import islands_check
 from cad.holes import rounds_of
 from cad.mesh import Mesh
 from cad.print_pose import PrintPose, print_pose
@@ -35,6 +36,7 @@ def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: M
         pose = print_pose(meshes[name], printer.bed_mm)
         checks.append(_bed(name, pose, printer))
         checks.append(note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg"))
+        checks.append(islands_check(name, meshes[name], pose))
         checks.append(_walls(name, meshes[name], printer))
         holes = [feature.diameter for feature in rounds_of(solid) if feature.hole]
         if holes:

@@ -1,8 +1,11 @@
-"""All checks of one scanner: for its build folder, and for `scanwright check`."""
+"""All checks of one scanner: for its build folder, and for `scanwright check`.
+
+They look at the parts without their labels: a groove between two strokes is no thin wall.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from cad.assembly import Assembly, make_parts
@@ -10,9 +13,9 @@ from cad.build import PartsResult, link_bodies, write_files
 from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
+from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
-from cad.mesh import Mesh, mesh_of
 from cad.remarks import shaft_is_turned, unverified
 from cad.shadow import shadow_of, triangles_of
 from design.scanner import Scanner
@@ -30,7 +33,7 @@ def check_parts(scanner: Scanner, made: PartsResult, folder: Path, progress: Say
         folder: the build folder.
         progress: called with a line of text before each step.
     """
-    checks, shadow = _run(scanner, made.assembly, made.meshes, progress)
+    checks, shadow = run_checks(scanner, made.assembly, progress)
     own_body = own_body_bytes(shadow, scanner.lidar.bearings_rad())
     write_files(folder, {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body})
     return checks
@@ -43,14 +46,13 @@ def check_scanner(scanner: Scanner, progress: Say) -> list[Check]:
         BuildError: a part cannot be made.
     """
     progress("making the parts")
-    return _run(scanner, make_parts(scanner), {}, progress)[0]
+    return run_checks(scanner, make_parts(scanner), progress)[0]
 
 
-def _run(scanner: Scanner, assembly: Assembly, known: Mapping[str, Mesh], progress: Say) -> tuple[list[Check], Shadow]:
-    """Checks and shadow; `known` are meshes of parts that need not be made again."""
+def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Check], Shadow]:
+    """Checks and shadow."""
     progress("casting the beams")
-    solids = assembly.made | assembly.bought
-    meshes = {name: known[name] if name in known else mesh_of(solid) for name, solid in solids.items()}
+    meshes = assembly.meshes()
     triangles = triangles_of(meshes)
     shadow = shadow_of(scanner, triangles)
     progress("checking clearance, loads and walls")
@@ -63,10 +65,12 @@ def _run(scanner: Scanner, assembly: Assembly, known: Mapping[str, Mesh], progre
         if product is not None
         for finding in unverified(product)
     ]
+    bodies = link_bodies(scanner, assembly)
     checks = [
         *clearance_checks(meshes),
         *beam_checks(scanner, shadow, triangles),
-        *mechanics_checks(scanner, assembly.stack, link_bodies(scanner, assembly)),
+        *mechanics_checks(scanner, assembly.stack, bodies),
+        *deflection_checks(scanner, assembly.stack, assembly.linkage, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes),
         *doubts,
     ]

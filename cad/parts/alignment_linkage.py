@@ -21,7 +21,7 @@ from cad.loads import JOURNAL_WALL
 from cad.mesh import checked_mesh
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.sub_plate import EAR_SCREW, ear_screws, plate_marks
-from cad.screws import SCREWS, Screw
+from cad.screws import SCREWS, Screw, thread_hole
 from cad.sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, Stack, box_corners, envelope_of
 from cad.solids import building, checked
 from design.errors import BuildError
@@ -51,6 +51,8 @@ class AlignmentLinkage:
     body: Box
     ears: Box | None  # room of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
+    ear_thread: float  # diameter
+    clamp_thread: float  # diameter
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
@@ -92,6 +94,8 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         body=envelope.body,
         ears=None if stack.sub_plate is None else _grown(envelope.under),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
+        ear_thread=thread_hole(EAR_SCREW, printer),
+        clamp_thread=thread_hole(CLAMP_SCREW, printer),
         cables=envelope.cables,
         fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
         fan=_free_bearings(stack, lidar.bearings_rad()),
@@ -225,7 +229,7 @@ def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
     pocket = p.top - p.screw.head_height - 0.5
     pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
     low = p.top - PLATE_THICKNESS - 1.0
-    return pockets + [solids.upright(EAR_SCREW.core / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
+    return pockets + [solids.upright(p.ear_thread / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
 
 
 def _grown(box: Box) -> Box:
@@ -301,7 +305,7 @@ def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
     for azimuth in p.clamp_azimuths:
         out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         centre = np.array([0.0, 0.0, stack.clamp])
-        cuts.append(solids.cylinder(CLAMP_SCREW.core / 2, centre, out, 80.0))
+        cuts.append(solids.cylinder(p.clamp_thread / 2, centre, out, 80.0))
         # 1.5 mm into the hub: a spot face, not a tangent plane
         cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - 1.5) * out, out, 80.0))
     return cuts

@@ -2,8 +2,9 @@
 
 Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm; the deck is that of `cad/deck.py`. Two rails with feet take
 the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut that stays
-wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with four M4 holes on
-80 x 80 mm. Screws: first the case from behind through the strut, then the foot on the deck.
+wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's holes: four
+M4 on 80 x 80 mm unless the task names others. Screws: first the case from behind through the strut, then the foot on
+the deck.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.deck import BACK_THICKNESS, DECK_HOLES, DECK_SCREW, FOOT_THICKNESS, PLUG_GAP, Deck
+from cad.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, Deck
 from cad.screws import SCREWS, Screw
 from cad.sizing import Stack
 from cad.solids import building, checked
@@ -22,8 +23,6 @@ from design.frames import Array
 from design.scanner import Scanner
 
 PART = "base_mount"
-FOOT_HALF = 50.0
-PAD_HALF = 26.0  # of the strut on the foot
 RAIL_HALF_WIDTH = 4.0
 FOOT_RADIUS = 3.0
 UNDER_HEAD = 5.0
@@ -52,7 +51,7 @@ def mount_of(scanner: Scanner, stack: Stack, deck: Deck) -> BaseMount:
         ears=stack.horn + servo.case_rear_holes_z_mm,
         screw=screw,
         hole=screw.nominal + printer.screw_clearance_mm,
-        deck_hole=DECK_SCREW.nominal + printer.screw_clearance_mm,
+        deck_hole=deck.screw.nominal + printer.screw_clearance_mm,
     )
 
 
@@ -68,7 +67,7 @@ def base_mount(p: BaseMount) -> cq.Solid:
     on_deck = solids.location(frame, deck.centre)
     back = np.array(deck.back_centre)
     with building(PART, "strut and foot", "deck normal", axis):
-        foot = solids.prism(solids.octagon(FOOT_HALF, FOOT_HALF, 12.0), 0.0, FOOT_THICKNESS).moved(on_deck)
+        foot = solids.prism(solids.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
         body: cq.Shape = _back_plate(p).fuse(foot, _strut(p, frame))
         body = checked(body, PART, "strut and foot", "deck normal", axis)
     with building(PART, "rails and screw holes", "deck normal", axis):
@@ -79,7 +78,7 @@ def base_mount(p: BaseMount) -> cq.Solid:
         for x, y in deck.rear_holes:
             cuts.append(solids.upright(p.hole / 2, back[2] - 20.0, p.ears + 1.0, x, y))
             cuts.append(solids.upright(p.screw.head_room, back[2] - 400.0, p.ears - UNDER_HEAD, x, y))
-        for x, y in DECK_HOLES:
+        for x, y in deck.deck_holes:
             cuts.append(solids.upright(p.deck_hole / 2, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
         return checked(body.cut(*cuts).clean(), PART, "rails and screw holes", "deck normal", axis)
 

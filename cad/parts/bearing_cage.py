@@ -19,7 +19,7 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.screws import SCREWS, Screw
+from cad.screws import SCREWS, Screw, thread_hole
 from cad.sizing import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.solids import building, checked
 from design.catalogue import Bearing, Servo
@@ -57,6 +57,7 @@ class BearingCage:
     hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
     cage_hole: float  # diameter, in the legs
+    cage_thread: float  # diameter, in the boss
     legs: tuple[float, ...]  # azimuths of the bell's radial screws
     fit: float  # diametral clearance of a sliding fit
 
@@ -108,6 +109,7 @@ def cage_of(scanner: Scanner, stack: Stack) -> BearingCage | None:
         hole=hole,
         holes=holes,
         cage_hole=CAGE_SCREW.nominal + printer.screw_clearance_mm,
+        cage_thread=thread_hole(CAGE_SCREW, printer),
         legs=tuple(_leg_screw(middle, holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
         fit=printer.fit_clearance_mm,
     )
@@ -181,7 +183,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         for azimuth in p.legs:
             out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
             start = (stack.cage_inner - SCREW_DEPTH) * out + [0.0, 0.0, (p.foot + p.high) / 2]
-            cuts.append(solids.cylinder(CAGE_SCREW.core / 2, start, out, SCREW_DEPTH + 1.0))
+            cuts.append(solids.cylinder(p.cage_thread / 2, start, out, SCREW_DEPTH + 1.0))
         return checked(body.cut(*cuts).clean(), BASE, "feet and screw holes", "case_holes_mm", p.holes)
 
 

@@ -1,0 +1,170 @@
+"""Linear elasticity on a grid of cells that a body fills in part (finite cells): no mesh of the body is needed.
+
+Every cell is a hexahedron of 20 nodes, its stiffness the sum over those of its small cubes that are inside the body
+(Parvizian, Duester, Rank 2007); a surface that cannot move is held by springs. Millimetres, newtons, MPa.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from cad.statics.voxels import Grid
+from design.frames import Array
+
+OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
+HOLD = 20.0  # stiffness per area of what holds a surface, of modulus by edge: softens by some 1e-3
+LATTICE = np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)])
+NODES = LATTICE[(LATTICE == 1).sum(axis=1) < 2]  # corners and middles of edges, in half edges from the corner, (20, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A body on a grid.
+
+    Attributes:
+        grid: the cells.
+        cells: index of every cell that holds some of the body, shape (m, 3).
+        share: of each of their cubes that the body fills, shape (m, parts^3).
+        nodes: node number of each node of each cell, shape (m, 20).
+        count: number of nodes n.
+    """
+
+    grid: Grid
+    cells: NDArray[np.intp]
+    share: Array
+    nodes: NDArray[np.intp]
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Points in a body: the cell of each (row of `Model.cells`) and its shape functions, shape (p,) and (p, 20)."""
+
+    cell: NDArray[np.intp]
+    shapes: Array
+
+
+def model_of(grid: Grid, body: Array) -> Model:
+    """The cells of a body, from the share of each cube that it fills (`voxels.filled`)."""
+    (x, y, z), p = grid.shape, grid.parts
+    share = body.reshape(x, p, y, p, z, p).transpose(0, 2, 4, 1, 3, 5).reshape(x, y, z, p**3)
+    cells = np.argwhere(share.any(axis=3))
+    size = 2 * np.array(grid.shape) + 1
+    lattice = 2 * cells[:, None, :] + NODES
+    numbers = (lattice[..., 0] * size[1] + lattice[..., 1]) * size[2] + lattice[..., 2]
+    used, nodes = np.unique(numbers, return_inverse=True)
+    return Model(grid, cells, share[tuple(cells.T)], nodes.reshape(numbers.shape), len(used))
+
+
+def places(model: Model, points: Array) -> Places:
+    """Where points [mm] are, shape (p, 3); one on the face between two cells belongs to the lower."""
+    grid = model.grid
+    number = np.full(grid.shape, -1)
+    number[tuple(model.cells.T)] = np.arange(len(model.cells))
+    at = (points - grid.low) / grid.edge
+    corner = np.clip(np.ceil(at - 1e-9).astype(np.intp) - 1, 0, np.array(grid.shape) - 1)
+    cell = number[tuple(corner.T)]
+    known = cell >= 0
+    return Places(cell[known], _shapes_and_slopes((at - corner)[known])[0])
+
+
+def solve(model: Model, modulus: float, poisson: float, held: Places, held_mm2: float, loads: Array) -> Array:
+    """Displacements of all nodes.
+
+    Args:
+        model: the body.
+        modulus: of elasticity [MPa].
+        poisson: ratio.
+        held: points spread evenly over the surface that cannot move.
+        held_mm2: its area.
+        loads: [N], shape (n, 3, cases).
+
+    Returns:
+        [mm], of the loads' shape.
+
+    Raises:
+        RuntimeError: nothing holds the body.
+    """
+    cubes = _of_cubes(model.grid.parts, poisson)
+    matrices = (modulus * model.grid.edge * ((model.share + OUTSIDE) @ cubes)).reshape(-1, 20, 3, 20, 3)
+    spring = HOLD * modulus / model.grid.edge * held_mm2 / len(held.cell)
+    springs = spring * held.shapes[:, :, None] * held.shapes[:, None, :]
+    for axis in range(3):
+        np.add.at(matrices[:, :, axis, :, axis], held.cell, springs)
+    stiffness = _summed(model.nodes, matrices, model.count)
+    way = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    factors = splu(stiffness.tocsc(), **way)
+    return np.asarray(factors.solve(loads.reshape(-1, loads.shape[2])).reshape(loads.shape))
+
+
+def weight(model: Model, per_mm3: Array) -> Array:
+    """Loads of forces per volume [N/mm3] on all of the body, shape (3, cases): (n, 3, cases)."""
+    cube = (model.grid.edge / model.grid.parts) ** 3
+    share = model.share @ _shapes_and_slopes(_middles(model.grid.parts))[0] * cube
+    loads = np.zeros((model.count, *per_mm3.shape))
+    np.add.at(loads, model.nodes, share[:, :, None, None] * per_mm3)
+    return loads
+
+
+def pull(model: Model, at: Places, forces: Array) -> Array:
+    """Loads of forces on points [N], shape (p, 3, cases): (n, 3, cases)."""
+    loads = np.zeros((model.count, *forces.shape[1:]))
+    np.add.at(loads, model.nodes[at.cell], at.shapes[:, :, None, None] * forces[:, None])
+    return loads
+
+
+def moved(model: Model, at: Places, displacements: Array) -> Array:
+    """Displacements of points, shape (p, 3, cases), from those of the nodes."""
+    return np.asarray(np.einsum("pa,paic->pic", at.shapes, displacements[model.nodes[at.cell]]))
+
+
+def _middles(parts: int) -> Array:
+    """Of the cubes of a cell of edge 1, shape (parts^3, 3)."""
+    along = (np.arange(parts) + 0.5) / parts
+    return np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=3).reshape(-1, 3)
+
+
+def _shapes_and_slopes(points: Array) -> tuple[Array, Array]:
+    """Quadratic shape functions of a cell of edge 1 and their derivatives, shape (p, 20) and (p, 20, 3)."""
+    at, nodes = 2 * points[:, None, :] - 1, NODES - 1.0  # -1 to 1
+    on_edge = nodes == 0
+    side = np.where(on_edge, 1 - at**2, (1 + at * nodes) / 2)
+    slope = np.where(on_edge, -2 * at, nodes / 2)
+    corner = ~on_edge.any(axis=1)
+    plain = side.prod(axis=2)
+    plain_slopes = np.stack([slope[:, :, a] * np.delete(side, a, axis=2).prod(axis=2) for a in range(3)], axis=2)
+    last = np.where(corner, (at * nodes).sum(axis=2) - 2, 1.0)
+    slopes = plain_slopes * last[:, :, None] + np.where(corner[:, None], plain[:, :, None] * nodes, 0.0)
+    return plain * last, 2 * slopes
+
+
+def _of_cubes(parts: int, poisson: float) -> Array:
+    """Stiffness of every cube of a cell of edge 1 and modulus 1, shape (parts^3, 3600); 8 points to a cube."""
+    lame, shear = poisson / (1 + poisson) / (1 - 2 * poisson), 0.5 / (1 + poisson)
+    stiff = np.zeros((parts**3, 20, 3, 20, 3))
+    share = 1 / parts**3 / 8
+    for shift in (LATTICE[(LATTICE != 1).all(axis=1)] - 1.0) / np.sqrt(12) / parts:
+        _, g = _shapes_and_slopes(_middles(parts) + shift)
+        stiff += share * lame * np.einsum("cai,cbj->caibj", g, g)
+        stiff += share * shear * np.einsum("caj,cbi->caibj", g, g)
+        along = share * shear * np.einsum("cak,cbk->cab", g, g)
+        for axis in range(3):
+            stiff[:, :, axis, :, axis] += along
+    return stiff.reshape(parts**3, -1)
+
+
+def _summed(nodes: NDArray[np.intp], matrices: Array, count: int) -> sparse.bsr_matrix:
+    """Sparse matrix of 3 x 3 blocks, those of one place added up, always in the same order."""
+    blocks = matrices.transpose(0, 1, 3, 2, 4).reshape(-1, 3, 3)
+    rows, columns = np.repeat(nodes, 20, axis=1).reshape(-1), np.tile(nodes, (1, 20)).reshape(-1)
+    key = rows * count + columns
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    data = np.add.reduceat(blocks[order], first, axis=0)
+    starts = np.searchsorted(rows[order][first], np.arange(count + 1))
+    return sparse.bsr_matrix((data, columns[order][first], starts), shape=(3 * count, 3 * count), blocksize=(3, 3))

@@ -1,0 +1,159 @@
+"""How far gravity moves and turns the lidar against the horn, for gravity along each axis of the rotation frame.
+
+The printed parts between shaft and lidar by finite elements on two grids, the shaft as a beam. Linkage and
+sub-plate are one body, bonded to the spigot all around; the lidar lies on its seat and stiffens nothing. Grids lie
+along the laser frame: its seat is a face of theirs. Where a gap is narrower than a cell, the cell bridges it: the two
+grids then differ much, and the error says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.loads import STANDARD_GRAVITY
+from cad.mass import Inertial
+from cad.mesh import Mesh
+from cad.sizing import Stack
+from cad.statics import elastic
+from cad.statics.shaft import ShaftBend
+from cad.statics.voxels import Grid, filled
+from design.frames import Array
+
+EDGES = (8.0, 6.0)  # mm, of the cells of the two grids
+PARTS = 6  # cubes along the edge of a cell
+POISSON = 0.35
+STEP = 1.0  # mm, between points of seat and spigot
+
+
+@dataclass(frozen=True, slots=True)
+class Sag:
+    """Columns belong to gravity along x, y and z of the rotation frame, shape (3, 3) each.
+
+    Attributes:
+        rotation_rad: of the lidar, rotation vectors.
+        shift_m: of the optical centre.
+        rotation_error_rad: of the finite elements, with its sign.
+        shift_error_m: likewise.
+    """
+
+    rotation_rad: Array
+    shift_m: Array
+    rotation_error_rad: Array
+    shift_error_m: Array
+
+
+def linkage_sag(
+    stack: Stack, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
+) -> Sag:
+    """Of the printed parts alone.
+
+    Args:
+        stack: the layout.
+        meshes: linkage, and sub-plate where there is one; rotation frame [mm].
+        seat: half width, half depth and height of the lidar's seat, laser frame [mm].
+        lidar: in the laser frame.
+        modulus_mpa: of the material.
+        density_g_cm3: of the material.
+    """
+
+    def on_grid(edge: float) -> tuple[Array, Array]:
+        return _on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3)
+
+    coarse, fine = on_grid(EDGES[0]), on_grid(EDGES[1])
+    # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
+    errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse, fine, strict=True)]
+    return Sag(*fine, *errors)
+
+
+def with_shaft(sag: Sag, shaft: ShaftBend, stack: Stack, rotor: Inertial) -> Sag:
+    """Sag of linkage and shaft, which the whole rotor bends."""
+    end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
+    turned, shifted = [], []
+    for along in np.eye(3):
+        force = rotor.mass_kg * STANDARD_GRAVITY * along
+        moment = np.cross(rotor.centre_m - end, force)
+        rotation = shaft.rotation_of(force, moment)
+        turned.append(rotation)
+        shifted.append(shaft.shift_of(force, moment) + np.cross(rotation, -end))
+    return Sag(
+        sag.rotation_rad + np.stack(turned, axis=1),
+        sag.shift_m + np.stack(shifted, axis=1),
+        sag.rotation_error_rad,
+        sag.shift_error_m,
+    )
+
+
+def _on_grid(
+    edge: float, stack: Stack, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus: float, density: float
+) -> tuple[Array, Array]:
+    """Rotation [rad] and shift [m] of one grid, rotation frame."""
+    R = stack.R()
+    triangles = [(mesh.vertices @ R)[mesh.faces] for mesh in meshes]
+    grid = _grid(np.concatenate(triangles), edge, float(seat[2]))
+    body = np.max([filled(part, grid) for part in triangles], axis=0)
+    model = elastic.model_of(grid, body)
+    spigot, spigot_mm2 = _spigot(stack)
+    held = elastic.places(model, spigot @ R)
+    points, on_seat = _seat(grid, body, seat)
+    at = elastic.places(model, points[on_seat])
+    down = STANDARD_GRAVITY * R.T  # columns: gravity along each axis of the rotation frame, laser frame
+    loads = elastic.weight(model, density * 1e-6 * down)
+    lever = lidar.centre_m * 1000
+    loads += elastic.pull(model, at, _shared(points[on_seat], lidar.mass_kg * down, lever))
+    moved = elastic.solve(model, modulus, POISSON, held, spigot_mm2, loads)
+    shift, rotation = _rigid(points[on_seat], elastic.moved(model, at, moved))
+    return R @ rotation, R @ shift / 1000
+
+
+def _grid(triangles: Array, edge: float, seat: float) -> Grid:
+    """Around all triangles, with a face at the seat's height, and the same on both sides of the lidar's axis."""
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    start = np.array([0.0, 0.0, seat])
+    before, beyond = (np.ceil((start - low) / edge), np.ceil((high - start) / edge))
+    shape = np.maximum(before + beyond, 1).astype(int)
+    return Grid(start - edge * before, edge, (int(shape[0]), int(shape[1]), int(shape[2])), PARTS)
+
+
+def _spigot(stack: Stack) -> tuple[Array, float]:
+    """Points all around the shaft in the hub, and the area, rotation frame."""
+    radius, length = stack.shaft_diameter / 2, stack.spigot
+    rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
+    z = stack.hub_bottom + (np.arange(rows) + 0.5) / rows * length
+    angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, z)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=2)
+    return points.reshape(-1, 3), 2 * np.pi * radius * length
+
+
+def _seat(grid: Grid, body: Array, seat: Array) -> tuple[Array, Array]:
+    """Middles of the cubes' faces at the seat's height, and which of them the lidar lies on."""
+    level = round((float(seat[2]) - float(grid.low[2])) / grid.edge) * grid.parts
+    x, y = np.meshgrid(grid.middles(0), grid.middles(1), indexing="ij")
+    lies = (body[:, :, level - 1] > 0.5) & (np.abs(x) < seat[0]) & (np.abs(y) < seat[1])
+    points = np.stack([x, y, np.full_like(x, seat[2])], axis=2)
+    return points.reshape(-1, 3), lies.reshape(-1)
+
+
+def _shared(points: Array, force: Array, at: Array) -> Array:
+    """Forces on points that add up to forces (3, cases) at a place, as a rigid seat would share them: (p, 3, cases)."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    moment = np.cross(at - middle, force, axisb=0, axisc=0)
+    turn = np.linalg.solve(_second_moments(arms), moment)
+    return force / len(points) + np.cross(turn.T[None], arms[:, None], axis=2).transpose(0, 2, 1)
+
+
+def _rigid(points: Array, moved: Array) -> tuple[Array, Array]:
+    """Displacement of the origin and rotation (3, cases) that fit the moved points best."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    turned = np.cross(arms[:, None], moved.transpose(0, 2, 1), axis=2).sum(axis=0).T
+    rotation = np.linalg.solve(_second_moments(arms), turned)
+    return moved.mean(axis=0) + np.cross(rotation, -middle, axisa=0, axisc=0), rotation
+
+
+def _second_moments(arms: Array) -> Array:
+    """Of unit masses, shape (3, 3)."""
+    return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)

@@ -1,0 +1,88 @@
+"""How far the shaft bends and twists at the hub: a beam of round sections (Timoshenko), clamped in the horn.
+
+Where a bearing holds the hub, a spring holds the hub's journal sideways. SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.loads import ALUMINIUM_PA, WAIST, waist_radius_mm
+from cad.sizing import Stack
+from design.frames import Array
+
+SLICES = 400  # of the shaft's length: bend within 1e-4
+POISSON = 0.33
+SHEAR_SHARE = 0.9  # of a round section that carries shear
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftBend:
+    """What a load at the hub's lower end does to it. A force along x bends it about y, and so all around.
+
+    Attributes:
+        compliance: (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m].
+        twist_rad_per_nm: about the axis.
+        stretch_m_per_n: along the axis.
+    """
+
+    compliance: Array
+    twist_rad_per_nm: float
+    stretch_m_per_n: float
+
+    def rotation_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Rotation of the hub [rad], rotation frame; force and moment act on it at the height of its lower end."""
+        along = np.array([-force_n[1], force_n[0], 0.0])  # z x force
+        bend = self.compliance[1, 0] * along + self.compliance[1, 1] * np.array([*moment_nm[:2], 0.0])
+        return bend + np.array([0.0, 0.0, self.twist_rad_per_nm * moment_nm[2]])
+
+    def shift_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Displacement of the hub's lower end [m]."""
+        across = np.array([moment_nm[1], -moment_nm[0], 0.0])  # moment x z
+        bend = self.compliance[0, 0] * np.array([*force_n[:2], 0.0]) + self.compliance[0, 1] * across
+        return bend + np.array([0.0, 0.0, self.stretch_m_per_n * force_n[2]])
+
+
+def shaft_bend(stack: Stack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0) -> ShaftBend:
+    """The beam from horn to hub.
+
+    Args:
+        stack: its lengths and radii.
+        modulus_pa: of elasticity.
+        cage_n_per_m: sideways stiffness of the cage that holds the bearing, 0 without one.
+    """
+    length = (stack.hub_bottom - stack.horn) / 1000
+    z = (np.arange(SLICES) + 0.5) / SLICES * length
+    dz = length / SLICES
+    radius = _radius_mm(stack, 1000 * z) / 1000
+    area, second_moment = math.pi * radius**2, math.pi / 4 * radius**4
+    shear_pa = modulus_pa / (2 + 2 * POISSON)
+    lever = length - z
+    bend = dz / (modulus_pa * second_moment)
+    shear = float((dz / (SHEAR_SHARE * shear_pa * area)).sum())
+    free = np.array(
+        [[(bend * lever**2).sum() + shear, (bend * lever).sum()], [(bend * lever).sum(), bend.sum()]]
+    )  # of force and moment at the end
+    reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])  # the bearing moves by this
+    held = np.outer(free @ reach, reach @ free) * cage_n_per_m / (1 + cage_n_per_m * float(reach @ free @ reach))
+    return ShaftBend(
+        compliance=free - held,
+        twist_rad_per_nm=float((dz / (shear_pa * 2 * second_moment)).sum()),
+        stretch_m_per_n=float((dz / (modulus_pa * area)).sum()),
+    )
+
+
+def _radius_mm(stack: Stack, above_horn_mm: Array) -> Array:
+    """Radius of the shaft; the pocket of the horn's boss lies within the flange and is left out."""
+    shaft = stack.shaft_diameter / 2
+    z = above_horn_mm
+    radius = np.full_like(z, shaft)
+    if stack.bearing is not None:
+        waist = waist_radius_mm(stack)
+        above = z - stack.collar_height - WAIST
+        radius = np.where(above < 0, waist, np.minimum(shaft, waist + np.maximum(above, 0.0)))
+    radius = np.where(z < stack.collar_height, max(stack.collar_radius, shaft), radius)
+    return np.where(z < stack.flange_thickness, np.maximum(stack.flange_radius, radius), radius)

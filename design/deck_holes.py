@@ -1,0 +1,48 @@
+"""The holes of the robot's deck that the base mount is screwed to, as a task gives them; mm, about the mount's centre.
+
+x and y are those of the world frame, whose origin is the centre of the pattern on the face of the deck.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from design.record import Record
+
+Length = Annotated[float, Field(gt=0, le=400)]
+DeckScrew = Literal["M3", "M4", "M5", "M6"]
+
+
+class Rectangle(Record):
+    """Four holes in the corners of a rectangle; `size_mm` is between their centres, along x and y."""
+
+    shape: Literal["rectangle"]
+    size_mm: tuple[Length, Length] = (80.0, 80.0)
+    screw: DeckScrew = "M4"
+
+    def holes(self) -> tuple[tuple[float, float], ...]:
+        """Centres."""
+        x, y = self.size_mm[0] / 2, self.size_mm[1] / 2
+        return (x, y), (-x, y), (-x, -y), (x, -y)
+
+
+class Circle(Record):
+    """Holes spread evenly on a circle, the first at `first_deg` from x."""
+
+    shape: Literal["circle"]
+    diameter_mm: Length
+    count: int = Field(default=4, ge=3, le=16)
+    first_deg: float = Field(default=45.0, ge=-360, le=360)
+    screw: DeckScrew = "M4"
+
+    def holes(self) -> tuple[tuple[float, float], ...]:
+        """Centres."""
+        turns = [math.radians(self.first_deg + 360 * i / self.count) for i in range(self.count)]
+        r = self.diameter_mm / 2
+        return tuple((round(r * math.cos(a), 6), round(r * math.sin(a), 6)) for a in turns)
+
+
+DeckHoles = Annotated[Rectangle | Circle, Field(discriminator="shape")]
