@@ -1,8 +1,14 @@
-"""The servo's side of a scan: a thread that gives its orders and asks, a hundred times a second, where it is."""
+"""The servo's side of a scan: a thread that gives its orders and asks, a hundred times a second, where it is.
+
+It asks at uneven times. At even ones an axis may pass very nearly a whole step of its encoder from one question to the
+next (an AX-12A at 30 deg/s does): all answers of a while are then rounded by the same part of a step, which no
+smoothing can find. At uneven times the rounding differs from sample to sample, and averages out.
+"""
 
 from __future__ import annotations
 
 import math
+import random
 import time
 from collections import Counter, deque
 from collections.abc import Iterator
@@ -23,19 +29,49 @@ SERVO_HZ = 100.0
 _DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
 _WINDOW = 50  # samples: half a second
 _STILL_RAD = math.radians(0.2)  # two steps of the encoder
-_DOUBT_RAD = math.radians(0.05)  # below it an angle of uncertain time is as good as the encoder's step
+_DOUBT_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
 _GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
 
 
 class Axis:
-    """What the servo's thread tells, and what is made of it here."""
+    """What the servo's thread is told and tells, and what is made of it here.
 
-    def __init__(self, begins_ns: int) -> None:
-        self.begins_ns = begins_ns
+    Attributes:
+        begins_ns: when the motion proper begins; before it the axis is on its way to the start.
+        orders: courses for the thread, None where the axis shall stand.
+        told: states and errors from the thread.
+        window: the good angles of the last half second.
+        left_out: angles that are not recorded, reason -> count.
+    """
+
+    def __init__(self, motion: Motion, stands_rad: float, step_rad: float) -> None:
+        self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()
         self.told: SimpleQueue[ServoState | Exception] = SimpleQueue()
         self.window: deque[ServoState] = deque(maxlen=_WINDOW)
-        self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
         self.left_out: Counter[str] = Counter()
+        self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
+        self._kept: list[ServoState] = []  # heard by `go`, for the next who hears
+        self._motion = motion
+        self._doubt_rad = _DOUBT_STEPS * step_rad
+        self._order(stands_rad)
+
+    def stop(self) -> None:
+        """Stand, with torque on, until `go`."""
+        self.orders.put(None)
+
+    def go(self) -> None:
+        """Make the motion anew from where the axis stands; `begins_ns` tells when it begins.
+
+        Raises:
+            DeviceError: the servo failed meanwhile.
+        """
+        self._kept = self.hear()
+        self._order(self.window[-1].position_rad if self.window else 0.0)
+
+    def _order(self, from_rad: float) -> None:
+        lead_s, moves = course(self._motion, from_rad)
+        self.begins_ns = time.monotonic_ns() + round(lead_s * 1e9)
+        self.orders.put(moves)
 
     def hear(self) -> list[ServoState]:
         """What is new and fit to be recorded.
@@ -43,7 +79,7 @@ class Axis:
         Raises:
             DeviceError: the servo failed.
         """
-        good = []
+        good, self._kept = self._kept, []
         while not self.told.empty():
             state = self.told.get()
             if isinstance(state, Exception):
@@ -53,7 +89,7 @@ class Axis:
                 self.left_out["servo angles in the dead sector"] += 1
             elif (  # where the axis turns back it is slow, and no angle is in doubt
                 state.time_bound_ns > 2 * sorted(self._bounds_ns)[len(self._bounds_ns) // 10]
-                and abs(state.velocity_rad_s) * state.time_bound_ns > _DOUBT_RAD * 1e9
+                and abs(state.velocity_rad_s) * state.time_bound_ns > self._doubt_rad * 1e9
                 and self.window
                 and state.time_ns - self.window[-1].time_ns < _GAP_NS
             ):
@@ -93,9 +129,8 @@ def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
         raise DeviceError(
             f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
         )
-    lead_s, moves = course(motion, stands_rad)
-    axis, done = Axis(time.monotonic_ns() + round(lead_s * 1e9)), Event()
-    thread = Thread(target=_follow, args=(servo, moves, axis.told, done), name="servo", daemon=True)
+    axis, done = Axis(motion, stands_rad, servo.step_rad), Event()
+    thread = Thread(target=_follow, args=(servo, axis.orders, axis.told, done), name="servo", daemon=True)
     thread.start()
     try:
         yield axis
@@ -104,14 +139,26 @@ def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
         thread.join()
 
 
-def _follow(servo: Servo, moves: Iterator[Move], told: SimpleQueue[ServoState | Exception], done: Event) -> None:
+def _follow(
+    servo: Servo,
+    orders: SimpleQueue[Iterator[Move] | None],
+    told: SimpleQueue[ServoState | Exception],
+    done: Event,
+) -> None:
     """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
     began_s = due_s = heard_s = time.monotonic()
-    move = next(moves, None)
+    moves: Iterator[Move] = iter(())
+    move = None
     try:
         while not done.wait(max(due_s - time.monotonic(), 0)):
             now_s = time.monotonic()
-            due_s = max(due_s + 1 / SERVO_HZ, now_s)
+            due_s = max(due_s + random.uniform(0.5, 1.5) / SERVO_HZ, now_s)
+            if not orders.empty():
+                ordered = orders.get()
+                began_s, moves = now_s, iter(()) if ordered is None else ordered
+                move = next(moves, None)
+                if ordered is None:
+                    servo.hold()
             if move is not None and now_s - began_s >= move.at_s:
                 if math.isinf(move.goal_rad):
                     servo.spin(move.rate_rad_s)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import ExitStack
+from itertools import takewhile
 from pathlib import Path
 from types import TracebackType
 
@@ -105,6 +106,19 @@ def write_points(path: Path, points_m: NDArray[np.float64], comments: Iterable[s
         rows[axis] = points_m[:, column]
     with PlyWriter(path, fields, comments) as cloud:
         cloud.write(rows)
+
+
+def ply_comments(path: Path) -> list[str]:
+    """The comments in the header of a cloud that `read_ply` reads, without the filler."""
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        lines = iter(stream.readline, b"")
+        words = [line.decode("ascii", "replace").strip() for line in takewhile(_in_header, lines)]
+    comments = [line.removeprefix("comment ") for line in words if line.startswith("comment ")]
+    return [comment for comment in comments if comment.strip("-")]
+
+
+def _in_header(line: bytes) -> bool:
+    return line.strip() != b"end_header"
 
 
 def read_ply(path: Path) -> NDArray[np.void]:

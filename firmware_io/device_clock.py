@@ -2,12 +2,12 @@
 
 A packet can be late, never early: among the arrivals only the earliest say anything about the clocks. The way is
 
-1. stamps are whole milliseconds, turns are regular: a slow loop over the stamps finds where between two ticks a turn
-   began (it cannot where turns and ticks beat slowly, in seconds to minutes; then half a tick stays unknown);
+1. stamps are whole milliseconds, turns are nearly even: `stamp_line` finds where between two ticks a turn began (a
+   constant part of a tick may stay unknown, and does no harm: the offset takes it up);
 2. the straight line below all arrivals of the last 100 seconds, as close to them as it goes, gives rate and offset:
    it is that edge of their lower convex hull which spans the middle (one arrival a second is kept, the earliest);
 3. where even the earliest arrivals of the last seconds lie above that line by more than chance, the line is lifted
-   (the beat of 1., or a rate that changed);
+   (a rate that changed);
 4. the declared smallest delay, from the moment that a stamp means to the last byte of an undelayed packet, is taken
    off: from arrivals alone no one can tell it from the offset;
 5. a time synchronisation before the scans (question and answer: both bounds) keeps the result within what it allows.
@@ -28,12 +28,13 @@ import numpy as np
 from design.errors import DeviceError
 from firmware_io.samples import Times
 from firmware_io.scip import STAMP_WRAP_MS
+from firmware_io.stamp_line import Point, StampLine, hull
 
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
+_RATE_USUAL = 5e-5
 _BUCKETS = 100  # seconds that the line looks back: longer averages better, shorter follows a warming quartz
-_NEAR = 8  # seconds in which the earliest arrival must touch the line
+_NEAR = 320  # arrivals among which the earliest must touch the line
 _CHANCE = 2.0  # times the earliness that is usual among so many arrivals
-_LOOP_S = 1.25  # the loop over the stamps forgets in twice this time: motors wander
 _GRAIN_NS = 1e6 / math.sqrt(12)  # standard deviation of a tick, which may stay unknown
 
 
@@ -120,6 +121,19 @@ class StampCounter:
             self._last = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Early:
+    """An arrival: number and sensor time of its turn, and by how much more host than sensor time had passed."""
+
+    turn: int
+    turn_ms: float
+    late_ns: float
+
+    def above(self, slope: float) -> float:
+        """Beyond a line through 0."""
+        return self.late_ns - slope * self.turn_ms
+
+
 class DeviceClock:
     """Host times of the scans of one sensor, one after the other, in constant memory."""
 
@@ -161,23 +175,19 @@ class DeviceClock:
             self._begin_anew()
         if self._count == 0:
             self._origin = (stamp_ms, arrival_ns)
-            self._turn_ms = -self._period_ms
-            self._last_ms = -self._period_ms
         since_ms = stamp_ms - self._origin[0]
         self._count += 1
-        turn_ms = self._between_ticks(since_ms)
-        if self._count == round(2 * _LOOP_S * 1e3 / self._period_ms):  # what the loop said while it settled is off
-            self._earliest.clear()
-            self._bucket_ms = -math.inf
+        turn = self._stamps.add(since_ms)
+        turn_ms = self._stamps.time_ms(turn)
         # What is left after the nominal rate is small: floats hold it to a nanosecond.
         late_ns = arrival_ns - self._origin[1] - turn_ms * 1e6
-        self._learn(turn_ms, late_ns)
+        self._learn(turn, turn_ms, late_ns)
         line_ns = self._offset_ns + self._slope * turn_ms
         self._late_ns += (late_ns - line_ns - self._late_ns) * max(1 / self._count, 1e-3)
-        chance_ns = self._late_ns / min(self._count, _NEAR * 1e3 / self._period_ms)
+        chance_ns = self._late_ns / min(self._count, _NEAR)
         line_ns += max(self._near_ns - _CHANCE * chance_ns, 0.0)
         time_ns = self._origin[1] + round(turn_ms * 1e6 + line_ns) - self._delay_ns
-        uncertainty_ns = math.hypot(chance_ns, _GRAIN_NS)
+        uncertainty_ns = math.hypot(chance_ns, self._reach_ns, _GRAIN_NS)
         if self._sync is not None:
             told_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
             time_ns = min(max(time_ns, told_ns - half_ns), told_ns + half_ns)
@@ -187,44 +197,51 @@ class DeviceClock:
     def _begin_anew(self) -> None:
         self._count = 0
         self._origin = (0, 0)
-        self._turn_ms = 0.0
-        self._last_ms = 0.0
-        self._turn_period_ms = self._period_ms
-        self._earliest: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
+        self._stamps = StampLine(self._period_ms)
+        self._fits = 0
+        self._earliest: deque[_Early] = deque(maxlen=_BUCKETS)
         self._bucket_ms = -math.inf
         self._slope = 0.0  # host nanoseconds per sensor millisecond, beyond 1e6
         self._offset_ns = 0.0
+        self._reach_ns = 0.0  # what the slope's uncertainty does to the end of the line
         self._near_ns = 0.0  # by how much the last seconds stay above the line
         self._late_ns = 0.0
 
-    def _between_ticks(self, since_ms: float) -> float:
-        """When the turn began, between the tick of its stamp and the next one."""
-        turns = max(round((since_ms - self._last_ms) / self._turn_period_ms), 1)
-        self._last_ms = since_ms
-        n = self._count
-        slow = min(self._period_ms / (_LOOP_S * 1e3), 0.1)
-        gain = max(slow, 2 * (2 * n - 1) / (n * (n + 1)))  # a straight line through all stamps at first
-        pull = max(slow * slow / 2, 6 / (n * (n + 1)) if n > 2 else 0.0)
-        expected_ms = self._turn_ms + turns * self._turn_period_ms
-        missed_ms = since_ms + 0.5 - expected_ms
-        self._turn_ms = expected_ms + min(gain, 1.0) * missed_ms
-        self._turn_period_ms += pull * missed_ms / turns
-        return self._turn_ms
-
-    def _learn(self, turn_ms: float, late_ns: float) -> None:
+    def _learn(self, turn: int, turn_ms: float, late_ns: float) -> None:
         """Keep the earliest arrival of each second, and the line below them."""
+        if self._fits != self._stamps.fits:  # the same arrivals, their turns told anew
+            self._fits = self._stamps.fits
+            self._earliest = deque((self._told_anew(early) for early in self._earliest), _BUCKETS)
+        elif turn_ms - self._bucket_ms < 1e3 and late_ns - self._slope * turn_ms >= self._earliest[-1].above(
+            self._slope
+        ):
+            return
+        here = _Early(turn, turn_ms, late_ns)
         if turn_ms - self._bucket_ms >= 1e3:
             self._bucket_ms = turn_ms
-            self._earliest.append((turn_ms, late_ns))
-        elif late_ns - self._slope * turn_ms < self._earliest[-1][1] - self._slope * self._earliest[-1][0]:
-            self._earliest[-1] = (turn_ms, late_ns)
-        else:
-            return
-        slope = _middle_slope(_lower_hull(list(self._earliest)))
+            self._earliest.append(here)
+        elif here.above(self._slope) < self._earliest[-1].above(self._slope):
+            self._earliest[-1] = here
+        slope = _middle_slope(hull([(early.turn_ms, early.late_ns) for early in self._earliest], 1))
+        # Few arrivals tell the rate less well than the usual quality of quartzes does. Two of them hold the line, some
+        # half of the span apart, each late by the mean over half of all: that is their rate's uncertainty.
+        span_ms = max(turn_ms - self._earliest[0].turn_ms, self._period_ms)
+        unsure = 12 * self._late_ns * self._period_ms / span_ms**2
+        usual = _RATE_USUAL * 1e6
+        slope /= 1 + (unsure / usual) ** 2
+        self._reach_ns = span_ms / 2 * unsure * usual / math.hypot(unsure, usual)
         self._slope = min(max(slope, -_RATE_MAX * 1e6), _RATE_MAX * 1e6)
-        above_ns = [late - self._slope * ms for ms, late in self._earliest]
+        above_ns = [early.above(self._slope) for early in self._earliest]
         self._offset_ns = min(above_ns)
-        self._near_ns = min(above_ns[-_NEAR:]) - self._offset_ns
+        near = max(round(_NEAR * self._period_ms / 1e3), 1)
+        self._near_ns = min(above_ns[-near:]) - self._offset_ns
+
+    def _told_anew(self, early: _Early) -> _Early:
+        """An arrival, with the time of its turn by the present line where that holds for it."""
+        if early.turn < self._stamps.first_turn:
+            return early
+        turn_ms = self._stamps.time_ms(early.turn)
+        return _Early(early.turn, turn_ms, early.late_ns + (early.turn_ms - turn_ms) * 1e6)
 
     def _allowed(self, sync: TimeSync, stamp_ms: int, between_ms: float) -> tuple[int, int]:
         """Host time of a turn by the synchronisation, and how far it may be off."""
@@ -246,22 +263,10 @@ def host_times(clock: DeviceClock, stamp_ms: Times, arrival_ns: Times) -> tuple[
     return times, np.array([moment.uncertainty_ns for moment in moments], np.int64)
 
 
-def _lower_hull(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Lower convex hull of points that are sorted by their first number."""
-    hull: list[tuple[float, float]] = []
-    for x, y in points:
-        while len(hull) > 1 and (hull[-1][0] - hull[-2][0]) * (y - hull[-2][1]) <= (hull[-1][1] - hull[-2][1]) * (
-            x - hull[-2][0]
-        ):
-            hull.pop()
-        hull.append((x, y))
-    return hull
-
-
-def _middle_slope(hull: Sequence[tuple[float, float]]) -> float:
+def _middle_slope(below: Sequence[Point]) -> float:
     """Slope of the edge over the middle: of all lines below the points, it has the least area to them."""
-    middle = (hull[0][0] + hull[-1][0]) / 2
-    for (x0, y0), (x1, y1) in pairwise(hull):
+    middle = (below[0][0] + below[-1][0]) / 2
+    for (x0, y0), (x1, y1) in pairwise(below):
         if x0 < x1 and middle <= x1:
             return (y1 - y0) / (x1 - x0)
     return 0.0

@@ -81,11 +81,13 @@ class Servo:
         baud: bits per second.
         id: on the bus.
         port: name of the port.
+        step_rad: of its encoder.
     """
 
     def __init__(self, bus: ServoBus, table: ControlTable, servo_id: int, warnings: tuple[str, ...]) -> None:
         self.model, self.protocol, self.id = table.model, table.protocol, servo_id
         self.baud, self.port = bus.baud, bus.port
+        self.step_rad = table.position.unit
         self._bus, self._table, self._warnings = bus, table, warnings
         self._fastest_rad_s = motor_of(table.model).no_load_rad_s
         self._mode: tuple[Setting, ...] = ()

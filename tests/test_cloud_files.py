@@ -3,6 +3,7 @@
 import struct
 import xml.etree.ElementTree as ET
 
+import laspy
 import numpy as np
 import pye57
 import pytest
@@ -89,6 +90,31 @@ def test_las_keeps_points_and_columns_and_says_what_it_loses(tmp_path, suffix):
     assert back.start_ns == cloud.start_ns
     assert "LAS holds points only: the shape 5 x 7 is lost, 6 rows without a point are left out" in said
     assert len(said) == 5
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_colours_come_back_as_bytes(tmp_path, suffix):
+    rng = np.random.default_rng(3)
+    colours = {name: rng.integers(0, 256, 50).astype(np.uint8) for name in ("red", "green", "blue", "alpha")}
+    back, _ = through(tmp_path, Cloud(rng.normal(size=(50, 3)), colours), suffix)
+    assert set(back.columns) == set(colours)
+    for name, column in colours.items():
+        assert back.columns[name].dtype == np.uint8
+        np.testing.assert_array_equal(back.columns[name], column)
+
+
+def test_other_readers_find_the_colours(tmp_path):
+    rgb = np.array([[255, 0, 7], [1, 128, 254]], np.uint8)
+    colours = dict(zip(("red", "green", "blue", "alpha"), [*rgb.T, np.full(2, 255, np.uint8)], strict=True))
+    for suffix in ("ply", "pcd", "las", "e57"):
+        write_clouds(tmp_path / f"c.{suffix}", [Cloud(np.eye(3)[:2], colours)])
+    np.testing.assert_array_equal(trimesh.load(tmp_path / "c.ply").colors[:, :3], rgb)
+    _, rows = parse_pcd((tmp_path / "c.pcd").read_bytes())
+    np.testing.assert_array_equal(rows["rgba"] & 0xFFFFFF, rgb.astype(np.uint32) @ [1 << 16, 1 << 8, 1])
+    las = laspy.read(tmp_path / "c.las")
+    np.testing.assert_array_equal(np.stack([las.red, las.green, las.blue], axis=1), rgb.astype(np.uint16) * 257)
+    scan = pye57.E57(str(tmp_path / "c.e57")).read_scan(0, colors=True, ignore_missing_fields=True)
+    np.testing.assert_array_equal(np.stack([scan[f"color{name}"] for name in ("Red", "Green", "Blue")], axis=1), rgb)
 
 
 def test_whole_intensities_need_no_second_column_in_las(tmp_path):

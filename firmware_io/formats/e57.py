@@ -17,11 +17,21 @@ from pye57 import libe57
 
 from design.errors import RecordingError
 from firmware_io.files import foreign, whole_file
-from firmware_io.formats.record import COLUMN_TYPES, Cloud, Column, headlines, pose_matrix, pose_numbers, told
+from firmware_io.formats.record import (
+    COLUMN_TYPES,
+    Cloud,
+    Column,
+    colour_bytes,
+    headlines,
+    pose_matrix,
+    pose_numbers,
+    told,
+)
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
-_OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp"}
+_COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
+_OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp", **_COLOURS}
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "columnIndex"}
@@ -63,6 +73,7 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
         for name, values in held.items()
         if name not in _STRUCTURE
     }
+    columns |= {name: colour_bytes(columns[name]) for name in _COLOURS if name in columns}
     columns = {name: values.astype(COLUMN_TYPES.get(name, values.dtype)) for name, values in columns.items()}
     T = np.eye(4)
     if header.has_pose():
@@ -140,6 +151,11 @@ def _write_scan(e57: pye57.E57, cloud: Cloud, name: str) -> None:
     if "intensity" in fields and np.isfinite(fields["intensity"]).any():
         low, high = float(np.nanmin(fields["intensity"])), float(np.nanmax(fields["intensity"]))
         _set(file, scan, "intensityLimits", {"intensityMinimum": low, "intensityMaximum": high})
+    if set(_COLOURS) <= set(cloud.columns):
+        limits = {
+            f"{name}{end}": value for name in _COLOURS.values() for end, value in (("Minimum", 0), ("Maximum", 255))
+        }
+        _set(file, scan, "colorLimits", limits)
     prototype = libe57.StructureNode(file)
     buffers = libe57.VectorSourceDestBuffer()
     held = []

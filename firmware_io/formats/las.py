@@ -14,13 +14,14 @@ import numpy as np
 from design import frames
 from design.errors import RecordingError
 from firmware_io.files import foreign, whole_file
-from firmware_io.formats.record import COLUMN_TYPES, Cloud, Column, headlines, told
+from firmware_io.formats.record import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
 
 _STEP_M = 1e-4
 _OURS = "scanwright"
 _EXACT = "intensity_exact"
 _OWN_FIELD = {"intensity": "intensity", "time_s": "gps_time"}
-_HELD = {"X", "Y", "Z", "intensity", "gps_time"}
+_COLOURS = ("red", "green", "blue")  # 16 bits; ours are bytes
+_HELD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
@@ -41,6 +42,8 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         columns["intensity"] = intensity.astype(COLUMN_TYPES["intensity"])
     if "gps_time" in las.point_format.dimension_names and np.any(las.gps_time):
         columns["time_s"] = np.array(las.gps_time, float)
+    for name in _COLOURS if "red" in las.point_format.dimension_names else ():
+        columns[name] = colour_bytes(np.array(las[name]))
     unread = [
         name
         for name in las.point_format.standard_dimension_names
@@ -59,13 +62,14 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     if not valid.any():
         raise RecordingError(f"{path}: no row of the cloud is a point, and LAS holds nothing else")
     world = frames.apply(cloud.T_world_cloud, cloud.points_m[valid].astype(float))
-    header = laspy.LasHeader(version="1.4", point_format=6)
+    header = laspy.LasHeader(version="1.4", point_format=7 if "red" in cloud.columns else 6)
     header.scales = np.full(3, _STEP_M)
     header.offsets = np.floor(world.min(axis=0))
     lines = [line for line in headlines(cloud) if not line.startswith(("width", "height"))]
     if lines:
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
     columns = {name: column[valid] for name, column in cloud.columns.items()}
+    columns |= {name: columns[name].astype(np.uint16) * 257 for name in _COLOURS if name in columns}
     said = ["LAS rounds coordinates to 0.1 mm"]
     if cloud.placed:
         said.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
@@ -80,7 +84,11 @@ def write(path: Path, cloud: Cloud) -> list[str]:
         shape = f"the shape {height} x {width} is lost, " if cloud.organised else ""
         said.append(f"LAS holds points only: {shape}{np.count_nonzero(~valid):,} rows without a point are left out")
     header.add_extra_dims(
-        [laspy.ExtraBytesParams(name, column.dtype) for name, column in columns.items() if name not in _OWN_FIELD]
+        [
+            laspy.ExtraBytesParams(name, column.dtype)
+            for name, column in columns.items()
+            if name not in _HELD | set(_OWN_FIELD)
+        ]
     )
     las = laspy.LasData(header)
     las.x, las.y, las.z = world.T

@@ -6,19 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware_io.cloud import PlyWriter, read_ply
+from firmware_io.cloud import PlyWriter, ply_comments, read_ply
 from firmware_io.formats.record import Cloud, cloud_of, headlines, rows_of
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file."""
-    rows = read_ply(path)
-    lines = []
-    with path.open("rb") as stream:
-        while (line := stream.readline().decode("ascii", "replace").strip()) != "end_header":
-            if line.startswith("comment "):
-                lines.append(line.removeprefix("comment "))
-    return [cloud_of(rows, lines)], []
+    return [cloud_of(read_ply(path), ply_comments(path))], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

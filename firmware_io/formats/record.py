@@ -16,7 +16,9 @@ from firmware_io.samples import Floats
 
 Column = NDArray[Any]
 
-COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u4"}
+COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u4"} | dict.fromkeys(
+    ("red", "green", "blue", "alpha"), "|u1"
+)
 """What the columns of our own clouds hold. Others keep the type of their file."""
 
 
@@ -113,3 +115,8 @@ def pose_matrix(numbers: Iterable[float]) -> Floats:
     """Inverse of `pose_numbers`; the quaternion may have any length but zero."""
     x, y, z, *quaternion = numbers
     return frames.rigid(Rotation.from_quat(quaternion).as_matrix(), [x, y, z])
+
+
+def colour_bytes(values: Column) -> Column:
+    """Colours as bytes, of whole numbers up to 255 or to 65535."""
+    return (values // 257 if values.max(initial=0) > 255 else values).astype(np.uint8)

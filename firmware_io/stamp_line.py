@@ -1,0 +1,117 @@
+"""When turns begin, finer than the ticks that their stamps are counted in.
+
+A stamp is the last whole tick before the beginning of a turn, and turns are nearly even: the beginnings lie on a
+straight line over the turn's number, and that line passes within the tick of every stamp. Of all such lines the one in
+their middle is taken, which runs half a tick above the minimax fit of the stamps. It is found over as many of the last
+seconds as some line explains: a motor that wanders leaves few of them, an even one a hundred, and then a beat of turns
+and ticks that takes a minute is seen through. Where not even the last seconds lie on a line (stamps that jitter by
+more than their tick), a line of least squares has to do.
+
+Time is in ticks (milliseconds) since any origin.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+Point = tuple[float, float]
+
+_BLOCK_MS = 1e3  # what is forgotten at once
+_BLOCKS = 100
+_FEWEST = 3  # blocks
+_SLACK_MS = 0.02  # by which a motor may be uneven from turn to turn
+
+
+class StampLine:
+    """The line through the stamps of one life of a sensor's clock, in constant memory.
+
+    Attributes:
+        first_turn: the oldest turn that the line holds for.
+        fits: how often the line has changed.
+    """
+
+    def __init__(self, period_ms: float) -> None:
+        """Nothing is known but the period, to one part in a hundred."""
+        self.first_turn = 0
+        self.fits = 0
+        self._turn = -1
+        self._stamp_ms = -period_ms
+        self._slope_ms = period_ms
+        self._start_ms = 0.5  # where the line passes turn 0
+        self._blocks: deque[list[Point]] = deque(maxlen=_BLOCKS)
+        self._block_ends_ms = -np.inf
+        self._new_blocks = 0
+
+    def add(self, stamp_ms: float) -> int:
+        """The number of the turn that has this stamp, which is later than the last one."""
+        self._turn += max(round((stamp_ms - self._stamp_ms) / self._slope_ms), 1)
+        self._stamp_ms = stamp_ms
+        missed_ms = self.time_ms(self._turn) - stamp_ms
+        if stamp_ms >= self._block_ends_ms:
+            if self._blocks:
+                self._blocks[-1] = _outermost(self._blocks[-1])
+            self._blocks.append([])
+            self._block_ends_ms = stamp_ms + _BLOCK_MS
+            self._new_blocks += 1
+        self._blocks[-1].append((float(self._turn), stamp_ms))
+        grown = self._new_blocks > len(self._blocks) // 10  # what lies within the tick is news to a short line only
+        if grown or not -_SLACK_MS < missed_ms < 1 + _SLACK_MS:
+            self._fit()
+        return self._turn
+
+    def time_ms(self, turn: int) -> float:
+        """When a turn begins, by the line."""
+        return self._start_ms + self._slope_ms * turn
+
+    def _fit(self) -> None:
+        self.fits += 1
+        self._new_blocks = 0
+        points = [point for block in self._blocks for point in block]
+        if len(points) < 3:
+            self._start_ms = self._stamp_ms + 0.5 - self._slope_ms * self._turn
+            return
+        while True:
+            slope_ms, low_ms, high_ms = _narrowest(points)
+            if high_ms - low_ms <= 1 + 2 * _SLACK_MS:
+                break
+            if len(self._blocks) <= _FEWEST:
+                turn, stamp_ms = np.array(points).T
+                slope_ms, low_ms = np.polyfit(turn, stamp_ms, 1)
+                high_ms = low_ms
+                break
+            for _ in range(max(len(self._blocks) // 8, 1)):
+                self._blocks.popleft()
+            points = [point for block in self._blocks for point in block]
+        self.first_turn = round(points[0][0])
+        self._slope_ms, self._start_ms = float(slope_ms), float(low_ms + high_ms) / 2 + 0.5
+
+
+def hull(points: Sequence[Point], side: int) -> list[Point]:
+    """Convex hull from below (side 1) or above (-1) of points that are sorted by their first number."""
+    found: list[Point] = []
+    for x, y in points:
+        while len(found) > 1:
+            (x0, y0), (x1, y1) = found[-2:]
+            if side * ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) > 0:
+                break
+            found.pop()
+        found.append((x, y))
+    return found
+
+
+def _outermost(points: list[Point]) -> list[Point]:
+    """Those that bound a line above or below."""
+    return sorted({*hull(points, 1), *hull(points, -1)})
+
+
+def _narrowest(points: list[Point]) -> tuple[float, float, float]:
+    """Slope of the strip of the least height that holds all points, and where its edges pass 0: an edge is a hull's."""
+    below, above = np.array(hull(points, 1)), np.array(hull(points, -1))
+    slopes = np.concatenate([np.diff(side[:, 1]) / np.diff(side[:, 0]) for side in (below, above)])
+    low = (below[:, 1] - slopes[:, None] * below[:, 0]).min(axis=1)
+    high = (above[:, 1] - slopes[:, None] * above[:, 0]).max(axis=1)
+    best = int(np.argmin(high - low))
+    return float(slopes[best]), float(low[best]), float(high[best])
