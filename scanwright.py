@@ -9,8 +9,8 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
@@ -20,10 +20,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
+
     from cad.findings import Finding
+    from design.angles import AngleSet
     from design.optimum import Optimum
     from design.shadowed import Chosen
     from design.task import LoadedTask
+    from firmware_io.live import Feed
+    from firmware_io.trajectory import Trajectory
 
 app = typer.Typer(
     help="One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar.",
@@ -116,14 +122,16 @@ def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Find
         from cad.exports import export_scanner
         from cad.shadow import PartsWorkshop
 
-        product = scanner_of(writer.angle_set(loaded, result.best[0]), loaded.task.printer, loaded.products)
-        chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, PartsWorkshop(product), _say)
+        first = writer.angle_set(loaded, result.best[0])
+        product = scanner_of(first, loaded.task.printer, loaded.products, loaded.task.deck)
+        workshop = PartsWorkshop(product)
+        chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, _say)
         best = chosen.family
         angles = writer.angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
-        offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products))
+        offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products, loaded.task.deck))
         angles = angles.model_copy(update={"t_world_rot_mm": offset})
-        scanner = scanner_of(angles, loaded.task.printer, loaded.products)
-        made = build_parts(scanner, work, _say)
+        scanner = scanner_of(angles, loaded.task.printer, loaded.products, loaded.task.deck)
+        made = build_parts(scanner, work, _say, workshop.assembly)
         exported = export_scanner(scanner, made, work, _say)
         check_parts(scanner, made, work, _say)
         _say("drawing density.png")
@@ -174,7 +182,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     from design.task import load_task
 
     loaded = load_task(out / "task.toml")
-    scanner = scanner_of(load_angles(out / "angles.json"), loaded.task.printer, loaded.products)
+    scanner = scanner_of(load_angles(out / "angles.json"), loaded.task.printer, loaded.products, loaded.task.deck)
     from cad.kernel import require_kernel
 
     require_kernel()
@@ -267,11 +275,14 @@ def evaluate(
 def accuracy(
     task: TaskFile,
     stress: Annotated[bool, typer.Option("--stress", help="The table of stiff and extreme cases instead.")] = False,
+    choices: Annotated[
+        bool, typer.Option("--choices", help="Meshes, integrator of the emulated servo and its angle instead.")
+    ] = False,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one folder of reports per task.")] = Path(
         "out/accuracy"
     ),
 ) -> None:
-    """Report error against run time of every way to compute J, at the optimum of a task."""
+    """Report error against run time of every way to compute J, at the optimum of a task; of other choices too."""
     from design import accuracy_report as report
     from design.accuracy import as_log, measure, on_front
     from design.optimum import optimum_of
@@ -279,8 +290,12 @@ def accuracy(
     from design.stress import stress_rows
     from design.task import load_task
 
-    loaded = as_log(load_task(task))
+    loaded = load_task(task)
     folder = out / loaded.task.name
+    if choices:
+        _choices(loaded, folder)
+        return
+    loaded = as_log(loaded)
     if stress:
         _say("stiff and extreme cases")
         rows = stress_rows(loaded, problem_of(loaded))
@@ -302,6 +317,36 @@ def accuracy(
         seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
         print(f"{'*' if front else ' '} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
     print(f"* nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}")
+
+
+def _choices(loaded: LoadedTask, folder: Path) -> None:
+    """Error against run time of every numerical choice that is not J."""
+    from cad.kernel import require_kernel
+    from design.build import angle_set
+    from design.choices import on_front, trials_picture, write_trials
+    from design.optimum import optimum_of
+    from design.scanner import scanner_of
+    from firmware_io.axis_trials import axis_trials
+    from firmware_io.twins.dynamics import plant_of
+    from firmware_io.twins.solver_trials import solver_trials
+
+    require_kernel()
+    from cad.assembly import make_parts
+    from cad.mesh_trials import mesh_trials
+
+    optimum = optimum_of(loaded, _say)
+    angles = angle_set(optimum.loaded, optimum.search.best[0])
+    solids = make_parts(scanner_of(angles, loaded.task.printer, loaded.products, loaded.task.deck)).made
+    trials = [*mesh_trials(solids, _say), *solver_trials(plant_of(loaded.task.servo), _say), *axis_trials(_say)]
+    folder.mkdir(parents=True, exist_ok=True)
+    write_trials(folder / "choices.csv", trials)
+    trials_picture(folder / "choices.png", trials)
+    for trial in trials:
+        mark = "=" if trial.chosen else "*" if on_front(trial, trials) else " "
+        method = f"{trial.method}, {trial.setting}"
+        price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
+        print(f"{mark} {trial.choice:26} {method:50} {price}")
+    print(f"= chosen, * nothing is both faster and nearer; wrote choices.csv and .png to {folder}")
 
 
 @app.command()
@@ -383,6 +428,9 @@ def assemble(
     columns: Annotated[
         str, typer.Option(help="What to write of each point beside x,y,z.")
     ] = "intensity,time_s,joint_rad,ring",
+    camera: Annotated[
+        Path | None, typer.Option(metavar="TASK", help="Colour the points from the images of a task's [camera].")
+    ] = None,
 ) -> None:
     """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
 
@@ -393,14 +441,16 @@ def assemble(
     from firmware_io.own_body import own_body_beside
     from firmware_io.pose_files import load_trajectory
 
+    angle_set, trajectory = load_angles(angles), None if poses is None else load_trajectory(poses, recording)
+    paint = None if camera is None else _painter(camera, recording, angle_set, trajectory, lag_s)
     summary = assemble_recording(
         recording,
-        load_angles(angles),
+        angle_set,
         out,
         flat=flat,
         lag_s=lag_s,
         per=per.value,
-        poses=None if poses is None else load_trajectory(poses, recording),
+        poses=trajectory,
         own_body=own_body_beside(angles),
         smooth=not straight,
         columns=[name.strip() for name in columns.split(",") if name.strip()],
@@ -411,7 +461,36 @@ def assemble(
         print(f"left out {count:,} beams: {reason.replace('_', ' ')}")
     form = f"organised, {summary.height:,} scans x {summary.width:,} beams" if summary.width else "flat"
     where = f"{summary.out}" if per is Per.recording else f"{len(summary.clouds)} clouds, {summary.clouds[0]} and on"
+    if paint is not None:
+        for cloud in summary.clouds:
+            print(paint(cloud))
     print(f"wrote {summary.points:,} points of {summary.beams:,} beams ({form}) to {where}")
+
+
+def _painter(
+    task: Path, recording: Path, angles: AngleSet, poses: Trajectory | None, lag_s: float
+) -> Callable[[Path], str]:
+    """Colours a cloud with the images of a task's camera, and says how much of it."""
+    from design.errors import TaskError
+    from design.task import load_task
+    from firmware_io.colour import colour_cloud, spacing_of, stands_m
+    from firmware_io.recording import open_recording
+    from firmware_io.views import views_of
+
+    loaded, source = load_task(task), open_recording(recording)
+    taken = loaded.task.camera
+    if taken is None:
+        raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
+    views = views_of(taken, loaded.source.parent, angles, source, poses, lag_s)
+
+    def paint(cloud: Path) -> str:
+        done = colour_cloud(cloud, taken, views, spacing_of(source), stands_m(source, angles, poses))
+        return (
+            f"coloured {done.coloured:,} points of {cloud.name} from {done.images} images; without colour "
+            f"{done.hidden:,} behind others, {done.outside:,} in no image"
+        )
+
+    return paint
 
 
 @app.command()
@@ -463,10 +542,14 @@ def scan(
         StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
     ] = StampAt.step_0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and stop.")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
+    ] = False,
 ) -> None:
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     from firmware_io.acquire import acquire
     from firmware_io.assemble import assemble_recording
+    from firmware_io.live import NOBODY
     from firmware_io.own_body import own_body_beside
     from firmware_io.plan import plan_scan
 
@@ -483,9 +566,10 @@ def scan(
         print(line)
     if dry_run:
         return
+    page, watch = _live_page(out) if live else (None, NOBODY)
     try:
-        with _on_duty():
-            summary = acquire(plan, _say_in_place)
+        with _on_duty(), closing(watch):
+            summary = acquire(plan, _say_in_place, watch)
     except KeyboardInterrupt:
         kept = f"; what was recorded is in {plan.recording}" if plan.recording.exists() else ""
         print(f"scanwright: stopped, both devices stand still{kept}", file=sys.stderr)
@@ -509,6 +593,35 @@ def scan(
     for sentence in cloud.said:
         print(sentence)
     print(f"wrote {cloud.points:,} points of {cloud.beams:,} beams to {', '.join(map(str, cloud.clouds))}")
+    if page is not None:
+        with suppress(KeyboardInterrupt):
+            page.join()
+
+
+def _live_page(out: Path) -> tuple[BaseProcess, Feed]:
+    """A page that shows the scan of a build folder, in a process of its own, and the way to feed it."""
+    from multiprocessing import get_context
+
+    from firmware_io.live import Feed
+
+    spawn = get_context("spawn")
+    receiving, sending = spawn.Pipe(duplex=False)
+    page = spawn.Process(target=_show_live, args=(receiving, out), daemon=True)
+    page.start()
+    receiving.close()
+    return page, Feed(sending)
+
+
+def _show_live(receiving: Connection, out: Path) -> None:
+    """What the page's process does."""
+    from design.angles import load_angles
+    from design.studio.session import run_live
+    from firmware_io.live import Placing, growing
+    from firmware_io.own_body import own_body_beside
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
+    placing = Placing(load_angles(out / "angles.json"), own_body_beside(out / "angles.json"))
+    run_live(growing(receiving, placing), f"scan of {out.name}")
 
 
 @app.command()
@@ -685,6 +798,26 @@ def _build_winner(loaded: LoadedTask, target: Path) -> None:
         return
     _build(loaded, target)
     print(f"built {target}")
+
+
+@app.command()
+def studio(
+    task: Annotated[Path, typer.Argument(metavar="[TASK]", help="Task file, or the name of a shipped task.")] = Path(
+        "ground_ahead"
+    ),
+    port: Annotated[int, typer.Option(help="Port on this computer; 0 is any that is free.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
+        "out"
+    ),
+) -> None:
+    """Drag the angles and paint what matters in a page of your browser, and see what it comes to."""
+    from cad.bodies import bodies_of
+    from design.studio.session import run_studio
+    from design.studio.workbench import Workbench
+    from design.task import load_task
+    from firmware_io.twins.glimpse import glimpse
+
+    run_studio(load_task(task), Workbench(bodies_of, glimpse), port=port, out=out, say=_say)
 
 
 @app.command()

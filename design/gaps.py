@@ -94,17 +94,20 @@ def empty_cap(scan: Array) -> BlindCone:
     return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
 
 
-def shortest_period_s(problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int) -> float:
+def shortest_period_s(
+    problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int, nodes: int = NODES
+) -> float:
     """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
 
-    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats.
+    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats. The region is looked at
+    on `nodes` circles about the axis: with fewer a thin spot between two of them may go unseen.
 
     Raises:
         TaskError: the region holds directions that no period brings that many beams to.
     """
     if least < 1:
         raise TaskError(f"density {least}: ask for at least 1 beam per ball")
-    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, NODES)
+    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, nodes)
     polar_rad = rule.polar_rad[rule.fine > 0]
 
     def enough(count: int) -> bool:

@@ -1,0 +1,224 @@
+"""How fast the studio answers, and whether the live view keeps up.
+
+    uv run python -m benchmarks.studio                      # both
+    uv run python -m benchmarks.studio ground_ahead 300     # a task, moves
+
+Moves: a client of the page's own websocket moves a slider, waits for the facts and the colours of the sphere that
+answer it, and moves on a thirtieth of a second later, as a hand does. Times are from the message that leaves to the
+last one that arrives, unpacked: what a browser adds is its drawing.
+
+Live: scans of 1,081 beams at 40 Hz, and as fast as they can be handed over, go through the feed, the pipe and the frame
+chain into a page with a visitor; what counts is how long the scan's thread is held up, how far behind the view is at
+the end, and what it left out.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import msgspec
+import numpy as np
+import viser
+import zstandard
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from design.angles import Angles, AngleSet
+from design.studio.facts import judge_of
+from design.studio.gate import Gate, guarded_server
+from design.studio.live import LiveView
+from design.studio.page import Studio
+from design.studio.state import setting_of
+from design.studio.workbench import Body, View, Workbench
+from design.task import load_task
+from firmware_io.live import EVERY_S, Feed, Placing, growing
+from firmware_io.samples import Scan
+
+HAND_HZ = 30.0
+BEAMS, SCAN_HZ = 1081, 40.0
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (1.0, 1.0, 1.0),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 900,
+    "image_width": 1400,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+
+
+def main() -> None:
+    """Print both."""
+    task = Path(sys.argv[1] if len(sys.argv) > 1 else "ground_ahead")
+    moves(task, int(sys.argv[2]) if len(sys.argv) > 2 else 300)
+    live(10.0, SCAN_HZ)
+    live(10.0, 8 * SCAN_HZ)
+
+
+def moves(task: Path, count: int) -> None:
+    """From slider to picture, for a hand that moves and never rests."""
+    loaded = load_task(task)
+    with guarded_server() as (server, gate):
+        studio = Studio(server, loaded, Workbench(_nothing, _nowhere), Path.cwd(), Path.cwd() / "out")
+        judge = judge_of(loaded, studio.judge.problem)
+        compute = []
+        with visitor(gate) as socket:
+            studio.move(setting_of((10, -50, -70, 60)))  # where every angle matters: what stays the same is not sent
+            studio.judging.settled(60)
+            told: SimpleQueue[tuple[float, str]] = SimpleQueue()
+            facts = studio.controls.facts._impl.uuid
+            threading.Thread(target=_listen, args=(socket, facts, told), daemon=True).start()
+            rng, answered = np.random.default_rng(0), []
+            angles = np.array(studio.setting.angles_deg)
+            time.sleep(1.0)
+            for k in range(count):
+                slider, bound = studio.controls.angles[k % 4], 180.0 if k % 4 == 0 else 90.0
+                step = rng.choice([-1, 1]) * rng.uniform(1, 8)
+                angles[k % 4] += step if abs(angles[k % 4] + step) <= bound else -step
+                message = {
+                    "type": "GuiUpdateMessage",
+                    "uuid": slider._impl.uuid,
+                    "updates": {"value": float(angles[k % 4])},
+                }
+                while not told.empty():
+                    told.get()
+                sent = time.perf_counter()
+                socket.send(msgspec.msgpack.encode(message))
+                missing, when = {"facts", "sphere"}, sent
+                while missing:
+                    when, what = told.get(timeout=10)
+                    missing.discard(what)
+                answered.append(when - sent)
+                time.sleep(1 / HAND_HZ)
+            for _ in range(20):
+                began = time.perf_counter()
+                judge.quick(studio.setting)
+                compute.append(time.perf_counter() - began)
+        studio.close()
+    ms = 1e3 * np.array(answered)
+    print(
+        f"{task}: {len(ms)} moves, from slider to facts and colours: median {np.median(ms):.0f} ms, "
+        f"95th percentile {np.percentile(ms, 95):.0f} ms, worst {ms.max():.0f} ms; "
+        f"of these J, gaps and period {1e3 * np.median(compute):.0f} ms"
+    )
+
+
+def _listen(socket: ClientConnection, facts: str, told: SimpleQueue[tuple[float, str]]) -> None:
+    """Note when facts and colours arrive."""
+    for data in _until_closed(socket):
+        assert isinstance(data, bytes)
+        now = time.perf_counter()
+        size = int.from_bytes(data[8:16], "little")
+        inner = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data[16 : 16 + size]))
+        for message in inner["messages"]:
+            if message.get("uuid") == facts and "content" in message.get("updates", {}):
+                told.put((now, "facts"))
+            if message.get("name") == "/sphere" and "batched_colors" in message.get("updates", {}):
+                told.put((now, "sphere"))
+
+
+def _until_closed(socket: ClientConnection) -> Iterator[str | bytes]:
+    with suppress(ConnectionClosed):
+        yield from socket
+
+
+def live(seconds: float, rate_hz: float) -> None:
+    """The growing cloud under a stream of scans."""
+    angles = AngleSet(
+        task="bench",
+        angles_deg=Angles(alpha_rot=0, beta_rot=-55, alpha_laser=-80, beta_laser=75),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        motion={"mode": "spin", "period_s": 2.0},
+    )
+    receiving, sending = multiprocessing.Pipe(duplex=False)
+    finished: list[float] = []
+    with guarded_server() as (server, gate):
+        view = LiveView(server, "bench")
+
+        def watch() -> None:
+            for more in growing(receiving, Placing(angles, None)):
+                view.lost = more.lost
+                view.add(more.points_m, more.intensity, more.time_s)
+                finished.append(time.perf_counter())
+
+        with visitor(gate) as socket:
+            threading.Thread(target=lambda: list(map(len, _until_closed(socket))), daemon=True).start()
+            viewer = threading.Thread(target=watch)
+            viewer.start()
+            feed = Feed(sending)
+            held, scans = [], list(_scans(int(seconds * rate_hz), rate_hz))
+            began = time.perf_counter()
+            for k, scan in enumerate(scans):
+                time.sleep(max(0.0, began + k / rate_hz - time.perf_counter()))
+                start = time.perf_counter()
+                for j in range(3):
+                    stamp = scan.stamp_ns + round((j - 0.5) * 1e9 / rate_hz)
+                    feed.joint(stamp, np.pi * stamp / 1e9)
+                feed.scan(scan)
+                held.append(time.perf_counter() - start)
+            ended = time.perf_counter()
+            feed.close()
+            viewer.join()
+        behind = finished[-1] - ended
+    held_us = 1e6 * np.array(held)
+    print(
+        f"live, {rate_hz:g} scans/s of {BEAMS:,} beams for {seconds:g} s: {view.points:,} points shown, "
+        f"{feed.lost} scans left out; the scan's thread is held up {np.median(held_us):.0f} us a scan "
+        f"(99th percentile {np.percentile(held_us, 99):.0f}); the last points stand {behind:.2f} s after the last scan "
+        f"(they are sent every {EVERY_S:g} s)"
+    )
+
+
+def _scans(count: int, rate_hz: float) -> Iterator[Scan]:
+    rng = np.random.default_rng(0)
+    for k in range(count):
+        yield Scan(
+            stamp_ns=1_000_000_000 + round(1e9 * k / rate_hz),
+            angle_min_rad=-2.356,
+            angle_increment_rad=4.712 / (BEAMS - 1),
+            time_increment_s=0.7 / rate_hz / BEAMS,
+            scan_time_s=1 / rate_hz,
+            range_min_m=0.1,
+            range_max_m=30.0,
+            range_m=rng.uniform(0.5, 8.0, BEAMS).astype(np.float32),
+            intensity=np.empty(0, np.float32),
+        )
+
+
+@contextmanager
+def visitor(gate: Gate) -> Iterator[Any]:
+    """A client as the page is one."""
+    with connect(
+        f"ws://127.0.0.1:{gate.port}/",
+        origin=f"http://127.0.0.1:{gate.port}",  # type: ignore[arg-type]
+        subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
+        additional_headers={"Cookie": f"scanwright-{gate.port}={gate.token}"},
+        compression=None,
+        max_size=None,
+    ) as socket:
+        socket.send(msgspec.msgpack.encode(CAMERA))
+        yield socket
+
+
+def _nothing(_scanner: Any, _turning: bool) -> tuple[Body, ...]:
+    return ()
+
+
+def _nowhere(_view: View) -> Any:
+    return np.empty((0, 3), np.float32)
+
+
+if __name__ == "__main__":
+    main()

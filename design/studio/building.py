@@ -1,0 +1,50 @@
+"""`scanwright build` as a process of its own, and what it says as progress."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from threading import Thread
+
+STEPS = 50  # lines that a build of ground_ahead says; others say a few more or less
+
+
+def build_command(task_file: Path, out: Path) -> list[str]:
+    """What a person would type, with this very interpreter; -P: no module of the folder it runs in."""
+    return [sys.executable, "-P", "-m", "scanwright", "build", str(task_file), "--out", str(out)]
+
+
+class Building:
+    """One build that runs; `told` gets the share done and the last line, `done` the exit code and the last line."""
+
+    def __init__(
+        self, command: list[str], told: Callable[[float, str], None], done: Callable[[int, str], None]
+    ) -> None:
+        self._told, self._done = told, done
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self._thread = Thread(target=self._follow, name="build", daemon=True)
+        self._thread.start()
+
+    @property
+    def runs(self) -> bool:
+        """Whether it is still at work."""
+        return self._process.poll() is None
+
+    def stop(self) -> None:
+        """End it; what it made so far is thrown away by the build itself, which writes its folder last."""
+        if self.runs:
+            self._process.terminate()
+        self._thread.join()
+
+    def _follow(self) -> None:
+        assert self._process.stdout is not None
+        last = ""
+        for number, line in enumerate(self._process.stdout):
+            last = line.strip().removeprefix(".. ") or last
+            self._told(min(number / STEPS, 0.98), last)
+        self._process.stdout.close()
+        self._done(self._process.wait(), last)

@@ -1,0 +1,244 @@
+"""Who may talk to a live page: the one who has its address, from this computer, in small and known messages.
+
+viser serves its page and its websocket from one asyncio server of the `websockets` library and knows no visitors. So
+that server is opened through here: on a socket that is bound to 127.0.0.1 before viser sees it, with a check of every
+request before it is answered and of every message before viser reads it. One server and one port: no relay whose
+hidden port a page in the browser could find. Refused are
+
+- a request without the token, which the address carries once and a cookie (HttpOnly, SameSite=Strict) afterwards;
+- another Host than this computer's: a name that was bent to 127.0.0.1 (DNS rebinding);
+- another Origin than this page's, or one that the browser itself calls cross-site;
+- every path but `/` and every query but the token: there is one file and no other;
+- more than `MOST_VISITORS` at once; messages over `MOST_BYTES` (the library closes the connection);
+- messages that the page does not need: uploads, viser's sharing over the internet, and all that is malformed.
+
+The page may load nothing from anywhere else: its Content-Security-Policy says so.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import secrets
+import socket
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+import msgspec
+import rich
+import viser
+import viser._messages as wire
+import websockets.asyncio.server as library
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from design.errors import TaskError
+
+MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
+MOST_VISITORS = 8
+MOST_TEXT = 200
+KNOWN = {
+    kind.__name__: kind
+    for kind in (
+        wire.ViewerCameraMessage,
+        wire.GuiUpdateMessage,
+        wire.SceneNodeClickMessage,
+        wire.SceneNodeDragMessage,
+        wire.ScenePointerMessage,
+    )
+}
+"""What a page may say; everything else is dropped and counted."""
+
+Answer = Callable[[ServerConnection, Request], Response | None]
+
+
+class Gate:
+    """One page's door.
+
+    Attributes:
+        token: of its address.
+        port: on 127.0.0.1.
+        refused: what was turned away, reason -> how often.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.token = secrets.token_urlsafe(24)
+        self.refused: Counter[str] = Counter()
+        self.visitors = 0
+        self.opened = False
+        self.socket = _bound(port)
+        self.port: int = self.socket.getsockname()[1]
+        self._cookie = f"scanwright-{self.port}"
+        self._hosts = {f"127.0.0.1:{self.port}", f"localhost:{self.port}"}
+
+    @property
+    def address(self) -> str:
+        """What a person opens."""
+        return f"http://127.0.0.1:{self.port}/?token={self.token}"
+
+    def objection(self, request: Request) -> str:
+        """Why a request is refused; empty if it is not."""
+        headers, parts = request.headers, urlsplit(request.path)
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        talks = "websocket" in headers.get("Upgrade", "").lower() if len(headers.get_all("Upgrade")) < 2 else True
+        query = parse_qsl(parts.query, keep_blank_values=True)
+        given = [value for key, value in query if key == "token"]
+        kept = [value for key, value in _cookies(headers) if key == self._cookie]
+        if len(hosts) != 1 or hosts[0] not in self._hosts:
+            return "foreign host"
+        if any(origin not in {f"http://{host}" for host in self._hosts} for origin in origins):
+            return "foreign origin"
+        if talks and len(origins) != 1:
+            return "websocket without an origin"
+        if any(site not in ("none", "same-origin") for site in headers.get_all("Sec-Fetch-Site")):
+            return "cross-site"
+        if not any(secrets.compare_digest(value.encode(), self.token.encode()) for value in given + kept):
+            return "no token"
+        if request.path.startswith("//") or parts.path != "/" or [key for key, _ in query] not in ([], ["token"]):
+            return "no such page"
+        if talks and self.visitors >= MOST_VISITORS:
+            return "too many visitors"
+        return ""
+
+    def answering(self, answer: Answer) -> Answer:
+        """`process_request` of the library: viser's own, behind the check."""
+
+        def checked(connection: ServerConnection, request: Request) -> Response | None:
+            if why := self.objection(request):
+                self.refused[why] += 1
+                missing = why == "no such page"
+                status = HTTPStatus.NOT_FOUND if missing else HTTPStatus.FORBIDDEN
+                text = f"refused: {why}; open the address that scanwright printed\n".encode()
+                headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
+                return Response(status.value, status.phrase, headers, text)
+            response = answer(connection, request)
+            if response is not None:
+                for name, value in self._headers().items():
+                    response.headers[name] = value
+            return response
+
+        return checked
+
+    def admits(self, data: str | bytes) -> bool:
+        """Whether a message is one that the page sends, whole and of the right types."""
+        try:
+            told: Any = msgspec.msgpack.decode(data) if isinstance(data, bytes) else None
+            kind = KNOWN[told.pop("type")]
+            fits = set(told) <= {field.name for field in dataclasses.fields(kind)} and _tame(told)
+            msgspec.convert(told, type=kind)
+        except (msgspec.MsgspecError, KeyError, TypeError, AttributeError, RecursionError, ValueError):
+            return False
+        # viser writes whatever attribute of a control a message names: only its value is the page's to change
+        return fits and (kind is not wire.GuiUpdateMessage or set(told["updates"]) == {"value"})
+
+    def _headers(self) -> dict[str, str]:
+        own = " ".join(f"ws://{host}" for host in sorted(self._hosts))
+        policy = (
+            "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "
+            f"img-src data: blob:; font-src data:; worker-src blob:; connect-src 'self' data: blob: {own}; "
+            "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        )
+        return {
+            "Set-Cookie": f"{self._cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict",
+            "Content-Security-Policy": policy,
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+            "Cache-Control": "no-store",
+        }
+
+
+@contextmanager
+def guarded_server(port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
+    """A viser server that listens behind a gate while the body runs; `port` 0 is any that is free.
+
+    Raises:
+        TaskError: the port is taken.
+    """
+    gate = Gate(port)
+    rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
+    opening = library.serve
+    library.serve = _opening(gate, opening)  # type: ignore[assignment, misc]
+    try:
+        server = viser.ViserServer(host="127.0.0.1", port=gate.port, verbose=False)
+    finally:
+        library.serve = opening  # type: ignore[misc]
+    if not gate.opened:  # viser serves in another way than it did: never without the gate
+        server.stop()
+        raise RuntimeError("viser did not open its server through websockets.asyncio.server.serve")
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+    try:
+        yield server, gate
+    finally:
+        server.stop()
+        gate.socket.close()
+
+
+def _opening(gate: Gate, opening: Callable[..., Any]) -> Callable[..., Any]:
+    """`websockets.asyncio.server.serve` as viser is to find it."""
+
+    class Guarded(ServerConnection):
+        async def recv(self, decode: bool | None = None) -> Any:
+            while True:
+                data = await super().recv(decode)
+                if gate.admits(data):
+                    return data
+                gate.refused["unknown message"] += 1
+
+    def serve(
+        handler: Callable[[ServerConnection], Awaitable[None]],
+        _host: str,
+        _port: int,
+        *,
+        process_request: Answer,
+        **options: Any,
+    ) -> Any:
+        async def counted(connection: ServerConnection) -> None:
+            gate.visitors += 1
+            try:
+                await handler(connection)
+            finally:
+                gate.visitors -= 1
+
+        gate.opened = True
+        return opening(
+            counted,
+            sock=gate.socket,
+            process_request=gate.answering(process_request),
+            create_connection=Guarded,
+            **(options | {"max_size": MOST_BYTES}),
+        )
+
+    return serve
+
+
+def _bound(port: int) -> socket.socket:
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind(("127.0.0.1", port))
+    except (OSError, OverflowError) as error:
+        listening.close()
+        why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "no such port"
+        raise TaskError(f"--port {port}: {why}; leave it out for any that is free") from error
+    return listening
+
+
+def _cookies(headers: Headers) -> list[tuple[str, str]]:
+    pairs = (part.strip().partition("=") for line in headers.get_all("Cookie") for part in line.split(";"))
+    return [(key, value) for key, _, value in pairs]
+
+
+def _tame(value: Any) -> bool:
+    """Whether all that a message holds are finite numbers and short texts."""
+    if isinstance(value, dict):
+        return all(_tame(key) and _tame(inner) for key, inner in value.items())
+    if isinstance(value, list):
+        return len(value) <= MOST_TEXT and all(_tame(inner) for inner in value)
+    if isinstance(value, str):
+        return len(value) <= MOST_TEXT
+    return value is None or (isinstance(value, bool | int | float) and math.isfinite(value) and abs(value) < 1e12)
