@@ -1,0 +1,79 @@
+"""A study of two candidates from its command to its table, with their solids."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+TASK = """
+name = "ahead"
+sensor = "URG-04LX"
+servo = "AX-12A"
+[motion]
+mode = "sweep"
+limits_deg = [-90, 90]
+period_s = 12.0
+accel_deg_s2 = 200.0
+[angles]
+alpha_rot_deg = 0
+beta_rot_deg = 0
+alpha_laser_deg = 0
+beta_laser_deg = -60
+[density]
+ball_radius_deg = 3.0
+tolerance = 0.01
+[[weight]]
+shape = "band"
+theta_deg = [45, 135]
+"""
+STUDY = 'name = "two"\ntasks = ["ahead.toml"]\nservos = ["AX-12A", "MX-64R"]\nfront = ["mass_g", "J"]\nwinners = 0\n'
+
+
+def test_two_candidates_from_the_command_to_the_table(tmp_path, command):
+    (tmp_path / "ahead.toml").write_text(TASK)
+    (tmp_path / "two.toml").write_text(STUDY)
+    words = ("study", tmp_path / "two.toml", "--out", tmp_path / "out", "--processes", 1)
+    code, printed, complaint = command(*words)
+    assert (code, complaint) == (0, [])
+    assert "2 candidates: 1 front" in printed
+    assert "this run: 1 searches, 2 candidates made" in printed  # both servos look the same way
+    first = (tmp_path / "out" / "study.csv").read_bytes()
+    code, printed, _ = command(*words)
+    assert code == 0
+    assert "this run: 0 searches, 0 candidates made" in printed
+    assert (tmp_path / "out" / "study.csv").read_bytes() == first
+    assert (tmp_path / "out" / "front.png").stat().st_size > 10_000
+    light, heavy = csv.DictReader(first.decode().splitlines())
+    assert (light["name"], light["status"], heavy["status"]) == ("ahead-AX-12A", "front", "built")
+    assert heavy["reason"].startswith("ahead-AX-12A is as good or better")
+    agrees_with_the_parts(light, tmp_path / "ahead.toml")
+
+
+def agrees_with_the_parts(row, task):
+    """The numbers of a row by other ways: weighed solid by solid, J of the beams that get past the parts."""
+    import numpy as np
+
+    from cad.assembly import make_parts
+    from cad.shadow import PartsWorkshop
+    from design.angles import Angles, AngleSet
+    from design.objective import score
+    from design.problem import problem_of
+    from design.scanner import scanner_of
+    from design.task import load_task
+
+    loaded = load_task(Path(task))
+    angles = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=-60)
+    motion = loaded.task.motion
+    record = AngleSet(task="ahead", angles_deg=angles, sensor="URG-04LX", servo="AX-12A", slip_ring=None, motion=motion)
+    scanner = scanner_of(record, loaded.task.printer, loaded.products)
+    assembly = make_parts(scanner)
+    density = {"servo_shaft": 2.7} if assembly.stack.shaft_diameter < 20 else {}  # too thin to print: aluminium
+    made = sum(s.Volume() / 1000 * density.get(n, scanner.printer.density_g_cm3) for n, s in assembly.made.items())
+    assert float(row["mass_g"]) == pytest.approx(made + loaded.lidar.mass_g + loaded.servo.mass_g, rel=1e-4)
+    assert float(row["cost_usd"]) == loaded.lidar.price_usd + loaded.servo.price_usd
+    setting = np.radians([0.0, 0.0, 0.0, -60.0])
+    shadow = PartsWorkshop(scanner).shadow(setting)
+    assert float(row["hidden_fraction"]) == pytest.approx(shadow.hidden().mean(), rel=1e-5)
+    problem = problem_of(loaded)
+    bare = score(problem, setting).J
+    assert bare - 1e-3 <= float(row["J"]) <= bare + 0.2
