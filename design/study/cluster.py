@@ -40,7 +40,8 @@ def cluster(scheduler: str | None, processes: int | None = None, memory: str = "
         from distributed import Client
     except ImportError as error:
         raise TaskError(f"study: {error}: studies need an extra: pip install 'scanwright[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # deaths of workers are told in the table
+    for name in ("distributed", "distributed.client"):  # deaths are told in the table, or in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is None:
         with _local(processes, memory) as address, Client(address, set_as_default=False) as client:
             _compare(client)
@@ -78,6 +79,8 @@ def _local(processes: int | None, memory: str) -> Iterator[str]:
             silence_logs=50,
         ) as local,
     ):
+        number = len(local.workers)
+        local.adapt(minimum=number, maximum=number)  # a nanny whose worker dies while it starts is lost: take another
         yield local.scheduler_address
 
 

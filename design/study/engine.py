@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 RETRIES = 1  # of an exception: our own errors are results, what is left may be the machine's
 AHEAD = 3  # units sent for each thread: none waits for the client
 POLL_S = 0.02
+ALONE_S = 120.0  # without any worker: a nanny whose worker dies while it starts gives up
 TICK_S = 5.0  # between two words on a long silence
 
 
@@ -93,7 +94,7 @@ def _run(
     at_work: dict[str, Unit] = {}
     twins: Counter[str] = Counter()  # of units at work: the same record came again
     ended = as_completed(loop=client.loop)
-    last = time.monotonic()
+    last = seen = time.monotonic()
     threads = _threads(client)
     more = True
     while more or at_work:
@@ -133,6 +134,11 @@ def _run(
         if time.monotonic() - last > TICK_S:
             last, threads = time.monotonic(), _threads(client)
             ticked(threads)
+            seen = last if threads else seen
+            if last - seen > ALONE_S:
+                raise BuildError(
+                    f"no worker has been there for {ALONE_S:g} s: start workers, and run the study again: it goes on"
+                )
 
 
 def _key(unit: Unit) -> str:
