@@ -162,7 +162,7 @@ def test_the_number_of_threads_changes_no_digit(cores, monkeypatch):
 
 @pytest.mark.parametrize("name", shipped_tasks())
 def test_no_random_setting_beats_the_search_of_a_shipped_task(name):
-    """With 2500 draws, 500 where each sums over a sweep: all roughly, the best 20 with all nodes."""
+    """With 1200 draws, 300 where each sums over a sweep: all roughly, the best 20 with all nodes."""
     loaded = load_task(Path(name))
     problem, ranges = problem_of(loaded), loaded.task.angles
     found = search(problem, ranges)
@@ -170,7 +170,7 @@ def test_no_random_setting_beats_the_search_of_a_shipped_task(name):
         assert found.covered == 3_697_669 == 73 * 37 * 37 * 37
     best = found.best[0].score
     low, high = np.array([ranges.limits(angle) for angle in NAMES]).T
-    drawn = np.radians(np.random.default_rng(11).uniform(low, high, (2500 if problem.sweep is None else 500, 4)))
+    drawn = np.radians(np.random.default_rng(11).uniform(low, high, (1200 if problem.sweep is None else 300, 4)))
     drawn = np.unique(drawn, axis=0)
     rough = [quick_J(problem, setting, 243) for setting in drawn]
     for i in np.argsort(rough)[:20]:
