@@ -26,9 +26,10 @@ from design.motion import Motion, Spin, StopAndGo
 from firmware_io import ros
 from firmware_io.axis import Axis, turning_servo
 from firmware_io.hokuyo import StampAt
-from firmware_io.lidar import Lidar, RawScan, clock_of, open_lidar, scan_of
+from firmware_io.lidar import Lidar, clock_of, open_lidar
 from firmware_io.live import NOBODY, Watch
 from firmware_io.plan import Plan
+from firmware_io.raw_scan import RawScan, scan_of
 from firmware_io.recorder import Recorder
 from firmware_io.samples import Scan
 from firmware_io.servo import ServoState, open_servo

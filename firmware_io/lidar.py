@@ -10,125 +10,23 @@ with open_lidar("/dev/ttyACM0") as lidar:
 
 from __future__ import annotations
 
-import select
-import socket
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from types import TracebackType
-from typing import Protocol
-
-import serial
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io import hokuyo, scip
 from firmware_io.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
-from firmware_io.hokuyo import Parameters, StampAt
+from firmware_io.hokuyo import StampAt
 from firmware_io.ports import lidar_ports
-from firmware_io.samples import Float32s, Scan
+from firmware_io.raw_scan import RawScan
+from firmware_io.streams import FIRST_BAUD, Gone, SerialStream, open_stream
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
 _TRIES = 3  # a first request may be glued to what a client before us left half said
-_BAUDS = (115_200, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
+_BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
 _EXCHANGES = 60
-
-
-class Stream(Protocol):
-    """Bytes to and from a sensor; OSError when it is gone."""
-
-    def read(self, timeout_s: float) -> bytes:
-        """What has come, at least one byte; empty after the time."""
-        ...
-
-    def write(self, data: bytes) -> None:
-        """Send all of it."""
-        ...
-
-    def close(self) -> None:
-        """Let go of the port."""
-        ...
-
-
-class SerialStream:
-    """A serial port, USB or not."""
-
-    def __init__(self, port: str) -> None:
-        self._port = serial.Serial(port, _BAUDS[0], exclusive=True, write_timeout=1.0)
-        self._port.reset_input_buffer()
-
-    @property
-    def baud(self) -> int:
-        """Bits per second; USB and pseudo-terminals ignore it."""
-        return self._port.baudrate
-
-    @baud.setter
-    def baud(self, baud: int) -> None:
-        self._port.baudrate = baud
-        self._port.reset_input_buffer()
-
-    def read(self, timeout_s: float) -> bytes:
-        """What has come."""
-        self._port.timeout = max(timeout_s, 0.0)
-        first = self._port.read(1)
-        return first + self._port.read(self._port.in_waiting) if first else b""
-
-    def write(self, data: bytes) -> None:
-        """Send all of it."""
-        self._port.write(data)
-
-    def close(self) -> None:
-        """Let go of the port."""
-        self._port.close()
-
-
-class SocketStream:
-    """A TCP connection."""
-
-    def __init__(self, host: str, port: int) -> None:
-        self._socket = socket.create_connection((host, port), timeout=2.0)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def read(self, timeout_s: float) -> bytes:
-        """What has come."""
-        if not select.select([self._socket], [], [], max(timeout_s, 0.0))[0]:
-            return b""
-        received = self._socket.recv(1 << 16)
-        if not received:
-            raise ConnectionError("the sensor closed the connection")
-        return received
-
-    def write(self, data: bytes) -> None:
-        """Send all of it."""
-        self._socket.sendall(data)
-
-    def close(self) -> None:
-        """Let go of the connection."""
-        self._socket.close()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RawScan:
-    """One scan as it came.
-
-    Attributes:
-        stamp_ms: sensor time, unwrapped.
-        restarts: how often the sensor's clock began anew since the lidar was opened: stamps compare within one only.
-        arrival_ns: time.monotonic_ns() when the last byte came.
-        first_step: step of the first value.
-        cluster: steps per value.
-        range_m: shape (n,), NaN where nothing was measured.
-        intensity: shape (n,), or (0,) where none was asked for.
-        codes: error code -> how many values had it.
-    """
-
-    stamp_ms: int
-    restarts: int
-    arrival_ns: int
-    first_step: int
-    cluster: int
-    range_m: Float32s
-    intensity: Float32s
-    codes: Mapping[int, int]
 
 
 class Lidar:
@@ -286,7 +184,7 @@ class Lidar:
         """Open the port, whatever the sensor is doing, and put the laser out."""
         self._bad_before = self.bad_packets
         self._splitter = scip.Splitter()
-        self._stream = _open(address)
+        self._stream = open_stream(address)
         try:
             self._quiet(address)
             self._splitter.bad = 0  # what was on its way when we came is nobody's fault
@@ -306,9 +204,9 @@ class Lidar:
                 except DeviceTimeoutError:
                     continue
                 if told.status == "00":
-                    if baud not in (0, _BAUDS[0]) and isinstance(self._stream, SerialStream):
-                        self._accepted(self._ask(b"SS%06d" % _BAUDS[0]), "00", "03", "04")
-                        self._stream.baud = _BAUDS[0]
+                    if baud not in (0, FIRST_BAUD) and isinstance(self._stream, SerialStream):
+                        self._accepted(self._ask(b"SS%06d" % FIRST_BAUD), "00", "03", "04")
+                        self._stream.baud = FIRST_BAUD
                     return
                 # SCIP 1.1 knows no QT; a sensor that is adjusting its time knows nothing but TM.
                 self._ask(scip.SCIP_2 if len(told.status) == 1 else b"TM2")
@@ -353,7 +251,7 @@ class Lidar:
     def _ask_timed(self, request: bytes, timeout_s: float = _ANSWER_S) -> tuple[scip.Reply, int]:
         """The reply to a request and when it came; what comes before it is older and dropped."""
         self._waiting.clear()
-        with _Gone(self._name()):
+        with Gone(self._name()):
             self._stream.write(request + b"\n")
         deadline = time.monotonic() + timeout_s
         while True:
@@ -365,7 +263,7 @@ class Lidar:
         while not self._waiting:
             if time.monotonic() > deadline:
                 raise DeviceTimeoutError(f"{self._name()}: nothing came in time; check power and cable")
-            with _Gone(self._name()):
+            with Gone(self._name()):
                 received = self._stream.read(deadline - time.monotonic())
             arrival_ns = time.monotonic_ns()
             self._waiting += [(told, arrival_ns) for told in self._splitter.feed(received)]
@@ -377,21 +275,6 @@ class Lidar:
 
     def _name(self) -> str:
         return f"{self.address}: lidar"
-
-
-class _Gone:
-    """Turns what a vanished port raises into a DeviceError of one line."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        # A port that we closed after it vanished is None to pyserial, and -1 to select.
-        if isinstance(error, (OSError, TypeError, ValueError)):
-            raise DeviceError(f"{self._name}: the connection broke ({error}); plug it in again") from error
 
 
 def open_lidar(address: str) -> Lidar:
@@ -420,33 +303,3 @@ def clock_of(lidar: Lidar, stamp_at: StampAt = "step_0", transport_s: float = 0.
     if lidar.sync is not None:
         clock.synchronise(lidar.sync)
     return clock
-
-
-def scan_of(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
-    """The LaserScan of a raw one.
-
-    Args:
-        raw: as it came; where steps share a value, its bearing and time are those of their middle.
-        of: the sensor's parameters.
-        stamp_ns: time of step `raw.first_step`.
-    """
-    middle = (raw.cluster - 1) / 2
-    return Scan(
-        stamp_ns=stamp_ns + round(middle * of.step_s * 1e9),
-        angle_min_rad=(raw.first_step + middle - of.front_step) * of.step_rad,
-        angle_increment_rad=raw.cluster * of.step_rad,
-        time_increment_s=raw.cluster * of.step_s,
-        scan_time_s=of.scan_period_s,
-        range_min_m=of.range_min_mm / 1e3,
-        range_max_m=of.range_max_mm / 1e3,
-        range_m=raw.range_m,
-        intensity=raw.intensity,
-    )
-
-
-def _open(address: str) -> Stream:
-    host, colon, port = address.rpartition(":")
-    try:
-        return SocketStream(host, int(port)) if colon and port.isdigit() else SerialStream(address)
-    except (OSError, ValueError) as error:
-        raise DeviceError(f"{address}: cannot open: {error}; look at its plug and at who else uses it") from error

@@ -11,8 +11,9 @@ import pytest
 
 from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io import lidar as driver
-from firmware_io import scip
-from firmware_io.lidar import Lidar, clock_of, open_lidar, scan_of
+from firmware_io import scip, streams
+from firmware_io.lidar import Lidar, clock_of, open_lidar
+from firmware_io.raw_scan import scan_of
 from firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
@@ -215,7 +216,7 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
         os.close(slave)
 
 
-class SlowPort(driver.SerialStream):
+class SlowPort(streams.SerialStream):
     """A port whose sensor listens at the speed that it has after power-up, until it is told another one."""
 
     listens = 19_200
@@ -228,7 +229,7 @@ class SlowPort(driver.SerialStream):
 
 
 def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch):
-    monkeypatch.setattr(driver, "SerialStream", SlowPort)
+    monkeypatch.setattr(streams, "SerialStream", SlowPort)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
     with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
         assert lidar._stream.listens == lidar._stream.baud == 115_200
@@ -254,7 +255,7 @@ class Chatter:
 
 def test_endless_garbage_ends_in_a_timeout(monkeypatch):
     port = Chatter()
-    monkeypatch.setattr(driver, "_open", lambda _: port)
+    monkeypatch.setattr(driver, "open_stream", lambda _: port)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
     with pytest.raises(DeviceTimeoutError):
         open_lidar("somewhere")

@@ -1,0 +1,114 @@
+"""Bytes to and from a sensor: over a serial port, USB or not, or over TCP."""
+
+from __future__ import annotations
+
+import select
+import socket
+from typing import Protocol
+
+import serial
+
+from design.errors import DeviceError
+
+FIRST_BAUD = 115_200
+
+
+class Stream(Protocol):
+    """Bytes to and from a sensor; OSError when it is gone."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come, at least one byte; empty after the time."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the port."""
+        ...
+
+
+class SerialStream:
+    """A serial port, USB or not."""
+
+    def __init__(self, port: str) -> None:
+        self._port = serial.Serial(port, FIRST_BAUD, exclusive=True, write_timeout=1.0)
+        self._port.reset_input_buffer()
+
+    @property
+    def baud(self) -> int:
+        """Bits per second; USB and pseudo-terminals ignore it."""
+        return self._port.baudrate
+
+    @baud.setter
+    def baud(self, baud: int) -> None:
+        self._port.baudrate = baud
+        self._port.reset_input_buffer()
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come."""
+        self._port.timeout = max(timeout_s, 0.0)
+        first = self._port.read(1)
+        return first + self._port.read(self._port.in_waiting) if first else b""
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        self._port.write(data)
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._port.close()
+
+
+class SocketStream:
+    """A TCP connection."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._socket = socket.create_connection((host, port), timeout=2.0)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come."""
+        if not select.select([self._socket], [], [], max(timeout_s, 0.0))[0]:
+            return b""
+        received = self._socket.recv(1 << 16)
+        if not received:
+            raise ConnectionError("the sensor closed the connection")
+        return received
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+        self._socket.sendall(data)
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._socket.close()
+
+
+class Gone:
+    """Turns what a vanished port raises into a DeviceError of one line."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        # A port that we closed after it vanished is None to pyserial, and -1 to select.
+        if isinstance(error, (OSError, TypeError, ValueError)):
+            raise DeviceError(f"{self._name}: the connection broke ({error}); plug it in again") from error
+
+
+def open_stream(address: str) -> Stream:
+    """Open "/dev/ttyACM0" or "192.168.0.10:10940".
+
+    Raises:
+        DeviceError: no such port or host, or it is in use.
+    """
+    host, colon, port = address.rpartition(":")
+    try:
+        return SocketStream(host, int(port)) if colon and port.isdigit() else SerialStream(address)
+    except (OSError, ValueError) as error:
+        raise DeviceError(f"{address}: cannot open: {error}; look at its plug and at who else uses it") from error
