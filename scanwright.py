@@ -864,6 +864,7 @@ def run() -> None:
 @contextmanager
 def _on_duty() -> Iterator[None]:
     """Go first where the system allows it (times get blurred on a busy computer), and end well on every signal."""
+    usual = os.nice(0)
     with suppress(PermissionError):
         os.nice(-10)
 
@@ -876,6 +877,7 @@ def _on_duty() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        os.setpriority(os.PRIO_PROCESS, 0, usual)
 
 
 def _say_in_place(line: str) -> None:

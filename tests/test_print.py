@@ -1,6 +1,7 @@
 """Print files: the pose by its rule on shapes whose answer is plain, and 3MF as a strict reader takes it."""
 
 import itertools
+import shutil
 import zipfile
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from lib3mf import get_wrapper
 from scipy.spatial.transform import Rotation
 
+from benchmarks.slicer import PROGRAM, sliced
 from cad.glyphs import GLYPHS, text_width
 from cad.mesh import Mesh
 from cad.print_pose import on_bed, print_pose
@@ -120,6 +122,26 @@ def test_every_printed_part_has_a_file_that_a_strict_reader_takes(made):
         assert read.bounds[0, 2] == 0
         assert (read.bounds[0] >= 0).all() and (read.bounds[1] <= BED).all()
         assert (read.face_normals[read.triangles_center[:, 2] < 1e-3][:, 2] < -0.999).all()  # a flat lies on the bed
+
+
+def test_a_slicer_takes_the_print_files_without_repair(made):
+    if shutil.which(PROGRAM) is None:
+        pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
+    volumes = {part.name: part.volume_mm3 for part in made.result.parts}
+    for name in ("alignment_linkage", "slip_ring_adapter"):
+        found = sliced(made.folder / "print" / f"{name}.3mf")
+        assert found.closed
+        assert found.volume_mm3 == pytest.approx(volumes[name], rel=1e-3)
+        assert found.height_mm == pytest.approx(found.size_mm[2], abs=0.3)  # a layer of its own choice
+
+
+def test_a_slicer_is_believed_because_it_sees_a_hole(tmp_path):
+    if shutil.which(PROGRAM) is None:
+        pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
+    open_box = trimesh.creation.box(extents=(20, 20, 20))
+    open_box.update_faces(np.arange(len(open_box.faces)) > 0)
+    (tmp_path / "open.3mf").write_bytes(threemf_bytes(mesh(open_box), "open", "a box that lacks a triangle"))
+    assert not sliced(tmp_path / "open.3mf").closed
 
 
 def test_the_zip_holds_no_date_and_no_platform(tmp_path):
