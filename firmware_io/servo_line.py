@@ -80,8 +80,11 @@ class Line:
 
     def _read(self, length: int) -> bytes:
         data = b""
-        while len(data) < length and not self.isPacketTimeout():
+        while len(data) < length:
+            over = self.isPacketTimeout()  # told before the last look: what came while we were kept waiting counts
             data += self.port.read(length - len(data))
+            if over:
+                break
         return data
 
 

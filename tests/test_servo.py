@@ -124,6 +124,13 @@ def test_packets_of_the_manual(bus, protocol, verb, register, data, request_hex,
     assert answer.data == bytes.fromhex(answer_hex)[5 if protocol == 1.0 else 9 : -1 if protocol == 1.0 else -2]
 
 
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+def test_an_answer_that_waits_for_a_late_host_counts(bus, protocol):
+    """The deadline passes while this process is kept from running; the bytes have long been there."""
+    line, _ = bus(protocol, lambda _: status(protocol, 1, 0, b"\x2a\x07"), wait_s=-1.0)
+    assert line.read(1, Register(36, 2)).data == b"\x2a\x07"
+
+
 def test_requests_are_stuffed_which_the_sdk_forgets(bus):
     line, wire = bus(2.0, lambda _: status(2.0, 1, 0, b""))
     line.write(1, Register(116, 4), bytes.fromhex("ff ff fd 00"))
