@@ -32,7 +32,8 @@ from mcap_ros2.reader import read_ros2_messages
 
 from design.angles import Angles, AngleSet, load_angles
 from firmware_io.cloud import PlyWriter
-from firmware_io.deskew import place, place_block
+from firmware_io.deskew import place
+from firmware_io.deskew_kernel import place_block
 from firmware_io.encoder import interpolation_orders
 from firmware_io.recording import RecordingWriter
 from firmware_io.samples import AxisCurve, Block, Floats, JointLog, Scan, blocks, straight

@@ -231,6 +231,16 @@ def bound(room: Room, setup: Setup, truth: Truth, names: tuple[str, ...]) -> Flo
     return setup.noise_m**2 * np.linalg.inv(information)
 
 
+def faces(room: Room, setup: Setup, truth: Truth, time_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number of the surface that the beam of each time meets, as `cast` counts them, shape (n,)."""
+    motion = _Motion.of(setup.sweeps)
+    beams = _beams(setup, motion)
+    fired_ns = START_NS + np.rint(beams.time_s * 1e9).astype(np.int64)
+    _, face = cast(room, *_rays(setup, truth, motion, beams))
+    nearest = np.searchsorted(fired_ns, time_ns - 1000)  # stamps and steps are rounded
+    return face[nearest]
+
+
 def cast(room: Room, origin: Floats, direction: Floats) -> tuple[Floats, NDArray[np.int64]]:
     """Range to the first surface and its number (six to a block, the walls first), each shape (n,)."""
     best, face = _through(room.walls, origin, direction, inside=True)

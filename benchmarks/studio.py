@@ -1,11 +1,16 @@
 """How fast the studio answers, and whether the live view keeps up.
 
-    uv run python -m benchmarks.studio                      # both
-    uv run python -m benchmarks.studio ground_ahead 300     # a task, moves
+    uv run python -m benchmarks.studio                                      # all three
+    uv run python -m benchmarks.studio moves --task ground_ahead --count 300
+    uv run python -m benchmarks.studio rebuild --count 40
+    uv run python -m benchmarks.studio live
 
 Moves: a client of the page's own websocket moves a slider, waits for the facts and the colours of the sphere that
 answer it, and moves on a thirtieth of a second later, as a hand does. Times are from the message that leaves to the
 last one that arrives, unpacked: what a browser adds is its drawing.
+
+Rebuild: the client drags two sliders for a third of a second and lets go; times are from the last message of the hand
+to the arrival of the half of the scanner that turns (linkage, shaft, lidar), and of the half that stands.
 
 Live: scans of 1,081 beams at 40 Hz, and as fast as they can be handed over, go through the feed, the pipe and the frame
 chain into a page with a visitor; what counts is how long the scan's thread is held up, how far behind the view is at
@@ -14,8 +19,8 @@ the end, and what it left out.
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -35,13 +40,15 @@ from design.angles import Angles, AngleSet
 from design.studio.facts import judge_of
 from design.studio.gate import Gate, guarded_server
 from design.studio.live import LiveView
+from design.studio.newest import REST_S
 from design.studio.page import Studio
 from design.studio.state import setting_of
-from design.studio.workbench import Body, View, Workbench
+from design.studio.workbench import Body, View, Workbench, scanner_at
 from design.task import load_task
 from firmware_io.live import EVERY_S, Feed, Placing, growing
 from firmware_io.samples import Scan
 
+WHAT = ("moves", "rebuild", "live")
 HAND_HZ = 30.0
 BEAMS, SCAN_HZ = 1081, 40.0
 CAMERA = {
@@ -59,11 +66,22 @@ CAMERA = {
 
 
 def main() -> None:
-    """Print both."""
-    task = Path(sys.argv[1] if len(sys.argv) > 1 else "ground_ahead")
-    moves(task, int(sys.argv[2]) if len(sys.argv) > 2 else 300)
-    live(10.0, SCAN_HZ)
-    live(10.0, 8 * SCAN_HZ)
+    """Parse the command line, and measure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="*", metavar="WHAT", help="moves, rebuild, live; all if none is named")
+    parser.add_argument("--task", type=Path, default=Path("ground_ahead"))
+    parser.add_argument("--count", type=int, help="of moves (300) or rebuilds (40)")
+    given = parser.parse_args()
+    if unknown := set(given.what) - set(WHAT):
+        parser.error(f"{unknown.pop()}: none of {', '.join(WHAT)}")
+    for what in given.what or WHAT:
+        if what == "moves":
+            moves(given.task, given.count or 300)
+        elif what == "rebuild":
+            rebuild(given.task, given.count or 40)
+        else:
+            live(10.0, SCAN_HZ)
+            live(10.0, 8 * SCAN_HZ)
 
 
 def moves(task: Path, count: int) -> None:
@@ -86,15 +104,10 @@ def moves(task: Path, count: int) -> None:
                 slider, bound = studio.controls.angles[k % 4], 180.0 if k % 4 == 0 else 90.0
                 step = rng.choice([-1, 1]) * rng.uniform(1, 8)
                 angles[k % 4] += step if abs(angles[k % 4] + step) <= bound else -step
-                message = {
-                    "type": "GuiUpdateMessage",
-                    "uuid": slider._impl.uuid,
-                    "updates": {"value": float(angles[k % 4])},
-                }
                 while not told.empty():
                     told.get()
                 sent = time.perf_counter()
-                socket.send(msgspec.msgpack.encode(message))
+                _slide(socket, slider, float(angles[k % 4]))
                 missing, when = {"facts", "sphere"}, sent
                 while missing:
                     when, what = told.get(timeout=10)
@@ -114,8 +127,69 @@ def moves(task: Path, count: int) -> None:
     )
 
 
+def rebuild(task: Path, count: int) -> None:
+    """From the hand that lets go to the new scanner, at settings all over the sliders."""
+    from cad.bodies import bodies_of
+
+    loaded = load_task(task)
+    took: dict[str, list[float]] = {"turning": [], "standing": []}
+    work: dict[str, list[float]] = {"turning": [], "standing": []}
+    refused = 0
+    with guarded_server() as (server, gate):
+        studio = Studio(server, loaded, Workbench(bodies_of, _nowhere), Path.cwd(), Path.cwd() / "out")
+        with visitor(gate) as socket:
+            told: SimpleQueue[tuple[float, str]] = SimpleQueue()
+            threading.Thread(target=_listen, args=(socket, "", told), daemon=True).start()
+            studio.judging.settled(120)
+            studio.makers.settled(120)
+            rng, angles = np.random.default_rng(0), np.array(studio.setting.angles_deg)
+            for _ in range(count):
+                while not told.empty():
+                    told.get()
+                moved, goal = rng.choice(4, 2, replace=False), rng.uniform(-1, 1, 4) * (180.0, 90.0, 90.0, 90.0)
+                for step in np.linspace(0, 1, 10):
+                    for k in moved:
+                        value = float(angles[k] + step * (goal[k] - angles[k]))
+                        _slide(socket, studio.controls.angles[k], value)
+                        released = time.perf_counter()
+                    time.sleep(1 / HAND_HZ)
+                angles[moved] = goal[moved]
+                until = released + 30
+                while not studio.judging.settled(0) and time.perf_counter() < until:
+                    time.sleep(0.01)
+                studio.makers.settled(30)
+                time.sleep(0.1)  # for what is on its way
+                arrived = {}
+                while not told.empty():
+                    when, what = told.get()
+                    arrived[what] = when - released
+                if studio.controls.making.content:
+                    refused += 1
+                    continue
+                for half, times in took.items():
+                    if half in arrived:  # parts that stay the same are not made again
+                        times.append(arrived[half])
+                        began = time.process_time()
+                        bodies_of(scanner_at(loaded, studio.setting), half == "turning")
+                        work[half].append(time.process_time() - began)
+        studio.close()
+    for half, times in took.items():
+        print(
+            f"{task}: {len(times)} rebuilds, from letting go to the {half} half: median {np.median(times):.2f} s, "
+            f"95th percentile {np.percentile(times, 95):.2f} s, worst {max(times):.2f} s; of these {REST_S:g} s are "
+            f"rest, and {np.median(work[half][1:]):.2f} s (at most {max(work[half][1:]):.2f}) of a core are the parts"
+        )
+    print(f"{refused} settings refused: they cannot be built")
+
+
+def _slide(socket: ClientConnection, slider: Any, value: float) -> None:
+    """Move a slider as the page does."""
+    message = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": value}}
+    socket.send(msgspec.msgpack.encode(message))
+
+
 def _listen(socket: ClientConnection, facts: str, told: SimpleQueue[tuple[float, str]]) -> None:
-    """Note when facts and colours arrive."""
+    """Note when facts, colours and bodies arrive."""
     for data in _until_closed(socket):
         assert isinstance(data, bytes)
         now = time.perf_counter()
@@ -126,6 +200,8 @@ def _listen(socket: ClientConnection, facts: str, told: SimpleQueue[tuple[float,
                 told.put((now, "facts"))
             if message.get("name") == "/sphere" and "batched_colors" in message.get("updates", {}):
                 told.put((now, "sphere"))
+            if message["type"] == "MeshMessage":
+                told.put((now, message["name"].split("/")[2]))
 
 
 def _until_closed(socket: ClientConnection) -> Iterator[str | bytes]:

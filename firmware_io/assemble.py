@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 from design.angles import AngleSet
 from design.errors import RecordingError, suggest
 from firmware_io.cloud import PlyWriter
-from firmware_io.deskew import PlacedBlock, Verdict, place_block
+from firmware_io.deskew_kernel import PlacedBlock, place_block
 from firmware_io.encoder import axis_curve
 from firmware_io.own_body import OwnBody
 from firmware_io.recording import Recording, open_recording
 from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
 from firmware_io.trajectory import Trajectory
 from firmware_io.turns import turn_starts
+from firmware_io.verdict import Verdict
 
 Per = Literal["recording", "turn", "half"]
 COLUMNS = ("intensity", "time_s", "joint_rad", "ring")

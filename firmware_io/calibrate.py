@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from firmware_io.calibration.model import Mount, gather, start_vector
 from firmware_io.calibration.report import report
 from firmware_io.calibration.tiles import fan_side
 from firmware_io.files import whole_file
+from firmware_io.own_body import OwnBody
 from firmware_io.recording import open_recording
 
 
@@ -26,6 +28,7 @@ def calibrate_recordings(
     out: Path,
     *,
     one_place: bool = False,
+    own_body: OwnBody | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Write the calibrated angle set to `out` and what was found to `report_path(out)`; return the latter.
@@ -35,6 +38,7 @@ def calibrate_recordings(
         angles: of the scanner that made them; its delta and lever arm are where the search starts.
         out: the calibrated angle set, `.json`.
         one_place: the scanner stood still from the first recording to the last.
+        own_body: beams that end on the scanner itself, to be left out.
         say: told what is going on.
 
     Raises:
@@ -42,8 +46,13 @@ def calibrate_recordings(
     """
     if out.suffix != ".json":
         raise RecordingError(f"{out}: an angle set is JSON; name it {out.with_suffix('.json').name}")
+    for k, recording in enumerate(recordings):
+        if recording.resolve() in [other.resolve() for other in recordings[:k]]:
+            raise RecordingError(f"{recording}: named twice; the same beams twice tell nothing more, but seem to")
     say(f"reading {len(recordings)} recording{'s'[: len(recordings) > 1]}")
-    beams, left_out = gather([open_recording(path) for path in recordings], one_place=one_place)
+    gamma_rot_rad = math.radians(angles.angles_deg.gamma_rot)
+    opened = [open_recording(path) for path in recordings]
+    beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
     mount, start = Mount.of(angles), start_vector(angles)
     say(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
     found = estimate(beams, mount, start)

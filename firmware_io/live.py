@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from design.angles import AngleSet
-from firmware_io.deskew import place_block
+from firmware_io.deskew_kernel import place_block
 from firmware_io.own_body import OwnBody
 from firmware_io.samples import Float32s, Floats, JointLog, Scan, Times, blocks, straight
 

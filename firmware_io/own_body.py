@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,6 +78,8 @@ def load_own_body(path: Path) -> OwnBody:
     Raises:
         RecordingError: the file is missing, damaged, or its arrays do not fit each other.
     """
+    if path.is_file() and not zipfile.is_zipfile(path):
+        raise RecordingError(f"{path}: damaged, or no own-body mask at all; `scanwright build` writes one")
     with foreign(f"{path}: cannot read the own-body mask", np.load, path) as arrays:
         missing = sorted({"beams", "bearing_rad"} - set(arrays))
         if missing:

@@ -16,12 +16,13 @@ from design.angles import Angles, AngleSet
 from design.errors import RecordingError
 from firmware_io.assemble import assemble_recording
 from firmware_io.cloud import read_ply
-from firmware_io.deskew import Verdict, deskew, place
+from firmware_io.deskew import deskew, place
 from firmware_io.importer import import_bag
 from firmware_io.recording import RecordingWriter
 from firmware_io.samples import JointLog, Scan
 from firmware_io.trajectory import Trajectory
 from firmware_io.turns import turn_starts
+from firmware_io.verdict import Verdict
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 needs_data = pytest.mark.skipif(DATA is None, reason="SCANWRIGHT_DATA names no folder with the real recordings")
@@ -275,10 +276,14 @@ def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_no
             {"beams": np.zeros(2, bool), "bearing_rad": np.arange(3.0)},
             r"beams \(2,\), stator \(2, 0\): one row for each of 3",
         ),
+        (None, r"own_body.npz: damaged, .*scanwright build"),
     ],
 )
 def test_a_wrong_mask_is_one_line(tmp_path, command, arrays, says):
-    np.savez(tmp_path / "own_body.npz", **arrays)
+    if arrays is None:
+        (tmp_path / "own_body.npz").write_bytes(b"PK\3\4 cut off")
+    else:
+        np.savez(tmp_path / "own_body.npz", **arrays)
     (tmp_path / "angles.json").write_text(angle_set().to_json())
     code, _, complaints = command("assemble", "r", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply")
     assert code == 2

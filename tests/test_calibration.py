@@ -2,13 +2,28 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from benchmarks.calibration import calibrated, designed, faulty, mount_of
-from benchmarks.rooms import CORRIDOR, EMPTY_HALL, FURNISHED, NAMES, Room, Setup, Truth, bound, simulate, write
+from benchmarks.calibration import calibrated, designed, faulty, mount_of, strays
+from benchmarks.rooms import (
+    CORRIDOR,
+    EMPTY_HALL,
+    FURNISHED,
+    NAMES,
+    Room,
+    Setup,
+    Simulated,
+    Truth,
+    bound,
+    faces,
+    simulate,
+    write,
+)
 from design.angles import load_angles
 from design.errors import RecordingError
 from firmware_io.assemble import assemble_recording
@@ -78,16 +93,21 @@ def test_errors_are_as_large_as_stated_and_the_start_may_be_far_off():
     squares = []
     for seed in range(2):
         truth = faulty(seed)
-        found, _ = calibrated(QUICK, truth, seed)
+        found, *_ = calibrated(QUICK, truth, seed)
         off = (found.x - [getattr(truth, name) for name in NAMES])[:4]
         squares.append(off @ np.linalg.solve(found.covariance[:4, :4], off))
+        # a hundred beams of the other side of edges, in flat tiles, pull as far as a third of what is stated
+        stray, used = strays(found, faces(FURNISHED, QUICK, truth, found.tiles.beams.time_ns))
+        assert stray < 2e-4 * used
+        on_surfaces = found.tiles.count[found.grouping.used].sum()
+        assert used > 0.95 * on_surfaces
     assert chi2.ppf(0.0005, 8) < sum(squares) < chi2.ppf(0.9995, 8)
 
 
 def test_a_late_log_is_found_where_the_axis_turns_both_ways():
     setup = Setup(beams=180, sweeps=((20.0, 360.0), (-20.0, 360.0)))
     truth = Truth(lag_s=0.024)
-    found, _ = calibrated(setup, truth, 0)
+    found, *_ = calibrated(setup, truth, 0)
     assert KEYS.index("lag_s") in found.choice.free
     assert found.x[KEYS.index("lag_s")] == pytest.approx(0.024, abs=2e-4)
     assert np.abs(errors(found, truth)).max() < 4
@@ -99,7 +119,7 @@ def test_a_late_log_is_found_where_the_axis_turns_both_ways():
 def test_backlash_is_told_from_a_late_log_by_a_second_speed():
     setup = Setup(beams=120, sweeps=((20.0, 360.0), (-20.0, 360.0), (60.0, 360.0), (-60.0, 360.0)))
     truth = Truth(lag_s=-0.01, backlash_rad=float(np.radians(1 / 3)))
-    found, _ = calibrated(setup, truth, 0)
+    found, *_ = calibrated(setup, truth, 0)
     assert found.choice.held == ()
     assert found.x[KEYS.index("lag_s")] == pytest.approx(-0.01, abs=3e-4)
     assert np.degrees(found.x[KEYS.index("backlash_rad")]) == pytest.approx(1 / 3, abs=0.02)
@@ -135,6 +155,35 @@ def test_a_corridor_is_flagged(tmp_path):
     assert np.abs(errors(found, Truth())).max() < 4
 
 
+def test_what_the_scanner_sees_of_itself_does_not_count(tmp_path, command):
+    setup, truth = Setup(beams=180, noise_m=0.002), faulty(0)
+    made = simulate(FURNISHED, setup, truth)
+    bearing_rad = made.scans[0].bearing_rad
+    fan = Rotation.from_euler("xy", setup.laser_deg, degrees=True)
+    direction = fan.apply(np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad), np.zeros(180)]))
+    hidden = direction[:, 2] < -0.75
+    # a plate that turns with the laser, askew by 1 deg: a disc that swings
+    plate_m = -0.6 / (direction @ [np.sin(np.radians(1.0)), 0.0, np.cos(np.radians(1.0))])
+    plate_m = plate_m + np.random.default_rng(1).normal(0, setup.noise_m, (len(made.scans), 180))
+    seen = [np.where(hidden, at_m, scan.range_m) for scan, at_m in zip(made.scans, plate_m, strict=True)]
+    scans = [replace(scan, range_m=row.astype(np.float32)) for scan, row in zip(made.scans, seen, strict=True)]
+    write(tmp_path / "r.mcap", Simulated(scans, made.log))
+    (tmp_path / "angles.json").write_text(designed(setup).to_json())
+    words = ("calibrate", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "a.json")
+    np.savez(tmp_path / "own_body.npz", bearing_rad=bearing_rad, beams=hidden)
+    code, printed, _ = command(*words)
+    assert code == 0
+    assert f"left out {hidden.sum() * len(scans):,} beams: own body" in printed
+    found = load_angles(tmp_path / "a.json")
+    off = np.radians(found.delta_rotvec_rot_deg) - [truth.tilt_x_rad, truth.tilt_y_rad]
+    off = np.append(off, np.array(found.t_rot_laser_mm[:2]) / 1e3 - [truth.offset_x_m, truth.offset_y_m])
+    assert off @ np.linalg.solve(np.array(found.covariance), off) < chi2.ppf(0.999, 4)
+    (tmp_path / "own_body.npz").unlink()
+    code, _, complaints = command(*words)  # now the plate passes for most of the room
+    assert code == 2
+    assert "nothing is seen twice" in complaints[0]
+
+
 def test_recordings_of_two_places_are_two_scenes(room, tmp_path):
     recording, _ = room
     elsewhere = Setup(beams=180, position_m=(-4.0, -2.0, 1.0))
@@ -155,6 +204,12 @@ def test_wrong_input_is_one_line(room, tmp_path, command, out, says):
     assert (code, len(complaints)) == (2, 1)
     assert re.search(says, complaints[0])
     assert not list(tmp_path.rglob("*.json"))
+
+
+def test_the_same_beams_do_not_count_twice(room, tmp_path, command):
+    code, _, complaints = command("calibrate", room[0], room[0], "--angles", room[1], "-o", tmp_path / "a.json")
+    assert (code, len(complaints)) == (2, 1)
+    assert "named twice" in complaints[0]
 
 
 def test_the_real_tilting_scanner_sees_nothing_twice(data, tmp_path, command):

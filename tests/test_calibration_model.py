@@ -11,8 +11,10 @@ from design.angles import Angles, AngleSet
 from firmware_io.calibration.model import BACKLASH, COUNT, LAG, PARAMETERS, Beams, Mount, gather, rays, start_vector
 from firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
 from firmware_io.calibration.tiles import flat_tiles
-from firmware_io.deskew import deskew
+from firmware_io.deskew import deskew, place
+from firmware_io.own_body import OwnBody
 from firmware_io.samples import JointLog, Scan, straight
+from firmware_io.verdict import Verdict
 
 START = 1_700_000_000_000_000_000
 SIZES = np.array([0.1, 0.1, 0.05, 0.05, 0.02, 0.02, 0.02, 0.02, 0.02, 0.03, 0.02])
@@ -74,6 +76,36 @@ def test_it_places_points_where_the_assembler_does(seed):
     T_world_rot = angles.T_world_rot(0.0)
     points = (origin + beams.range_m[:, None] * direction) @ T_world_rot[:3, :3].T + T_world_rot[:3, 3]
     np.testing.assert_allclose(points, deskew(scan, log, angles), atol=1e-7)
+
+
+@settings(deadline=None, max_examples=10)
+@given(seed=seeds)
+def test_it_leaves_out_the_beams_that_the_assembler_does(seed):
+    rng = np.random.default_rng(seed)
+    angles = an_angle_set(rng)
+    turned = angles.angles_deg.model_copy(update={"gamma_rot": float(rng.uniform(-180, 180))})
+    angles = angles.model_copy(update={"angles_deg": turned})
+    range_m = rng.choice([0.0, 0.01, np.nan, np.inf, 40.0, 1.0, 2.0, 3.0, 5.0, 8.0], 60).astype(np.float32)
+    scan = Scan(
+        stamp_ns=START + 10**9,
+        angle_min_rad=-2.0,
+        angle_increment_rad=0.05,
+        time_increment_s=2e-2,
+        scan_time_s=2.0,
+        range_min_m=0.1,
+        range_max_m=30.0,
+        range_m=range_m,
+        intensity=np.empty(0, np.float32),
+    )
+    log = JointLog(START + np.array([0, 2 * 10**9]), np.array([0.0, 5.0]))
+    own_body = OwnBody(np.linspace(-2, 1, 50), rng.random(50) < 0.3, rng.random((50, 24)) < 0.5)
+    placed = next(place([scan], log, angles, own_body=own_body))
+    keep = placed.verdict == Verdict.POINT
+    gamma_rot_rad = np.radians(angles.angles_deg.gamma_rot)
+    beams, left_out = gather([Recorded([scan], log)], one_place=True, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
+    np.testing.assert_array_equal(beams.time_ns, scan.time_ns[keep])
+    assert left_out["own_body"] == np.sum(placed.verdict == Verdict.OWN_BODY) > 0
+    assert sum(left_out.values()) == 60 - keep.sum()
 
 
 def residuals(mount, x, beams, q):

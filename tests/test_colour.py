@@ -1,6 +1,7 @@
 """Colours on clouds: a painted room, photographed by a slow camera of the test's own, comes out with its own paint."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from benchmarks.calibration import designed
-from benchmarks.rooms import FURNISHED, START_NS, Setup, Truth, cast, simulate, write
+from benchmarks.rooms import FURNISHED, START_NS, Setup, Simulated, Truth, cast, simulate, write
 from design.camera import Camera
 from firmware_io.cloud import read_ply
 
@@ -198,3 +199,88 @@ def test_points_get_the_paint_of_what_they_lie_on(scanned, command, tmp_path, mo
         assert coloured[blocked].mean() < 0.08
     assert right[coloured].mean() > 0.94  # those on edges among them
     assert f"coloured {coloured.sum():,} points" in said
+
+
+def carried(time_s):
+    """Where the platform is after some seconds: it drives a curve and rocks; rotations and positions."""
+    turned = np.stack([0.05 * np.sin(time_s), 0.03 * np.cos(2 * time_s), 0.15 * time_s], axis=-1)
+    at = np.stack([-0.3 * time_s, 0.1 * time_s + 0.05 * np.sin(time_s), 0.02 * np.sin(2 * time_s)], axis=-1)
+    return Rotation.from_rotvec(turned), at
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """A recording made from a moving platform, its poses, and the face that each of its beams hit."""
+    folder = tmp_path_factory.mktemp("driven")
+    made = simulate(FURNISHED, SETUP, Truth(), 3)
+    laser = Rotation.from_euler("xy", SETUP.laser_deg, degrees=True)
+    rng = np.random.default_rng(5)
+    scans, faces = [], []
+    for scan in made.scans:
+        after_s = (scan.time_ns - START_NS) / 1e9
+        joint_rad = np.interp(after_s, (made.log.time_ns - START_NS) / 1e9, made.log.position_rad)
+        b = scan.bearing_rad
+        fan = laser.apply(np.column_stack([np.cos(b), np.sin(b), np.zeros(b.size)]))
+        platform, at = carried(after_s)
+        range_m, face = cast(
+            FURNISHED, at + SETUP.position_m, platform.apply(Rotation.from_euler("z", joint_rad[:, None]).apply(fan))
+        )
+        scans.append(replace(scan, range_m=(range_m + rng.normal(0, SETUP.noise_m, b.size)).astype(np.float32)))
+        faces.append(face)
+    write(folder / "room.mcap", Simulated(scans, made.log))
+    (folder / "angles.json").write_text(designed(SETUP).to_json())
+    pose_s = np.arange(-0.2, SETUP.sweeps[0][1] / SETUP.sweeps[0][0] + 0.2, 0.01)
+    platform, at = carried(pose_s)
+    with (folder / "poses.csv").open("w") as stream:
+        stream.write("time_ns,x,y,z,qx,qy,qz,qw\n")
+        for t, p, q in zip(pose_s.tolist(), at.tolist(), platform.as_quat().tolist(), strict=True):
+            stream.write(",".join(map(str, [START_NS + round(t * 1e9), *p, *q])) + "\n")
+    return folder, np.concatenate(faces)
+
+
+def test_on_a_moving_platform_each_image_has_its_own_pose(driven, command, tmp_path):
+    folder, face = driven
+    values = camera("pinhole", frame="laser") | ON_THE_HEAD
+    of = Camera.model_validate(values)
+    lines, seen = ["file,time_ns"], []
+    for k, after_s in enumerate((1.3, 4.4)):
+        platform, at = carried(np.array(after_s))
+        T_map_platform = np.eye(4)
+        T_map_platform[:3, :3], T_map_platform[:3, 3] = platform.as_matrix(), at
+        T = T_map_platform @ pose_in_world(of, np.radians(50.0 * after_s))
+        shown = in_room(T, rays(of))
+        Image.fromarray(PAINT[shown].reshape(SIZE[1], SIZE[0], 3)).save(tmp_path / f"{k}.png")
+        lines.append(f"{k}.png,{START_NS + round(after_s * 1e9)}")
+        seen.append((T, shown.reshape(SIZE[::-1])))
+    (tmp_path / "shots.csv").write_text("\n".join(lines) + "\n")
+    words = ("--angles", folder / "angles.json", "--poses", folder / "poses.csv")
+    out = tmp_path / "room.ply"
+    more = ("--camera", task_with(tmp_path, values), "-o", out)
+    code, said, _ = command("assemble", folder / "room.mcap", *words, *more)
+    assert code == 0, said
+    cloud = read_ply(out)
+    points_m = np.stack([cloud[axis] for axis in "xyz"], axis=1).astype(float)
+    coloured = cloud["alpha"] == 255
+    right = (np.stack([cloud[name] for name in ("red", "green", "blue")], axis=1) == PAINT[face]).all(axis=1)
+    plain, edge = np.zeros(face.size, bool), np.zeros(face.size, bool)
+    for T, shown in seen:
+        to = points_m - T[:3, 3]
+        far_m = np.linalg.norm(to, axis=1)
+        free_m, _ = cast(FURNISHED, np.broadcast_to(T[:3, 3] + SETUP.position_m, to.shape), to / far_m[:, None])
+        x, y, z = (to @ T[:3, :3]).T
+        front = (np.abs(free_m - far_m) < 0.05) & (z > np.hypot(x, y) / 1.2)
+        u, v = np.full((2, face.size), -1)
+        at_px = bent("pinhole", of.distortion, x[front] / z[front], y[front] / z[front]).T * of.focal_px + of.centre_px
+        u[front], v[front] = np.rint(at_px).clip(-1, 9999).astype(int).T
+        within = (u > 9) & (v > 9) & (u < SIZE[0] - 10) & (v < SIZE[1] - 10)
+        alone = within.copy()  # nothing else near its pixel
+        for dv in range(-8, 9, 4):
+            for du in range(-8, 9, 4):
+                alone[alone] &= shown[v[alone] + dv, u[alone] + du] == face[alone]
+        plain |= alone
+        edge |= within & ~alone
+    expected = plain & ~edge
+    assert expected.sum() > 1000
+    assert right[expected & coloured].mean() > 0.999
+    assert coloured[expected].mean() > 0.9
+    assert right[coloured].mean() > 0.94

@@ -11,11 +11,13 @@ from scipy.spatial.transform import Rotation
 from design.angles import Angles, AngleSet
 from design.errors import RecordingError
 from firmware_io.cloud import read_ply
-from firmware_io.deskew import Verdict, _sin_cos, place, place_block
+from firmware_io.deskew import place
+from firmware_io.deskew_kernel import _sin_cos, place_block
 from firmware_io.own_body import OwnBody
 from firmware_io.recording import RecordingWriter
 from firmware_io.samples import JointLog, Scan, blocks
 from firmware_io.trajectory import Trajectory
+from firmware_io.verdict import Verdict
 
 START = 1_436_377_047_737_469_125
 angle_deg = st.floats(-180, 180)

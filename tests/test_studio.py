@@ -1,7 +1,9 @@
 """What the studio makes of a task, without a page: paint, files, facts, and work that follows a hand."""
 
 import math
+import os
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -199,9 +201,11 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
 
 
 def bodies(scanner, turning):
-    """A stand-in for the kernel: one triangle whose size tells the setting; refuses where beta_laser is 13."""
+    """A stand-in for the kernel: a triangle as large as beta_rot, none at beta_laser = 13; what stands waits."""
     if scanner.angles.angles_deg.beta_laser == 13:
         raise BuildError("alignment_linkage: no room")
+    while not turning and not Path(os.environ["SCANWRIGHT_TEST_GO"]).exists():
+        time.sleep(0.01)
     corners = np.eye(3, dtype=np.float32) * np.float32(scanner.angles.angles_deg.beta_rot)
     return (Body("turning" if turning else "standing", corners, np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
 
@@ -210,12 +214,19 @@ def points(view):
     return np.full((len(view.joint_rad), 3), view.every, np.float32)
 
 
-def test_parts_and_scans_are_made_in_other_processes_and_a_refusal_is_said(loaded):
+def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp_path, monkeypatch):
+    monkeypatch.setenv("SCANWRIGHT_TEST_GO", str(tmp_path / "go"))
     shown, notes = {}, []
     problem = problem_of(loaded)
+
+    def show(name, value):
+        shown[name] = value
+        if shown.keys() >= {True, "points"}:  # what turns, and the scan, did not wait for what stands
+            (tmp_path / "go").touch()
+
     shows = Shows(
-        bodies=lambda _, turning, made: shown.__setitem__(turning, made[0].vertices_m.max()),
-        points=lambda _, points_m: shown.__setitem__("points", points_m.shape),
+        bodies=lambda _, turning, made: show(turning, made[0].vertices_m.max() if made else None),
+        points=lambda _, points_m: show("points", points_m.shape),
         note=lambda text, bad: notes.append((text, bad)),
     )
     makers = Makers(Workbench(bodies, points), shows)
@@ -223,8 +234,13 @@ def test_parts_and_scans_are_made_in_other_processes_and_a_refusal_is_said(loade
         makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, "room"))
         assert makers.settled(60)
         assert shown == {True: 40, False: 40, "points": (80, 3)}
+        assert notes[-1] == ("", False)
         makers.order(Order(loaded, problem, setting_of((0, 40, 0, 13)), True, ""))
         assert makers.settled(60)
-        assert ("alignment_linkage: no room", True) in notes
+        assert notes[-1] == ("alignment_linkage: no room", True)
+        assert shown[True] is shown[False] is None  # and no other setting's parts stay
+        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, ""))
+        assert makers.settled(60)
+        assert (shown[True], notes[-1]) == (40, ("", False))
     finally:
         makers.close()

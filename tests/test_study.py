@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.study import invented_judge, invented_search, invented_study
+from benchmarks.study.invented import invented_judge, invented_search, invented_study
 from design.catalogue import load_catalogue
 from design.errors import TaskError
 from design.study import session as sessions
@@ -122,14 +122,14 @@ def test_the_name_decides_nothing_and_a_servo_no_search():
     assert addresses(one)[1] != addresses(other)[1]
 
 
-def in_some_order(seed):
+def in_some_order(seed, at_once=6):
     """A cluster of two that finishes what it holds in any order."""
     dice = random.Random(seed)
 
     def run(_client, units, store, _limit_s, _ticked):
         units, at_work, more = iter(units), [], True
         while more or at_work:
-            while more and len(at_work) < 6:
+            while more and len(at_work) < at_once:
                 unit = next(units, None)
                 more = unit is not None
                 if more:
@@ -176,6 +176,24 @@ def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path, monkeypa
     again.run(None, lambda _: None)
     assert (again.counts.judged, again.counts.searches) == (0, 0)
     assert list(again.rows()) == list(session.rows())
+
+
+def test_a_candidate_whose_bound_is_beaten_is_never_made(tmp_path, monkeypatch):
+    """With one worker that has one unit at a time, nothing is at work when a bound is asked for."""
+    session = Session(Crossing(invented_study(60, mountings=3)), open_store(tmp_path), None, invented_search)
+    wasted = []
+
+    def judge(loaded, found):
+        bound = costs(bounds_of(loaded, found), session.crossing.loaded.study.front)
+        wasted.append(any((done <= bound).all() and (done < bound).any() for done in session.fronts[0].costs))
+        return invented_judge(loaded, found)
+
+    session.judge = judge
+    monkeypatch.setattr(sessions, "run", in_some_order(0, at_once=1))
+    session.run(None, lambda _: None)
+    assert not any(wasted)
+    assert 0 < session.counts.beaten == 60 - len(wasted)
+    assert session.counts.beaten == sum(row["status"] == "dominated" for row in session.rows())
 
 
 def test_both_tables_hold_the_same(tmp_path):

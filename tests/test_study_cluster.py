@@ -5,43 +5,56 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks.study import die, disturbed, run_invented
+from benchmarks.study.invented import die, invented_judge, invented_search, invented_study
+from benchmarks.study.kills import disturbed
 from design.errors import BuildError
 from design.study import cluster as clusters
+from design.study import session as sessions
+from design.study.answer import write_answer
 from design.study.cluster import _compare, cluster
-from design.study.engine import run
+from design.study.crossing import Crossing
+from design.study.engine import Finished, run
 from design.study.identity import address, identity, tools
+from design.study.session import Session
 from design.study.store import open_store
 from design.study.work import Unit
 
-UNITS, SECONDS = 16, 0.1
+UNITS, SECONDS = 12, 0.1
 
 
 def unit(name, function, *arguments):
     return Unit(address("test", name), name, function, arguments)
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("undisturbed")
-    run_invented(folder, None, UNITS, SECONDS, processes=1)
-    return tables(folder)
+def one_after_the_other(_client, units, store, _limit_s, _ticked):
+    """The engine without a cluster."""
+    for asked in units:
+        result = asked.function(*asked.arguments)
+        store.put(asked.address, result)
+        yield Finished(asked, result, "", 0.0, 0.0)
 
 
 def tables(folder):
     return [(folder / name).read_bytes() for name in ("study.csv", "study.parquet")]
 
 
-def test_killed_processes_change_nothing(undisturbed, tmp_path):
-    # workers and scheduler are started by Dask's own commands and talk over TCP
-    kills = [("worker", 0.05), ("client", 0.05), ("scheduler", 0.05)]
-    starts, twice = disturbed(kills, UNITS, SECONDS, tmp_path)
+def test_killed_processes_change_nothing_and_are_told_in_one_line(tmp_path, monkeypatch):
+    # a worker and the scheduler are started by Dask's own commands and talk over TCP
+    kills = [("worker", 0.05), ("scheduler", 0.05), ("client", 0.05)]
+    starts, twice = disturbed(kills, UNITS, SECONDS, tmp_path, workers=1)
     assert (starts, twice) == (3, 0)
-    assert tables(tmp_path) == undisturbed
+    (told,) = (tmp_path / "client.log").read_text().splitlines()  # of three clients, and nothing of Dask's
+    assert told.startswith("study: the scheduler at tcp://127.0.0.1:") and "run the study again" in told
+    monkeypatch.setattr(sessions, "run", one_after_the_other)
+    alone = Session(Crossing(invented_study(UNITS)), open_store(tmp_path / "alone"), invented_judge, invented_search)
+    alone.run(None, lambda _: None)
+    write_answer(alone, tmp_path / "alone")
+    assert tables(tmp_path) == tables(tmp_path / "alone")
 
 
 def test_units_that_raise_die_or_hang_cost_a_row_and_nothing_else(tmp_path):
     import dask
+    import distributed  # noqa: F401  its defaults come first: what is set before them is taken away with them
 
     units = [unit(f"good {i}", dict, {"status": "built", "i": i}) for i in range(8)]
     bad = {

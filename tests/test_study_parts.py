@@ -1,10 +1,20 @@
-"""A study of two candidates from its command to its table, with their solids."""
+"""A study from its command to its table: one candidate with its solids, and one that its bound rules out."""
 
 import csv
 from pathlib import Path
 
 import pytest
 
+from cad.candidate import judge
+from design.study import session as sessions
+from design.study.answer import write_answer
+from design.study.crossing import Crossing
+from design.study.engine import Finished
+from design.study.session import Session
+from design.study.store import open_store
+from design.study.study import load_study
+
+TABLES = ("study.csv", "study.parquet")
 TASK = """
 name = "ahead"
 sensor = "URG-04LX"
@@ -26,27 +36,38 @@ tolerance = 0.01
 shape = "band"
 theta_deg = [45, 135]
 """
-STUDY = 'name = "two"\ntasks = ["ahead.toml"]\nservos = ["AX-12A", "MX-64R"]\nfront = ["mass_g", "J"]\nwinners = 0\n'
+STUDY = 'name = "two"\ntasks = ["ahead.toml"]\nservos = ["AX-12A", "MX-64R"]\nfront = ["cost_usd", "J"]\nwinners = 0\n'
 
 
-def test_two_candidates_from_the_command_to_the_table(tmp_path, command):
+def only_looked_up(_client, units, store, _limit_s, _ticked):
+    """The engine without a cluster, where all has been done."""
+    for unit in units:
+        known = store.get(unit.address)
+        assert known is not None
+        yield Finished(unit, known, "", None, 0.0)
+
+
+def test_two_candidates_from_the_command_to_the_table(tmp_path, command, monkeypatch):
     (tmp_path / "ahead.toml").write_text(TASK)
     (tmp_path / "two.toml").write_text(STUDY)
-    words = ("study", tmp_path / "two.toml", "--out", tmp_path / "out", "--processes", 1)
-    code, printed, complaint = command(*words)
+    out = tmp_path / "out"
+    code, printed, complaint = command("study", tmp_path / "two.toml", "--out", out, "--processes", 1)
     assert (code, complaint) == (0, [])
-    assert "2 candidates: 1 front" in printed
-    assert "this run: 1 searches, 2 candidates made" in printed  # both servos look the same way
-    first = (tmp_path / "out" / "study.csv").read_bytes()
-    code, printed, _ = command(*words)
-    assert code == 0
-    assert "this run: 0 searches, 0 candidates made" in printed
-    assert (tmp_path / "out" / "study.csv").read_bytes() == first
-    assert (tmp_path / "out" / "front.png").stat().st_size > 10_000
-    light, heavy = csv.DictReader(first.decode().splitlines())
-    assert (light["name"], light["status"], heavy["status"]) == ("ahead-AX-12A", "front", "built")
-    assert heavy["reason"].startswith("ahead-AX-12A is as good or better")
-    agrees_with_the_parts(light, tmp_path / "ahead.toml")
+    assert "2 candidates: 1 front (on the front of their task), 1 dominated" in printed
+    # both servos look the same way, and the dearer one cannot make up for its price
+    assert "this run: 1 searches, 1 candidates made, 0 looked up, 1 beaten before they were made" in printed
+    cheap, dear = csv.DictReader((out / "study.csv").read_text().splitlines())
+    assert (cheap["name"], cheap["status"]) == ("ahead-AX-12A", "front")
+    assert (dear["status"], dear["reason"]) == ("dominated", "not made: ahead-AX-12A beats its bound")
+    assert (out / "front.png").stat().st_size > 10_000
+    agrees_with_the_parts(cheap, tmp_path / "ahead.toml")
+    monkeypatch.setattr(sessions, "run", only_looked_up)
+    again = Session(Crossing(load_study(tmp_path / "two.toml")), open_store(out / "results"), judge)
+    again.run(None, lambda _: None)
+    write_answer(again, tmp_path / "again")
+    assert [(tmp_path / "again" / name).read_bytes() for name in TABLES] == [
+        (out / name).read_bytes() for name in TABLES
+    ]
 
 
 def agrees_with_the_parts(row, task):

@@ -23,6 +23,7 @@ class Controls:
 
     facts: viser.GuiHtmlHandle
     note: viser.GuiHtmlHandle
+    making: viser.GuiHtmlHandle
     task: viser.GuiDropdownHandle[str]
     angles: tuple[viser.GuiSliderHandle[float], ...]
     optimise: viser.GuiButtonHandle
@@ -54,7 +55,7 @@ class Controls:
 
 def lay_out(gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> Controls:
     """Put up the panel for a task, with the angles of a setting."""
-    facts, note = gui.add_html(""), gui.add_html("")
+    facts, note, making = gui.add_html(""), gui.add_html(""), gui.add_html("")
     tabs = gui.add_tab_group()
     with tabs.add_tab("Angles"):
         task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
@@ -94,6 +95,7 @@ def lay_out(gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Se
     return Controls(
         facts=facts,
         note=note,
+        making=making,
         task=task,
         angles=angles,
         optimise=optimise,

@@ -36,7 +36,7 @@ class Facts:
         blind_cone_deg: half angle of the wider one about the axis.
         gap_deg: widest distance between neighbouring scan lines.
         blind_weight: share of the weight that is never seen.
-        period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo sweeps.
+        period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
         density: beams per ball that the period is for.
         standard: J of rolling and pitching for the same task.
     """
@@ -82,7 +82,8 @@ class Judge:
 
     def _facts(self, setting: Setting, found: Score, *, exact: bool) -> Facts:
         plane = setting.angles_rad[None, 2:]
-        within_reach = found.blind_weight == 0 and self.problem.sweep is None
+        turns = self.loaded.task.motion.mode in ("spin", "shortest")
+        within_reach = found.blind_weight == 0 and turns
         return Facts(
             setting=setting,
             J=found.J,

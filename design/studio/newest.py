@@ -9,6 +9,8 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
+REST_S = 0.25  # without a wish: the hand has let go
+
 
 class Newest(Generic[T]):
     """A thread that does the newest wish, and once no other has come for a while, what belongs to the rest.
@@ -17,7 +19,7 @@ class Newest(Generic[T]):
     """
 
     def __init__(
-        self, name: str, work: Callable[[T], None], rest: Callable[[T], None] | None = None, rest_s: float = 0.25
+        self, name: str, work: Callable[[T], None], rest: Callable[[T], None] | None = None, rest_s: float = REST_S
     ) -> None:
         self._work, self._rest, self._rest_s = work, rest, rest_s
         self._changed = Condition()

@@ -1,8 +1,8 @@
 """The studio: a person drags the angles or paints what matters, and sees at once what it comes to.
 
 Three threads follow the hand, each doing only the newest wish: one judges the setting (J, gaps, the colours of the
-sphere), one takes paint into the task, one has parts and scans made in other processes. The search and a build run
-beside them. Everybody who has the page sees and moves the same setting.
+sphere), one takes paint into the task, the makers' have parts and scans made in other processes. The search and a build
+run beside them. Everybody who has the page sees and moves the same setting.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Studio:
         self.saving = Saving(self.controls, saved_to, out)
         self.judging: Newest[Setting] = Newest("judge", self._follow, self._rest)
         self.painting: Newest[Canvas] = Newest("paint", self._take, self._rejudge)
-        self.makers = Makers(bench, Shows(self._show_bodies, self._show_points, self.say))
+        self.makers = Makers(bench, Shows(self._show_bodies, self._show_points, self._show_making))
         self._connect()
         self._taken()
         self._rejudge(self._canvas)
@@ -158,9 +158,9 @@ class Studio:
         self.stage.colour(judge.problem, setting, self._highest)
 
     def _rest(self, setting: Setting) -> None:
+        self._order()
         exact = self.judge.exact(setting)
         self._tell(exact)
-        self._order()
         self._tell(self.judge.settled(exact))
 
     def _tell(self, facts: Facts) -> None:
@@ -243,6 +243,9 @@ class Studio:
 
     def _show_points(self, _: Setting, points_m: Array) -> None:
         self.stage.show_points(points_m)
+
+    def _show_making(self, text: str, bad: bool) -> None:
+        self.controls.making.content = words.note_html(text, bad=bad) if text else ""
 
     def _show_scanner(self) -> None:
         self.stage.show_scanner(self.controls.scanner.value)

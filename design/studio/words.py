@@ -17,12 +17,12 @@ def facts_html(facts: Facts, log: bool) -> str:
     """The facts of the present setting; `log`: J is the mean of -ln(1 + d), whose differences are ratios."""
     state = "exact" if facts.exact else "dragging"
     rows = [
-        ("J", f"<b>{facts.J:.5f}</b> &plusmn; {facts.J_error:.0e}", state),
+        ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {facts.J_error:.0e}, {state}"),
         *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.standard.items()),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),
         ("never seen", f"{facts.blind_weight:.2%}", "of the weight"),
-        ("shortest turn", _period(facts), f"for {facts.density} per ball"),
+        ("shortest turn", _period(facts), f"{facts.density} per ball"),
     ]
     cells = "".join(
         f'<tr><td style="{CELL}">{name}</td><td style="{NUMBER}">{value}</td>'

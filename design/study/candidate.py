@@ -63,10 +63,11 @@ def search_record(loaded: LoadedTask) -> LoadedTask:
 
 
 def digest(loaded: LoadedTask) -> str:
-    """Of a record: all that decides its result, bearings included, and the name not."""
+    """Of a record: all that decides its result, bearings and belts included, and the name not."""
     nameless = replace(loaded, task=loaded.task.model_copy(update={"name": ANYBODY}))
-    bearings = "\n".join(bearing.model_dump_json() for bearing in loaded.products.bearings())
-    return hashlib.sha256(f"{nameless.sha256()}\n{bearings}".encode()).hexdigest()
+    choice = (*loaded.products.bearings(), *loaded.products.belts())
+    chosen_from = "\n".join(product.model_dump_json() for product in choice)
+    return hashlib.sha256(f"{nameless.sha256()}\n{chosen_from}".encode()).hexdigest()
 
 
 def search_of(loaded: LoadedTask) -> Result:

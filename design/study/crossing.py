@@ -154,10 +154,10 @@ def _check_motion(loaded: LoadedTask) -> None:
 
 
 def _trimmed(loaded: LoadedTask) -> LoadedTask:
-    """With no products but its own and the bearings: it goes over the wire."""
+    """With no products but its own, the bearings and the belts: it goes over the wire."""
     task = loaded.task
     names = [task.sensor, task.servo, task.slip_ring, task.printer]
-    names += [bearing.name for bearing in loaded.products.bearings()]
+    names += [product.name for product in (*loaded.products.bearings(), *loaded.products.belts())]
     return replace(loaded, products=Catalogue({name: loaded.products.products[name] for name in names if name}))
 
 

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 RETRIES = 1  # of an exception: our own errors are results, what is left may be the machine's
-AHEAD = 3  # units sent for each thread: none waits for the client
+AHEAD = 3  # units sent for each thread once the first is back: none waits for the client
 POLL_S = 0.02
 ALONE_S = 120.0  # without any worker: a nanny whose worker dies while it starts gives up
+AGAIN = "-again"
 TICK_S = 5.0  # between two words on a long silence
 
 
@@ -77,16 +78,21 @@ def run(
         else:
             yield done
     for same in suspects.values():
-        (again,) = _run(client, [same[0].unit], store, limit_s, ticked)
+        (again,) = _run(client, [same[0].unit], store, limit_s, ticked, AGAIN)
         yield again
         for _ in same[1:]:
             yield replace(again, seconds=None)
 
 
 def _run(
-    client: Client, units: Iterable[Unit], store: Store, limit_s: float, ticked: Callable[[int], None]
+    client: Client,
+    units: Iterable[Unit],
+    store: Store,
+    limit_s: float,
+    ticked: Callable[[int], None],
+    attempt: str = "",
 ) -> Iterator[Finished]:
-    """All units once."""
+    """All units once; `attempt` ends their keys: the client may not have forgotten yet how those of another ended."""
     from distributed import CancelledError, as_completed
     from distributed.comm import CommClosedError
 
@@ -96,9 +102,9 @@ def _run(
     ended = as_completed(loop=client.loop)
     last = seen = time.monotonic()
     threads = _threads(client)
-    more = True
+    more, ahead = True, 1
     while more or at_work:
-        while more and len(at_work) < AHEAD * max(1, threads):
+        while more and len(at_work) < ahead * max(1, threads):
             unit = next(waiting, None)
             if unit is None:
                 more = False
@@ -107,10 +113,11 @@ def _run(
             if known is not None:
                 yield Finished(unit, known, "", None, 0.0)
                 continue
-            if _key(unit) in at_work:
+            key = f"scanwright_{unit.kind}-{unit.address}{attempt}"
+            if key in at_work:
                 twins[unit.address] += 1
                 continue
-            future = _submit(client, unit, store, limit_s)
+            future = _submit(client, key, unit, store, limit_s)
             at_work[future.key] = unit
             ended.add(future)
         if not at_work:
@@ -123,6 +130,7 @@ def _run(
                 done = _taken(at_work.pop(future.key), future, store, limit_s)
             except (CommClosedError, CancelledError) as error:
                 raise BuildError(_gone(client)) from error
+            ahead = AHEAD  # not before: what the first have come to may rule out the next
             del future  # the cluster forgets the result
             yield done
             for _ in range(twins.pop(done.unit.address, 0)):
@@ -141,11 +149,7 @@ def _run(
                 )
 
 
-def _key(unit: Unit) -> str:
-    return f"scanwright_{unit.kind}-{unit.address}"
-
-
-def _submit(client: Client, unit: Unit, store: Store, limit_s: float) -> Future:
+def _submit(client: Client, key: str, unit: Unit, store: Store, limit_s: float) -> Future:
     try:
         return client.submit(
             do,
@@ -154,7 +158,7 @@ def _submit(client: Client, unit: Unit, store: Store, limit_s: float) -> Future:
             store.mark,
             identity(),
             limit_s,
-            key=_key(unit),
+            key=key,
             pure=True,
             retries=RETRIES,
         )

@@ -1,4 +1,4 @@
-"""What a study would cost, before it runs: from the unit costs that `benchmarks/study.py` has measured."""
+"""What a study would cost, before it runs: from the unit costs that `benchmarks/study` has measured."""
 
 from __future__ import annotations
 

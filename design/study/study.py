@@ -5,17 +5,17 @@ Every list multiplies the candidates; one that is left out leaves each task as i
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
+from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
 from design.errors import TaskError, suggest
 from design.motion import LONGEST_S
-from design.record import Record, explain
+from design.record import Record
+from design.shipped import named_record, names_in
 from design.study.columns import COLUMNS
 from design.task import AngleRanges, Limits, LoadedTask, load_task
 
@@ -100,12 +100,7 @@ def load_study(path: Path) -> LoadedStudy:
     Raises:
         TaskError: the file is missing or malformed, a task cannot be read, or a product is unknown.
     """
-    source = _find(path)
-    table = read_toml(source, "the study file")
-    try:
-        study = Study.model_validate(table)
-    except ValidationError as error:
-        raise TaskError(explain(error, source, Study)) from error
+    study, source = named_record(path, Study, SHIPPED, "study")
     products = load_catalogue(*(source.parent / extra for extra in study.catalogue))
     for field, kind in (("sensors", Lidar), ("servos", Servo), ("slip_rings", SlipRing), ("printers", Printer)):
         for name in getattr(study, field):
@@ -125,16 +120,7 @@ def load_study(path: Path) -> LoadedStudy:
 
 def shipped_studies() -> list[str]:
     """Names of the studies that come with the package."""
-    return _stems(SHIPPED.glob("*.toml"))
-
-
-def _find(path: Path) -> Path:
-    if path.suffix == ".toml" or path.is_file():
-        return path
-    named = SHIPPED / f"{path}.toml"
-    if path.parent == Path() and named.exists():
-        return named
-    raise TaskError(f"{path}: no such study file, and no shipped study of that name: {', '.join(shipped_studies())}")
+    return names_in(SHIPPED)
 
 
 def _task(source: Path, name: str) -> LoadedTask:
@@ -143,7 +129,3 @@ def _task(source: Path, name: str) -> LoadedTask:
         return load_task(beside if beside.is_file() or beside.suffix == ".toml" else Path(name))
     except TaskError as error:
         raise TaskError(f"{source}: tasks: {error}") from error
-
-
-def _stems(paths: Iterable[Path]) -> list[str]:
-    return sorted(path.stem for path in paths)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from firmware_io.calibration.edges import clear_of_edges
 from firmware_io.calibration.model import COUNT, LAG, MOUNT, Beams, Ints, Mount, rays
 from firmware_io.calibration.observable import Choice, check_fan, choose, several_speeds, spectrum
 from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, reduced, step, sums
@@ -17,6 +19,7 @@ from firmware_io.samples import Floats
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
 _NARROW = ((0.12, 3.0), (0.06, 2.0), (0.03, 1.0), (0.03, 1.0))
 _STEPS = 4
+_LAST_STEPS = 2  # with all beams, and again with those clear of edges
 _TRUST = 0.1  # times `near`: the standard deviation of tiles about planes that are wrong by up to `near`
 _ROUNDS = 2  # of grouping, with all beams
 _VAGUE_DEG, _LAST_VAGUE_DEG = 15.0, 45.0  # in the end misfits are found beam by beam
@@ -34,6 +37,7 @@ class Estimate:
         spectrum: singular values of their information, in units of their limits, shape (k,).
         tiles: what it was found from.
         grouping: their surfaces.
+        clear: which of their beams surely met these, and were used, shape (n,).
         noise_m: standard deviation of a range, after all.
         bulge_m: standard deviation of the walls from planes; 0 where the noise hides it.
     """
@@ -44,6 +48,7 @@ class Estimate:
     spectrum: Floats
     tiles: Tiles
     grouping: Grouping
+    clear: NDArray[np.bool_]
     noise_m: float
     bulge_m: float
 
@@ -71,16 +76,12 @@ def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
         held = np.setdiff1d(np.arange(COUNT), choice.free)
         x[held] = start[held]
         grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
-        on = grouping.surface[tiles.tile] >= 0
-        own, tile = tiles.beams.taken(on), tiles.tile[on]
-        weight = 1 / tiles.variance_m2[tile]
-        bulge = 0.0
-        for _ in range(_STEPS):
-            x, grouping, normal = _iterated(mount, x, choice.free, grouping, own, tile, weight, bulge)
-            grouping = without_misfits(grouping, misfits(normal, tiles.count), tiles.count)
-            bulge = bulge_m(normal, grouping)
-    part = reduced(normal, grouping, choice.free, bulge)
-    scale = float(np.average(misfits(normal, tiles.count)[grouping.used], weights=tiles.count[grouping.used]))
+        near = _refined(tiles, mount, x, choice.free, grouping, grouping.surface[tiles.tile] >= 0)
+        clear = clear_of_edges(mount, near.x, tiles, near.grouping, near.bulge_m)
+        last = _refined(tiles, mount, near.x, choice.free, near.grouping, clear)
+        x, grouping, normal = last.x, last.grouping, last.normal
+    part = reduced(normal, grouping, choice.free, last.bulge_m)
+    scale = float(np.average(misfits(normal, last.count)[grouping.used], weights=last.count[grouping.used]))
     return Estimate(
         x=x,
         choice=choice,
@@ -88,9 +89,37 @@ def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
         spectrum=spectrum(part, choice.free),
         tiles=tiles,
         grouping=grouping,
+        clear=clear,
         noise_m=tiles.noise_m * float(np.sqrt(scale)),
-        bulge_m=bulge,
+        bulge_m=last.bulge_m,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Refined:
+    """What some of the beams say: `count` of them in each tile."""
+
+    x: Floats
+    grouping: Grouping
+    normal: Floats
+    count: Ints
+    bulge_m: float
+
+
+def _refined(
+    tiles: Tiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
+) -> _Refined:
+    """Solve with some beams of the tiles, one by one; tiles that none is left of, or that do not fit, drop out."""
+    own, tile = tiles.beams.taken(which), tiles.tile[which]
+    weight = 1 / tiles.variance_m2[tile]
+    count = np.bincount(tile, minlength=tiles.count.size)
+    grouping = replace(grouping, surface=np.where(count > 0, grouping.surface, -1))
+    bulge = 0.0
+    for _ in range(_LAST_STEPS):
+        x, grouping, normal = _iterated(mount, x, free, grouping, own, tile, weight, bulge)
+        grouping = without_misfits(grouping, misfits(normal, count), count)
+        bulge = bulge_m(normal, grouping)
+    return _Refined(x, grouping, normal, count, bulge)
 
 
 def _coarse(

@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from design import frames
 from design.angles import AngleSet
 from design.errors import RecordingError
-from firmware_io.deskew import Verdict, judge
 from firmware_io.encoder import axis_curve
+from firmware_io.own_body import OwnBody
 from firmware_io.recording import Recording
 from firmware_io.samples import AxisCurve, Floats, Times
+from firmware_io.verdict import Verdict, judge
 
 Ints = NDArray[np.int64]
 _SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
@@ -119,10 +120,17 @@ class Beams:
 _COLUMNS = ("range_m", "bearing_rad", "joint_rad", "speed_rad_s", "recording", "place", "time_ns")
 
 
-def gather(recordings: Sequence[Recording], *, one_place: bool) -> tuple[Beams, dict[str, int]]:
-    """All beams that returned and have an angle, and how many were left out, reason by reason.
+def gather(
+    recordings: Sequence[Recording], *, one_place: bool, own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0
+) -> tuple[Beams, dict[str, int]]:
+    """All beams that returned from the scene and have an angle, and how many were left out, reason by reason.
 
-    `one_place`: the scanner stood still from the first recording to the last, so that all show one scene.
+    Args:
+        recordings: of scenes that stand still.
+        one_place: the scanner stood still from the first recording to the last, so that all show one scene.
+        own_body: beams that end on the scanner. Its parts turn with the beams that see them: to a calibration they
+            are walls that agree with every error.
+        gamma_rot_rad: axis angle at joint position 0, from where the mask counts.
     """
     ranges, bearings, numbers, times = [], [], [], []
     verdicts = np.zeros(len(Verdict), np.int64)
@@ -130,8 +138,7 @@ def gather(recordings: Sequence[Recording], *, one_place: bool) -> tuple[Beams, 
     for k, (recording, curve) in enumerate(zip(recordings, curves, strict=True)):
         for scan in recording.scans():
             time_ns = scan.time_ns
-            inside = (time_ns >= curve.knot_ns[0]) & (time_ns <= curve.knot_ns[-1])
-            verdict = judge(scan, np.where(inside, 0.0, np.nan))
+            verdict = judge(scan, curve.angle_at(time_ns), own_body, gamma_rot_rad)
             verdicts += np.bincount(verdict, minlength=len(Verdict))
             good = verdict == Verdict.POINT
             ranges.append(scan.range_m[good].astype(float))

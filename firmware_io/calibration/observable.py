@@ -21,6 +21,7 @@ from firmware_io.samples import Floats
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
 FLATTEST_FAN_RAD = np.radians(3.0)
 _TWICE = 0.05  # share of the beams
+_INSIDE = "half of it, divided by the speed, is inside the time offset"
 _ONE_LINE = 0.01  # share of the surface that faces across it
 
 
@@ -108,6 +109,8 @@ def choose(beams: Beams, tiles: Tiles, grouping: Grouping, normal: Floats) -> Ch
                 f"found together with the others, {PARAMETERS[worst].words} would be known to "
                 f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
             )
+            if group == model.BACKLASH and model.LAG[0] in free:
+                why += f"; {_INSIDE}"
         held.append(Held(tuple(PARAMETERS[k].name for k in group), _words(group), why))
     share = _facing(tiles, grouping)[0]
     notes = []
@@ -144,7 +147,7 @@ def _motion(beams: Beams, group: tuple[int, ...]) -> str:
     moving = np.abs(beams.speed_rad_s[beams.way != 0])
     slow, fast = np.percentile(moving, [5, 95])
     if group == model.BACKLASH and fast < 1.2 * slow:
-        return "both ways at one speed: half of it, divided by the speed, is inside the time offset"
+        return f"both ways at one speed: {_INSIDE}"
     return ""
 
 

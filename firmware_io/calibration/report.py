@@ -34,7 +34,7 @@ class Fit:
 def fit_of(found: Estimate, mount: Mount, x: Floats) -> Fit:
     """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
     tiles, grouping = found.tiles, found.grouping
-    on = grouping.surface[tiles.tile] >= 0
+    on = found.clear
     beams, tile = tiles.beams.taken(on).late_by(x[LAG[0]]), tiles.tile[on]
     weight = np.ones(tile.size)
     grouping = planes_alone(mount, x, beams, tile, weight / found.noise_m**2, grouping)
@@ -65,11 +65,11 @@ def report(found: Estimate, start: Floats, mount: Mount, beams: Beams, witness: 
     applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
     fits = {"before": start, "after": found.x, "as_assembled": applied}
     fit = {name: fit_of(found, mount, x) for name, x in fits.items()}
-    used = int(found.tiles.count[found.grouping.used].sum())
     return {
         "schema": "scanwright/calibration/1",
         "beams": int(beams.range_m.size),
-        "beams_used": used,
+        "beams_used": int(found.clear.sum()),
+        "beams_at_edges": int(found.tiles.count[found.grouping.used].sum() - found.clear.sum()),
         "surfaces": len(found.grouping.q),
         "parameters": [
             {
@@ -110,8 +110,11 @@ def report(found: Estimate, start: Floats, mount: Mount, beams: Beams, witness: 
 
 def lines(record: dict[str, Any]) -> Iterator[str]:
     """The record for a person."""
+    for reason, count in record["left_out"].items():
+        yield f"left out {count:,} beams: {reason.replace('_', ' ')}"
     yield (
-        f"{record['beams_used']:,} of {record['beams']:,} beams see {record['surfaces']} flat surfaces; "
+        f"{record['beams_used']:,} of {record['beams']:,} beams see {record['surfaces']} flat surfaces, "
+        f"{record['beams_at_edges']:,} more lie near edges; "
         f"noise of a range {record['range_noise_mm']:.1f} mm, walls bulge {record['wall_bulge_mm']:.1f} mm"
     )
     for one in record["parameters"]:

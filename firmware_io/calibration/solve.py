@@ -207,6 +207,7 @@ def covariance(part: Reduced) -> Floats:
 def bulge_m(normal: Floats, grouping: Grouping) -> float:
     """How far spots stand off their planes, beyond what noise does: standard deviation, from the median."""
     spot, _ = _per_spot(grouping, normal[:, _U, [_U, _E]])
+    spot = spot[spot[:, 0] > 0]  # those seen at grazing angles only have nothing to say
     square, noise = (spot[:, 1] / spot[:, 0]) ** 2, 1 / spot[:, 0]
     low, high = 0.0, float(square.max())
     for _ in range(60):
@@ -220,7 +221,7 @@ def bulge_m(normal: Floats, grouping: Grouping) -> float:
 
 def misfits(normal: Floats, beams: Ints) -> Floats:
     """Mean squared residual of each tile, in units of its variance, shape (m,); `beams` in each of them."""
-    return normal[:, _E, _E] / beams
+    return normal[:, _E, _E] / np.maximum(beams, 1)
 
 
 def planes_alone(mount: Mount, x: Floats, beams: Beams, tile: Ints, weight: Floats, grouping: Grouping) -> Grouping:

@@ -40,6 +40,7 @@ def group(tiles: Tiles, mount: Mount, x: Floats, near_m: float, turn_rad: float,
     limit = np.cos(turn_rad + 2.5 * tiles.normal_sd_rad)
     place = tiles.middle.place
     surface = np.full(weight.size, -1)
+    done = np.zeros(weight.size, bool)
     planes: list[Floats] = []
     rng = np.random.default_rng(0)
     free = np.flatnonzero(tiles.normal_sd_rad < vague_rad)
@@ -67,7 +68,8 @@ def group(tiles: Tiles, mount: Mount, x: Floats, near_m: float, turn_rad: float,
                 surface[members] = len(planes)
                 planes.append(n / c)
             alone = np.append(alone, members)
-        free = np.setdiff1d(free, alone)
+        done[alone] = True
+        free = free[~done[free]]
     if not planes:
         raise RecordingError("no flat patches lie in one plane: a calibration needs walls, floors or other planes")
     cells = np.floor(point / _SPOT_M).astype(np.int64)
@@ -96,7 +98,7 @@ def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping
         misfit: of each tile, mean squared residual in units of its variance, shape (m,).
         beams: of each tile, shape (m,).
     """
-    chance = 1 + _MISFIT * np.sqrt(2 / beams)
+    chance = 1 + _MISFIT * np.sqrt(2 / np.maximum(beams, 1))
     return replace(grouping, surface=np.where(misfit < chance, grouping.surface, -1))
 
 

@@ -1,0 +1,86 @@
+"""Beams near edges: where two surfaces meet, nobody can tell which of them a beam met.
+
+A tile that reaches over an edge by a little is as flat as its neighbours, and what its last beams see on the other
+side pulls at its plane, the same way however many beams there are: with more beams the noise shrinks and this pull
+does not. So beams are left out by geometry alone, which no noise moves: those for which another surface lies within
+`_APART` standard deviations of their own. Those further over the edge then stand out, and are left out by `_OUT`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from firmware_io.calibration.model import Ints, Mount, rays
+from firmware_io.calibration.solve import Grouping
+from firmware_io.calibration.tiles import Tiles
+from firmware_io.samples import Floats
+
+_APART = 6.0
+_OUT = 4.0  # 2 % of the beams that are 6 off come this near, and 1 of 16,000 that belong go with them
+_ACROSS = np.cos(np.radians(10.0))  # surfaces more alike than that are pieces of one
+_REACH_M = 1.0  # from a tile's middle to the edge of its surface
+
+
+def clear_of_edges(mount: Mount, x: Floats, tiles: Tiles, grouping: Grouping, bulge_m: float) -> NDArray[np.bool_]:
+    """Whether each beam of the tiles surely met the surface of its tile, shape (n,); `False` where that has none."""
+    tile = tiles.tile
+    surface = grouping.surface[tile]
+    on = np.flatnonzero(surface >= 0)
+    tile, surface, beams = tile[on], surface[on], tiles.beams.taken(on).under(x)
+    origin, direction = rays(mount, x, beams)
+    length = np.linalg.norm(grouping.q, axis=1)
+    slant = np.sum(grouping.q[surface] * direction, axis=1)
+    met_m = (1 - np.sum(grouping.q[surface] * origin, axis=1)) / slant
+    sd_m = np.sqrt(tiles.variance_m2[tile] + (bulge_m * length[surface] / slant) ** 2)
+    clear = np.abs(beams.range_m + x[4] - met_m) < _OUT * sd_m
+    low_m, high_m, place = _boxes(mount, x, tiles, grouping)
+    clear &= ~_crossed(
+        origin, direction, met_m, surface, grouping.q, grouping.q / length[:, None], place, low_m, high_m, _APART * sd_m
+    )
+    whole = np.zeros(tiles.tile.size, bool)
+    whole[on] = clear
+    return whole
+
+
+def _boxes(mount: Mount, x: Floats, tiles: Tiles, grouping: Grouping) -> tuple[Floats, Floats, Ints]:
+    """Where each surface has been seen, shapes (s, 3) and (s, 3), and from which place, shape (s,)."""
+    used = grouping.used
+    middle = tiles.middle.taken(used).under(x)
+    origin, direction = rays(mount, x, middle)
+    point = origin + (middle.range_m + x[4])[:, None] * direction
+    surface = grouping.surface[used]
+    low_m, high_m = np.full(grouping.q.shape, np.inf), np.full(grouping.q.shape, -np.inf)
+    np.minimum.at(low_m, surface, point - _REACH_M)
+    np.maximum.at(high_m, surface, point + _REACH_M)
+    place = np.full(len(grouping.q), -1)
+    place[surface] = middle.place
+    return low_m, high_m, place
+
+
+@njit(cache=True, nogil=True)
+def _crossed(origin, direction, met_m, surface, q, normal, place, low_m, high_m, close_m):  # type: ignore[no-untyped-def]
+    out = np.zeros(met_m.size, np.bool_)
+    for i in range(met_m.size):
+        s = surface[i]
+        x, y, z = origin[i]
+        u, v, w = direction[i]
+        px, py, pz = x + met_m[i] * u, y + met_m[i] * v, z + met_m[i] * w
+        for t in range(len(q)):
+            if t == s or place[t] != place[s]:
+                continue
+            if not (
+                low_m[t, 0] < px < high_m[t, 0] and low_m[t, 1] < py < high_m[t, 1] and low_m[t, 2] < pz < high_m[t, 2]
+            ):
+                continue
+            a, b, c = q[t]
+            # |r_t - r_s| < close, without the division: beams may run along the other plane
+            slant = a * u + b * v + c * w
+            if abs(1.0 - (a * px + b * py + c * pz)) >= close_m[i] * abs(slant):
+                continue
+            if abs(normal[s, 0] * normal[t, 0] + normal[s, 1] * normal[t, 1] + normal[s, 2] * normal[t, 2]) > _ACROSS:
+                continue
+            out[i] = True
+            break
+    return out
