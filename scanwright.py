@@ -102,7 +102,7 @@ def build(
 
 def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Finding, ...]]:
     """Make the build folder of a task."""
-    from cad.build import build_parts
+    from cad.build import build_parts, write_files
     from cad.deck import mount_offset_mm
     from cad.kernel import require_kernel
     from design import build as writer
@@ -111,14 +111,16 @@ def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Find
     from design.picture import density_picture
     from design.report.page import write_report
     from design.scanner import scanner_of
+    from design.second import second_process
     from design.shadowed import choose
 
-    with fresh_folder(target) as work:
+    with fresh_folder(target) as work, second_process() as begin:
+        begin(require_kernel)  # it loads while the search runs
         optimum = optimum_of(asked, _say)
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         require_kernel()
-        from cad.checks.run import check_parts
+        from cad.checks.run import check_files
         from cad.exports import export_scanner
         from cad.shadow import PartsWorkshop
 
@@ -131,13 +133,14 @@ def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Find
         offset = mount_offset_mm(scanner_of(angles, loaded.task.printer, loaded.products, loaded.task.deck))
         angles = angles.model_copy(update={"t_world_rot_mm": offset})
         scanner = scanner_of(angles, loaded.task.printer, loaded.products, loaded.task.deck)
+        checked = begin(check_files, scanner, workshop.assembly(scanner), _say)
         made = build_parts(scanner, work, _say, workshop.assembly)
-        exported = export_scanner(scanner, made, work, _say)
-        check_parts(scanner, made, work, _say)
+        exported = export_scanner(scanner, made, work, _say, begin)
         _say("drawing density.png")
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {s.J:.3f}": writer.standard_settings()[name] for name, s in optimum.standard.items()}
         density_picture(work / "density.png", problem, settings, optimum.title)
+        write_files(work, checked())
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         writer.write_task(work, asked)
         writer.write_search(work, result)
@@ -145,7 +148,7 @@ def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Find
         write_manifest(work, asked, [asdict(part) for part in made.parts])
         _say("writing report.html")
         write_report(work)
-    return optimum, chosen, made.findings
+    return optimum, chosen, (*made.findings, *exported.findings)
 
 
 def _check_build(folder: Path) -> None:
@@ -702,10 +705,21 @@ def register(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write.")],
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read, or a recording (.mcap).")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
 ) -> None:
-    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold."""
+    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
+
+    A recording becomes a ROS 1 bag where OUT ends in .bag, else a ROS 2 bag in sqlite3.
+    """
+    if source.suffix == ".mcap":
+        from firmware_io.bag_out import export_bag
+
+        exported = export_bag(source, target)
+        for topic, kind in exported.unknown.items():
+            print(f"note: left out {topic}: this ROS has no {kind}")
+        print(f"wrote {', '.join(f'{count:,} of {topic}' for topic, count in exported.written.items())} to {target}")
+        return
     from firmware_io.cloud_files import read_clouds, write_clouds
 
     clouds, unread = read_clouds(source)
@@ -728,12 +742,19 @@ def calibrate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed."""
+    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
+
+    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    """
     from design.angles import load_angles
     from firmware_io.calibrate import calibrate_recordings, report_path
     from firmware_io.calibration.report import lines
+    from firmware_io.own_body import own_body_beside
 
-    record = calibrate_recordings(recordings, load_angles(angles), out, one_place=one_place, say=_say)
+    own_body = own_body_beside(angles)
+    record = calibrate_recordings(
+        recordings, load_angles(angles), out, one_place=one_place, own_body=own_body, say=_say
+    )
     if as_json:
         _print_json(record)
         return

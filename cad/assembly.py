@@ -14,14 +14,12 @@ import cadquery as cq
 
 from cad import bought, solids
 from cad.deck import Deck, deck_of
+from cad.drive import Drive, drive_of
+from cad.head import Head
 from cad.mesh import Mesh, mesh_of
 from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of
-from cad.parts.bearing_cage import bearing_cage, cage_base, cage_of
-from cad.parts.servo_shaft import servo_shaft, shaft_of
-from cad.parts.slip_ring_adapter import adapter_of, slip_ring_adapter
 from cad.parts.sub_plate import sub_plate, sub_plate_of
-from cad.sizing import Stack, stack_of
 from design.scanner import Scanner
 
 PRINTED, TURNED = (0.93, 0.45, 0.10), (0.75, 0.76, 0.78)
@@ -32,23 +30,44 @@ BOUGHT = {
     "lidar": (0.20, 0.23, 0.27),
     "bearing_inner": STEEL,
     "bearing_outer": STEEL,
+    "bearing_inner_upper": STEEL,
+    "bearing_outer_upper": STEEL,
+    "bearing_inner_lower": STEEL,
+    "bearing_outer_lower": STEEL,
+    "belt": (0.10, 0.10, 0.11),
 }
 WINDOW = (0.35, 0.05, 0.08)
 
 
-TURNING = ("servo_shaft", "alignment_linkage", "sub_plate", "servo_horn", "ring_rotor", "bearing_inner", "lidar")
+TURNING = (
+    "servo_shaft",
+    "main_shaft",
+    "shaft_pulley",
+    "shaft_ring",
+    "alignment_linkage",
+    "sub_plate",
+    "servo_horn",
+    "ring_rotor",
+    "bearing_inner",
+    "lidar",
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
     """Solids by name: `made` are the parts of this project. Rotation frame, mm."""
 
-    stack: Stack
+    drive: Drive
     deck: Deck
     linkage: AlignmentLinkage
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
     _meshes: dict[str, Mesh] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def stack(self) -> Head:
+        """Every number that more than one part needs."""
+        return self.drive.stack
 
     def mesh(self, name: str) -> Mesh:
         """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
@@ -60,17 +79,21 @@ class Assembly:
         """Of all parts by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
 
+    def outlines(self) -> dict[str, Mesh]:
+        """Of all parts by name, as they look from outside while they turn."""
+        return self.meshes() | {name: mesh_of(solid) for name, solid in self.drive.sweeps().items()}
+
     def standing_parts(self) -> list[str]:
         """Names of the made parts that stand still."""
         return [name for name in self.made if not turns(name)]
 
     def turning_parts(self) -> list[str]:
-        """Names of the made parts that turn with the horn."""
+        """Names of the made parts that turn about the axis."""
         return [name for name in self.made if turns(name)]
 
 
 def turns(name: str) -> bool:
-    """Whether a part, made or bought, turns with the horn."""
+    """Whether a part, made or bought, turns about the axis."""
     return name.startswith(TURNING)
 
 
@@ -80,37 +103,23 @@ def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True)
     Raises:
         BuildError: a part cannot be made; the message names part, feature, parameter and value.
     """
-    stack = stack_of(scanner)
-    deck = deck_of(scanner, stack)
-    shaft, linkage = shaft_of(scanner, stack), linkage_of(scanner, stack)
-    made: dict[str, Callable[[], cq.Solid]] = {"servo_shaft": lambda: servo_shaft(shaft)}
-    cage = cage_of(scanner, stack)
-    if scanner.slip_ring is not None:
-        made["slip_ring_adapter"] = lambda: slip_ring_adapter(adapter_of(scanner, stack))
-    elif cage is not None:
-        made["cage_base"] = partial(cage_base, cage)
-    if cage is not None:
-        made["bearing_cage"] = partial(bearing_cage, cage)
+    drive = drive_of(scanner)
+    stack = drive.stack
+    deck, linkage = deck_of(scanner, stack), linkage_of(scanner, stack)
+    made: dict[str, Callable[[], cq.Solid]] = {**drive.made()}
     made["alignment_linkage"] = lambda: alignment_linkage(linkage)
     between = sub_plate_of(scanner, stack)
     if between is not None:
         made["sub_plate"] = partial(sub_plate, between)
     if not deck.flat:
-        made["base_mount"] = lambda: base_mount(mount_of(scanner, stack, deck))
-    others = {
-        "servo_case": bought.servo_case(scanner.servo, stack),
-        "servo_horn": bought.servo_horn(scanner.servo, stack, shaft),
-    }
-    if scanner.slip_ring is not None:
-        others |= bought.ring_solids(stack)
-    if stack.bearing is not None:
-        others |= bought.bearing_solids(stack.bearing, stack)
+        made["base_mount"] = lambda: base_mount(mount_of(scanner, deck))
+    others = {**drive.bought()}
     T = scanner.angles.T_rot_laser()
     optical = solids.location(stack.R(), T[:3, 3] * 1000)
     base = optical * cq.Location(cq.Vector(0, 0, -scanner.lidar.optical_height_mm))
     others |= {name: solid.moved(base) for name, solid in bought.lidar_solids(scanner.lidar).items()}
     return Assembly(
-        stack,
+        drive,
         deck,
         linkage,
         {name: make() for name, make in made.items() if wanted(name)},
@@ -135,6 +144,6 @@ def colour_of(name: str) -> tuple[float, float, float]:
     """SRGB colour of a part, made or bought."""
     if name == "lidar_window":
         return WINDOW
-    if name == "servo_shaft":
+    if name in ("servo_shaft", "main_shaft"):
         return TURNED
     return BOUGHT.get(name, BOUGHT.get(name.split("_")[0], PRINTED))

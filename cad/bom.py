@@ -12,9 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from cad.assembly import Assembly
+from cad.drive import Drive
 from cad.joints import Joint
+from cad.remarks import products_of
 from cad.screws import INSERT_LENGTH, SCREWS
-from design.catalogue import Bearing, Lidar, Servo, SlipRing
+from design.catalogue import Bearing, Belt, Lidar, Servo, SlipRing
 from design.scanner import Scanner
 
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
@@ -104,10 +106,9 @@ def items_of(
         how = "aluminium or steel, after" if part in turned else f"{scanner.printer.name}, solid, from"
         note = f"{how} {file}; drawing drawings/{part}.pdf"
         items.append(Item(made, part, number, 1, mass_g=round(masses_g[part], 1), note=note))
-    products = [scanner.lidar, scanner.servo, scanner.slip_ring, assembly.stack.bearing]
-    items += [_bought(product) for product in products if product is not None]
+    items += _products(scanner, assembly.drive)
     items += _screws(joints)
-    items += _wiring(scanner)
+    items += _wiring(scanner, assembly.drive)
     return [*items, _total(items)]
 
 
@@ -122,18 +123,25 @@ def bom_text(items: list[Item]) -> str:
     return text.getvalue()
 
 
-def _bought(product: Lidar | Servo | SlipRing | Bearing) -> Item:
+def _products(scanner: Scanner, drive: Drive) -> Iterator[Item]:
+    for product in products_of(scanner, drive):
+        if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
+            number = drive.order_number(product)
+            yield _bought(product, max(1, drive.products().count(product)), number)
+
+
+def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> Item:
     origin = product.provenance().get("price_usd")
     price = product.price_usd
     return Item(
         kind="bought",
         part=product.kind.replace("_", " "),
-        number=product.name,
-        quantity=1,
+        number=number,
+        quantity=quantity,
         supplier=product.maker,
-        supplier_number=product.name,
+        supplier_number=number,
         unit_usd=price,
-        total_usd=price,
+        total_usd=None if price is None else quantity * price,
         mass_g=product.mass_g,
         source=origin.source if origin is not None else "",
         verified="" if origin is None else "yes" if origin.verified else "no",
@@ -147,7 +155,7 @@ def _screws(joints: list[Joint]) -> Iterator[Item]:
     inserts: dict[str, int] = {}
     for joint in joints:
         screws.setdefault(joint.number, []).append(joint)
-        if joint.fixing in ("nut", "deck"):
+        if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name] = nuts.get(joint.screw.name, 0) + joint.count
         if joint.inserts:
             inserts[joint.screw.name] = inserts.get(joint.screw.name, 0) + joint.count
@@ -163,7 +171,7 @@ def _screws(joints: list[Joint]) -> Iterator[Item]:
         yield Item("insert", "heat-set insert", name, count, source="holes of the solids", note=note)
 
 
-def _wiring(scanner: Scanner) -> Iterator[Item]:
+def _wiring(scanner: Scanner, drive: Drive) -> Iterator[Item]:
     yield Item("wiring", "power supply, 12 V", quantity=1, source=PAPER, note="price unknown")
     for product in (scanner.lidar, scanner.servo):
         needs = WIRING.get(product.name)
@@ -175,13 +183,8 @@ def _wiring(scanner: Scanner) -> Iterator[Item]:
             yield Item("wiring", part, quantity=quantity, source=source, note="price unknown")
     if scanner.slip_ring is not None:
         circuits = scanner.slip_ring.circuits
-        yield Item(
-            "wiring",
-            "cable tie around the ring's stator",
-            quantity=1,
-            source="groove of the adapter",
-            note="price unknown",
-        )
+        for part, source in drive.wiring():
+            yield Item("wiring", part, quantity=1, source=source, note="price unknown")
         part = "plug, socket and heat shrink for the leads of the slip ring"
         yield Item(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"

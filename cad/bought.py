@@ -11,7 +11,6 @@ import math
 import cadquery as cq
 
 from cad import solids
-from cad.parts.servo_shaft import ServoShaft
 from cad.screws import SCREWS
 from cad.sizing import Stack
 from design.catalogue import Bearing, Lidar, Servo
@@ -40,10 +39,9 @@ def lidar_solids(lidar: Lidar) -> dict[str, cq.Solid]:
     return parts
 
 
-def servo_case(servo: Servo, stack: Stack) -> cq.Solid:
-    """The case with recesses down to the planes of its front and rear holes."""
+def servo_case(servo: Servo, z: float) -> cq.Solid:
+    """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    z = stack.horn
     recesses = [
         solids.upright(EAR_ROOM, z + servo.case_holes_z_mm, z + z1 + 1.0, *hole) for hole in servo.case_holes_mm
     ]
@@ -54,13 +52,12 @@ def servo_case(servo: Servo, stack: Stack) -> cq.Solid:
     return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
 
 
-def servo_horn(servo: Servo, stack: Stack, shaft: ServoShaft) -> cq.Solid:
-    """The horn's disc with its threaded holes and boss; it turns with the shaft."""
-    z = stack.horn
+def servo_horn(servo: Servo, z: float) -> cq.Solid:
+    """The horn's disc with its threaded holes and boss, its face at height z."""
     disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
     radius = SCREWS[servo.horn_screw].nominal / 2
     depth = min(servo.horn_thread_depth_mm, servo.horn_thickness_mm)
-    centres = solids.polygon(shaft.circle / 2, shaft.holes, math.radians(90.0 + shaft.first_hole_deg))
+    centres = solids.polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
     disc = disc.cut(*(solids.upright(radius, z - depth, z + 1.0, float(x), float(y)) for x, y in centres))
     if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
         disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))
@@ -78,10 +75,10 @@ def ring_solids(stack: Stack) -> dict[str, cq.Solid]:
     return {"ring_stator": stator.Solids()[0], "ring_rotor": rotor.Solids()[0]}
 
 
-def bearing_solids(bearing: Bearing, stack: Stack) -> dict[str, cq.Solid]:
-    """Inner and outer ring; the balls between them are left out."""
+def bearing_solids(bearing: Bearing, high: float) -> dict[str, cq.Solid]:
+    """Inner and outer ring, their upper face at a height; the balls between them are left out."""
     inner, outer = bearing.bore_mm / 2, bearing.outer_mm / 2
     wall = 0.3 * (outer - inner)
-    low, high = stack.bearing_top - bearing.width_mm, stack.bearing_top
+    low = high - bearing.width_mm
     bodies = {"bearing_inner": (inner, inner + wall), "bearing_outer": (outer - wall, outer)}
     return {name: solids.lathe([(a, low), (b, low), (b, high), (a, high)]) for name, (a, b) in bodies.items()}

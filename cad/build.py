@@ -10,13 +10,13 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cad.deck import deck_of
+from cad.drive import drive_of
 from cad.findings import Finding
 from cad.kernel import require_kernel
 from cad.remarks import findings_of, left_out_of
-from cad.sizing import stack_of
 from design.errors import BuildError
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -75,8 +75,8 @@ def build_parts(
     Raises:
         BuildError: a part cannot be made, or the angle set names another place of the optical centre.
     """
-    stack = stack_of(scanner)  # refuse what cannot be built before seconds go into the kernel
-    deck = deck_of(scanner, stack)
+    drive = drive_of(scanner)  # refuse what cannot be built before seconds go into the kernel
+    deck = deck_of(scanner, drive.stack)
     _check_offset(scanner, deck.t_world_rot)
     progress("loading the CAD kernel")
     require_kernel()
@@ -105,15 +105,15 @@ def build_parts(
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(scanner, assembly)
     meshes = {"servo": assembly.standing_parts(), "rot": assembly.turning_parts()}
-    files["scanner.urdf"] = urdf_text(scanner, stack, bodies, meshes).encode("utf-8")
+    files["scanner.urdf"] = urdf_text(scanner, drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
     return PartsResult(
         assembly=assembly,
         meshes=meshes_of_parts,
         t_world_rot_mm=deck.t_world_rot,
         parts=tuple(reports),
-        findings=findings_of(scanner, assembly, bodies),
-        left_out=(*left_out_of(scanner, stack, deck), *(_no_label(name) for name in labels.without)),
+        findings=(*findings_of(scanner, assembly, bodies), *labels.findings),
+        left_out=(*left_out_of(drive, deck), *labels.left_out),
         files=tuple(sorted(files)),
     )
 
@@ -128,7 +128,11 @@ def write_files(folder: Path, files: dict[str, bytes]) -> None:
 
 def config_hash(scanner: Scanner) -> str:
     """Twelve hex digits of everything that shapes the parts: angles, products, and the name on their labels; not J."""
-    angles = scanner.angles
+    angles, drive = scanner.angles, drive_of(scanner)
+    # the journal's bearing has had its place in the list since before there were others
+    others: list[dict[str, Any] | None] = [
+        product.model_dump() for product in drive.products() if product != drive.stack.bearing
+    ]
     content = {
         "task": angles.task,
         "angles": angles.angles_deg.model_dump(),
@@ -136,8 +140,9 @@ def config_hash(scanner: Scanner) -> str:
         "deck": None if scanner.deck is None else scanner.deck.model_dump(),
         "products": [
             None if product is None else product.model_dump()
-            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, stack_of(scanner).bearing, scanner.printer)
-        ],
+            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, drive.stack.bearing, scanner.printer)
+        ]
+        + others,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]
 
@@ -149,24 +154,11 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     """
     from cad import mass
 
-    stack, servo, lidar, ring = assembly.stack, scanner.servo, scanner.lidar, scanner.slip_ring
+    lidar = scanner.lidar
     own = {name: mass.of_solid(s, _density(name, scanner, assembly)) for name, s in assembly.made.items()}
-    case = ((*servo.case_min_mm[:2], servo.case_min_mm[2] + stack.horn), (*servo.case_max_mm[:2], stack.horn))
-    standing = [own[name] for name in assembly.standing_parts()]
-    standing.append(mass.of_box(servo.mass_g, *case))
-    turning = [own[name] for name in assembly.turning_parts()]
-    if ring is not None:
-        r = stack.ring_radius
-        half = mass.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top))
-        standing.append(half)
-        turning.append(half)
-    if stack.bearing is not None:
-        r = stack.bearing.outer_mm / 2
-        half = mass.of_box(
-            stack.bearing.mass_g / 2, (-r, -r, stack.bearing_top - stack.bearing.width_mm), (r, r, stack.bearing_top)
-        )
-        standing.append(half)
-        turning.append(half)
+    bought_standing, bought_turning = assembly.drive.weights()
+    standing = [*(own[name] for name in assembly.standing_parts()), *bought_standing]
+    turning = [*(own[name] for name in assembly.turning_parts()), *bought_turning]
     x, y, z = lidar.body_mm
     base = -lidar.optical_height_mm
     laser = mass.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
@@ -175,9 +167,8 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
 
 def _density(name: str, scanner: Scanner, assembly: Assembly) -> float:
     from cad.loads import ALUMINIUM_G_CM3
-    from cad.remarks import shaft_is_turned
 
-    if name == "servo_shaft" and shaft_is_turned(assembly.stack):
+    if name in assembly.drive.turned():
         return ALUMINIUM_G_CM3
     return scanner.printer.density_g_cm3
 
@@ -186,10 +177,6 @@ def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
     return PartReport(name, round(volume, 3), round(volume * density / 1000, 3), box, len(mesh.faces))
-
-
-def _no_label(name: str) -> LeftOut:
-    return LeftOut(f"label of {name}", "none of its flat faces has room for one", 1, "labels")
 
 
 def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cad.carried import Carried
+from cad.drive import drive_of
+from cad.head import Head
 from cad.screws import SCREWS, Screw
-from cad.sizing import Stack, rotor_radius, stack_of
+from cad.sizing import rotor_radius
 from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
 from design.frames import Array
@@ -43,7 +46,7 @@ class Deck:
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
-    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold the case
+    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold what the mount carries
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
@@ -60,12 +63,12 @@ def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
     Raises:
         BuildError: the scanner cannot be built, as for `stack_of`.
     """
-    return deck_of(scanner, stack_of(scanner)).t_world_rot
+    return deck_of(scanner, drive_of(scanner).stack).t_world_rot
 
 
-def deck_of(scanner: Scanner, stack: Stack) -> Deck:
+def deck_of(scanner: Scanner, stack: Head) -> Deck:
     """Lay the deck so that rotor, ring, case and mount stay clear of it, rounded up to whole millimetres."""
-    servo, pattern = scanner.servo, scanner.deck or USUAL
+    carried, pattern = drive_of(scanner).carried(), scanner.deck or USUAL
     screw = SCREWS[pattern.screw]
     R = scanner.angles.T_world_rot(0.0)[:3, :3]
     R = np.where(np.abs(R) < 1e-12, 0.0, R)
@@ -73,17 +76,16 @@ def deck_of(scanner: Scanner, stack: Stack) -> Deck:
     normal = -R[2] if hangs else R[2]
     deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # to the left of x, seen from the room
     along = R[0]
-    holes = _corner_holes(servo.case_rear_holes_mm)
+    holes = carried.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
     half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
-    rear = stack.horn + servo.case_min_mm[2]
-    back = np.array([0.0, (max(ys) + min(ys)) / 2, rear - PLUG_GAP])
-    flat = scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
+    back = np.array([0.0, (max(ys) + min(ys)) / 2, carried.rear - PLUG_GAP])
+    flat = carried.stands_alone and scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
     if flat:
-        centre = np.array([0.0, 0.0, rear])
+        centre = np.array([0.0, 0.0, carried.rear])
     else:
-        height = _height_of_back(scanner, stack, normal, back, half)
-        centre = back - height * normal + _foot_shift(scanner, holes, deck_holes, back, normal, R[0], height)
+        height = _height_of_back(scanner, stack, carried, normal, back, half)
+        centre = back - height * normal + _foot_shift(scanner, carried, deck_holes, back, normal, R[0], height)
     offset = -R @ centre
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
@@ -102,30 +104,26 @@ def deck_of(scanner: Scanner, stack: Stack) -> Deck:
     )
 
 
-def _height_of_back(scanner: Scanner, stack: Stack, normal: Array, back: Array, half: tuple[float, float]) -> float:
+def _height_of_back(
+    scanner: Scanner, stack: Head, carried: Carried, normal: Array, back: Array, half: tuple[float, float]
+) -> float:
     """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
-    servo = scanner.servo
-    low, high = servo.case_min_mm, servo.case_max_mm
-    case = [(x, y, stack.horn + z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
     plate = [
         (sx * half[0], back[1] + sy * half[1], back[2] - depth)
         for sx in (1, -1)
         for sy in (1, -1)
         for depth in (0.0, BACK_THICKNESS)
     ]
-    below = [float(-(np.array(point) @ normal)) for point in (*case, *plate)]
+    below = [float(-(np.array(point) @ normal)) for point in (*carried.corners, *plate)]
     sideways = float(np.hypot(normal[0], normal[1]))
-    around, top = max(stack.ring_radius + 8.0, stack.hub_radius), stack.ring_top  # with the adapter's arms
-    if stack.bearing is not None:
-        around, top = stack.cage_outer + 4.0, stack.cage_top  # with the heads of its screws
-    below += [around * sideways - z * float(normal[2]) for z in (stack.horn, top)]
+    below += [around * sideways - z * float(normal[2]) for around, z in carried.discs]
     below.append(rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN)
     return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
 
 
 def _foot_shift(
     scanner: Scanner,
-    holes: tuple[tuple[float, float], ...],
+    carried: Carried,
     deck_holes: tuple[tuple[float, float], ...],
     back: Array,
     normal: Array,
@@ -137,7 +135,7 @@ def _foot_shift(
     The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
     """
     screw = SCREWS[(scanner.deck or USUAL).screw]
-    room = SCREWS[scanner.servo.case_screw].head_room + screw.head_room
+    room = carried.screw.head_room + screw.head_room
     left = np.cross(normal, along)
     shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
     depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
@@ -148,7 +146,7 @@ def _foot_shift(
         return min(
             float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
             for point in screws
-            for x, y in holes
+            for x, y in carried.holes
         )
 
     a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
@@ -173,13 +171,6 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
         return half, half, half * (2 - math.sqrt(2))
     x, y = (max(size / 2, PAD_HALF) + HOLE_MARGIN for size in pattern.size_mm)
     return x, y, 12.0
-
-
-def _corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    """The four holes of the widest column pair that lie furthest apart along y."""
-    widest = max(x for x, _ in holes)
-    ys = sorted(y for x, y in holes if x == widest)
-    return ((widest, ys[-1]), (-widest, ys[-1]), (-widest, ys[0]), (widest, ys[0]))
 
 
 def _triple(v: Array) -> tuple[float, float, float]:

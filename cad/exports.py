@@ -10,29 +10,33 @@ from cad.assembly import Assembly
 from cad.bom import bom_text, items_of
 from cad.build import PartsResult, config_hash, write_files
 from cad.drawings.files import drawing_files
+from cad.findings import Finding
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
-from cad.joints import joints_of
+from cad.joints import joints_of, without_traps
 from cad.mesh import Mesh, checked_mesh
 from cad.parts.fit_coupon import PART as FIT_COUPON
 from cad.parts.fit_coupon import coupon_of, fit_coupon
 from cad.print_pose import on_bed, print_pose
-from cad.remarks import shaft_is_turned
 from cad.scenes import scene_files
 from cad.threemf import threemf_bytes
 from design.left_out import LeftOut
 from design.scanner import Scanner
+from design.second import Begin, in_turn
 
 
 @dataclass(frozen=True, slots=True)
 class Exports:
-    """What was written, relative to the build folder, and what was not."""
+    """What was written, relative to the build folder, what was not, and what a person should know."""
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
+    findings: tuple[Finding, ...]
 
 
-def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Callable[[str], None]) -> Exports:
+def export_scanner(
+    scanner: Scanner, made: PartsResult, folder: Path, progress: Callable[[str], None], begin: Begin = in_turn
+) -> Exports:
     """Write all of them into a build folder.
 
     Args:
@@ -40,10 +44,15 @@ def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: 
         made: its parts, of `build.build_parts`.
         folder: the build folder.
         progress: called with a line of text before each step.
+        begin: who draws the parts.
     """
     assembly, digest = made.assembly, config_hash(scanner)
     masses = {report.name: report.mass_g for report in made.parts}
     turned = {part for part in assembly.made if is_turned(part, assembly)}
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    joints = joints_of(scanner, assembly, rounds)
+    progress("drawing the parts")
+    drawn = begin(drawing_files, scanner, assembly, rounds, joints, masses, turned, digest)
     progress("writing print files")
     files, left_out = _prints(scanner, made.meshes, turned, digest)
     progress("making the fit coupon")
@@ -52,20 +61,18 @@ def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: 
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest, turned)
     progress("writing bom.csv and assembly.md")
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
     items = items_of(scanner, assembly, joints, masses, turned, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
-    progress("drawing the parts")
-    files |= drawing_files(scanner, assembly, rounds, joints, masses, turned, digest)
+    files |= drawn()
     write_files(folder, files)
-    return Exports(tuple(sorted(files)), tuple(left_out))
+    findings = without_traps(scanner.printer, assembly, joints)
+    return Exports(tuple(sorted(files)), tuple(left_out), tuple(findings))
 
 
 def is_turned(part: str, assembly: Assembly) -> bool:
     """Whether a part is turned from metal instead of printed."""
-    return part == "servo_shaft" and shaft_is_turned(assembly.stack)
+    return part in assembly.drive.turned()
 
 
 def _prints(

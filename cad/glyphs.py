@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import cadquery as cq
 import numpy as np
 import shapely  # type: ignore[import-untyped]
 
-from cad import solids
 from design.frames import Array
 
 ADVANCE = 6.0  # grid units from glyph to glyph
-STROKE = 0.8  # mm: two lines of a 0.4 mm nozzle
 
 # Each chain is a run of grid points, x then y, chains parted by a space.
 GLYPHS = {
@@ -70,46 +67,27 @@ def text_width(text: str, height: float) -> float:
     return (len(text) * ADVANCE - (ADVANCE - 4)) * height / 6 if text else 0.0
 
 
-def grooves(text: str, height: float, x: float, y: float, top: float, depth: float) -> list[cq.Solid]:
-    """What to cut from a face at z = top for one line of text whose lower left corner is at (x, y).
+def letters(text: str, height: float, stroke: float) -> list[shapely.Polygon]:
+    """Outlines of one line of text, origin at its lower left corner; strokes that meet are one outline.
 
     Args:
         text: letters, digits and ". - + _ /"; anything else is a blank.
-        height: of capitals [mm].
-        x: left edge.
-        y: base line.
-        top: height of the face.
-        depth: of the grooves.
+        height: of capitals, to the middle of their strokes [mm].
+        stroke: width [mm].
     """
-    unit = height / 6
-    cuts = []
-    for i, letter in enumerate(text.upper()):
-        origin = np.array([x + i * ADVANCE * unit, y])
-        for chain in GLYPHS.get(letter, "").split():
-            points = [origin + unit * np.array([int(chain[k]), int(chain[k + 1])]) for k in range(0, len(chain), 2)]
-            cuts += [_groove(a, b, top, depth) for a, b in pairwise(points)]
-    return cuts
-
-
-def letters(text: str, height: float) -> list[shapely.Polygon]:
-    """Outlines of one line of text, origin at its lower left corner; strokes that meet are one outline."""
     unit = height / 6
     strokes = []
     for i, letter in enumerate(text.upper()):
         origin = np.array([i * ADVANCE * unit, 0.0])
         for chain in GLYPHS.get(letter, "").split():
             points = [origin + unit * np.array([int(chain[k]), int(chain[k + 1])]) for k in range(0, len(chain), 2)]
-            strokes += [shapely.Polygon(_outline(a, b)) for a, b in pairwise(points)]
+            strokes += [shapely.Polygon(_outline(a, b, stroke)) for a, b in pairwise(points)]
     joined = shapely.normalize(shapely.union_all(strokes, grid_size=1e-6))
     return [part for part in shapely.get_parts(joined) if part.area > 0]
 
 
-def _groove(start: Array, end: Array, top: float, depth: float) -> cq.Solid:
-    return solids.prism(_outline(start, end), top - depth, top + 1.0)
-
-
-def _outline(start: Array, end: Array) -> Array:
+def _outline(start: Array, end: Array, stroke: float) -> Array:
     along = (end - start) / math.dist(start, end)
-    half = STROKE / 2
+    half = stroke / 2
     side, over = half * np.array([-along[1], along[0]]), half * along
     return np.stack([start - over - side, end + over - side, end + over + side, start - over + side])

@@ -9,57 +9,11 @@ from cad.assembly import Assembly
 from cad.joints import CASE_EAR, DECK, Joint
 from design.scanner import Scanner
 
-# The order that always works: what comes over the shaft follows what carries it. `{...}` is filled with the screws.
-STEPS: dict[str, tuple[str, str]] = {
-    "base_mount": (
-        "Servo into the mount",
-        "Put the case between the rails of the base mount, plugs to the channel behind it. {servo_case} Connect the "
-        "servo's cable now. {deck}",
-    ),
-    "deck": (
-        "Servo on the deck",
-        "The axis stands upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
-        "{servo_case} Leave room for the plugs.",
-    ),
-    "servo_shaft": (
-        "Shaft on the horn",
-        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
-        "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. {servo_horn}",
-    ),
-    "slip_ring_adapter": (
-        "Adapter on the servo",
-        "Slide the fork round the flange of the shaft. {servo_case}",
-    ),
-    "cage_base": ("Base of the cage on the servo", "Lower the base over the shaft. {servo_case}"),
-    "ring": (
-        "Slip ring",
-        "Lower the ring over the shaft, the rotor's leads upwards, and clamp its rotor to the shaft with its own set "
-        "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
-    ),
-    "bearing_cage": (
-        "Bearing and cage",
-        "Put the bearing into its seat and lower the cage onto its base. Put the screws of the cage "
-        "in loosely: {*} Tighten them last, when the linkage is on and turns freely, so that the bearing finds the "
-        "journal.",
-    ),
-    "lidar": (
-        "Lidar on its seat",
-        "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables over the square "
-        "notch. {lidar_body}",
-    ),
-    "sub_plate": (
-        "Lidar and sub-plate on the linkage",
-        "The hub covers one of the lidar's screws, so the lidar came on a plate of its own: put this plate on the "
-        "linkage, FRONT over FRONT, and drive the screws of its ears from the lidar's side. {alignment_linkage}",
-    ),
-    "alignment_linkage": (
-        "Linkage on the shaft",
-        "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way "
-        "only, and the groove of the hub then stands above the groove of the flange. {servo_shaft}",
-    ),
-}
-ORDER = tuple(STEPS)
-CLOSED_ADAPTER = "Lower the plate over the shaft. {servo_case}"  # the one that carries a cage is no fork
+NUTS = (
+    "Put the nuts into their traps before anything else: those of a hub from within its bore, flat against the wall; "
+    "those of a plate from below; those of a boss from above into the slots. Pull each home with a screw. What has no "
+    "trap is a plain thread."
+)
 LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
 IN_A_LOOP = "Leave the lidar's cables a loose loop for the whole sweep, then join them to USB and power."
@@ -84,6 +38,8 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
     ]
     if any(joint.inserts for joint in joints):
         lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
+    if any(joint.traps for joint in joints):
+        lines += [NUTS, ""]
     for number, (title, text) in enumerate(_steps(scanner, assembly, joints), start=1):
         lines += [f"## {number}. {title}", "", text, ""]
     return "\n".join(lines)
@@ -94,6 +50,7 @@ def screws_in_words(joint: Joint) -> str:
     what = f"{joint.count} x {joint.number}"
     where = {
         "thread": f"from {joint.part} into {joint.onto}",
+        "trap": f"from {joint.part} onto {joint.count} nuts {joint.screw.name} in {joint.onto}",
         "nut": f"through {joint.part} into {joint.onto}, with {joint.count} nuts {joint.screw.name}",
         "deck": f"through the foot into the deck, with {joint.count} nuts {joint.screw.name}",
         "grub": f"in {joint.part}, against {joint.onto}",
@@ -101,26 +58,31 @@ def screws_in_words(joint: Joint) -> str:
     left = ""
     if joint.covered:
         left = f" Leave the other {joint.covered} of the holes empty: no driver reaches them."
-    return f"{what} {where}{', in heat-set inserts' if joint.inserts else ''}.{left}"
+    held = ", in heat-set inserts" if joint.inserts else ""
+    if joint.traps and joint.fixing == "grub":
+        held = f", through {joint.count} nuts {joint.screw.name} in its bore"
+    return f"{what} {where}{held}.{left}"
 
 
 def _steps(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:
     done: set[int] = set()
+    words = assembly.drive.steps()
+    order = tuple(words)
     seat = next((joint.part for joint in joints if joint.onto.startswith("lidar")), "")
     things = [*assembly.made, "lidar"]
     if scanner.slip_ring is not None:
         things.append("ring")
     if "base_mount" not in assembly.made:
         things.append("deck")
-    for thing in sorted(things, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER)):
-        title, text = STEPS.get(thing, (thing, "{*}"))
-        if thing == "slip_ring_adapter" and "bearing_cage" in assembly.made:
-            text = CLOSED_ADAPTER
+    for thing in sorted(things, key=lambda name: order.index(name) if name in order else len(order)):
+        title, text = words.get(thing, (thing, "{*}"))
         carrier = seat if thing == "lidar" else thing
         for i, joint in enumerate(joints):
-            mark = "{" + (joint.onto or "deck") + "}"
-            if joint.part == carrier and i not in done and (mark in text or "{*}" in text):
-                place = mark if mark in text else "{*}"
+            onto = joint.onto or "deck"
+            marks = [f"{{{joint.part}>{onto}}}"]
+            marks += [f"{{{onto}}}", "{*}"] if joint.part == carrier else []
+            place = next((mark for mark in marks if mark in text), None)
+            if place is not None and i not in done:
                 text = text.replace(place, f"**{screws_in_words(joint)}** {place}")
                 done.add(i)
         yield title, " ".join(re.sub(r"\{.*?\}", "", text).split())

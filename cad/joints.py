@@ -1,9 +1,10 @@
 """Which screws hold the scanner together, read from the solids: where a hole of one part meets another body.
 
 A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance, or one that a screw
-holds on to (the core of a thread, the seat of an insert). What lies behind it on the same axis decides: a thread (the
-screw's own diameter, or such a hole in a part), a hole to pass through to a nut, or the spigot that a grub screw
-clamps; nothing means the robot's deck. Lengths are the shortest of the standards that hold. Millimetres.
+holds on to (the core of a thread, the seat of an insert, the way into a trapped nut). What lies behind it on the same
+axis decides: a thread (the screw's own diameter, or such a hole in a part), a hole to pass through to a nut, or the
+spigot that a grub screw clamps; nothing means the robot's deck. Lengths are the shortest of the standards that hold.
+Millimetres.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import Literal
 import numpy as np
 
 from cad.assembly import Assembly, turns
+from cad.findings import Finding
 from cad.holes import Piercing, Round
-from cad.screws import SCREWS, Screw, thread_hole
+from cad.screws import SCREWS, Screw, holding_holes, trap_of
 from design.catalogue import Printer
 from design.scanner import Scanner
 
@@ -37,7 +39,7 @@ COAXIAL = 0.05
 NEAR = 6.0  # between the hole of a part and what its screw holds: feet stand off, ears are recessed
 DRIVER = 60.0  # free length behind the head
 
-Fixing = Literal["thread", "nut", "deck", "grub"]
+Fixing = Literal["thread", "trap", "nut", "deck", "grub"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +49,15 @@ class Joint:
     Attributes:
         part: the made part that the screws go through.
         onto: the body that they hold it to; empty for the robot's deck.
-        fixing: what holds the thread: the body itself, a nut, a nut under the deck, or the part (grub screws).
+        fixing: what holds the thread: the body itself, a nut in a trap of the body, a nut, a nut under the deck, or the
+            part (grub screws).
         screw: the size.
         length_mm: of the screw's shank.
         count: number of screws.
         grip_mm: what the shank passes before it holds.
         covered: equal holes that no driver reaches, left empty.
         inserts: whether each screw holds in a heat-set insert.
+        traps: whether each screw holds in a nut that a part carries.
     """
 
     part: str
@@ -65,6 +69,7 @@ class Joint:
     grip_mm: float
     covered: int
     inserts: bool
+    traps: bool
 
     @property
     def number(self) -> str:
@@ -81,7 +86,7 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
         rounds: of `holes.rounds_of`, for every solid, made or bought.
     """
     printer = scanner.printer
-    found: dict[tuple[str, str, Fixing, str], list[tuple[float, float, bool]]] = {}
+    found: dict[tuple[str, str, Fixing, str, bool], list[tuple[float, float, bool]]] = {}
     for part, solid in assembly.made.items():
         piercing = Piercing(solid)
         for hole in rounds[part]:
@@ -89,16 +94,37 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
             behind = None if screw is None else _behind(assembly, part, hole, screw, core, rounds, printer)
             if screw is not None and behind is not None:
                 covered = behind.head != 0 and not _reachable(hole, behind.head, piercing)
-                key = (part, behind.onto, behind.fixing, screw.name)
+                in_trap = behind.fixing == "trap" or (core and _is_trap(hole, screw, printer))
+                key = (part, behind.onto, behind.fixing, screw.name, in_trap)
                 found.setdefault(key, []).append((hole.length, behind.depth, covered))
+    for part, onto, screw, count, grip, depth in assembly.drive.slotted():
+        found[part, onto, "thread", screw.name, False] = [(grip, depth, False)] * count
     if "base_mount" not in assembly.made:
-        key = ("deck", "servo_case", "nut", scanner.servo.case_screw)
+        key = ("deck", "servo_case", "nut", scanner.servo.case_screw, False)
         found[key] = [(DECK, CASE_EAR, False)] * 4
     return [
-        _joint(*key, holes, inserts=printer.thread == "insert" and (key[2] == "grub" or key[1] in assembly.made))
+        _joint(*key, holes, inserts=_has_insert(printer, SCREWS[key[3]], key[2] == "grub" or key[1] in assembly.made))
         for key, holes in found.items()
         if not all(covered for _, _, covered in holes)
     ]
+
+
+def without_traps(printer: Printer, assembly: Assembly, joints: list[Joint]) -> list[Finding]:
+    """Screws that hold in plain threads although the printer's profile asks for nuts."""
+    if printer.thread != "nut":
+        return []
+    found = []
+    for joint in joints:
+        holder = joint.part if joint.fixing == "grub" else joint.onto
+        if holder in assembly.made and joint.fixing in ("grub", "thread") and not joint.traps:
+            message = f"{holder}: no nut trap fits at its {joint.count} {joint.screw.name}: they hold in plain threads"
+            found.append(Finding("no_nut_trap", "note", holder, message))
+    return found
+
+
+def _has_insert(printer: Printer, screw: Screw, in_a_part: bool) -> bool:
+    """Whether a screw holds in a heat-set insert: not every size has one."""
+    return printer.thread == "insert" and screw.insert is not None and in_a_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +138,22 @@ class _Behind:
 
 
 def _joint(
-    part: str, onto: str, fixing: Fixing, name: str, holes: list[tuple[float, float, bool]], *, inserts: bool
+    part: str,
+    onto: str,
+    fixing: Fixing,
+    name: str,
+    traps: bool,
+    holes: list[tuple[float, float, bool]],
+    *,
+    inserts: bool,
 ) -> Joint:
     """One length for all screws of a joint: that of the thickest place."""
     used = [(grip, depth) for grip, depth, covered in holes if not covered]
     grip, depth = max(grip for grip, _ in used), min(depth for _, depth in used)
     screw = SCREWS[name]
     length = _length(screw, grip, fixing, depth)
-    return Joint(part, onto, fixing, screw, length, len(used), round(grip, 2), len(holes) - len(used), inserts)
+    covered = len(holes) - len(used)
+    return Joint(part, onto, fixing, screw, length, len(used), round(grip, 2), covered, inserts, traps)
 
 
 def _behind(
@@ -149,9 +183,15 @@ def _screw_for(hole: Round, printer: Printer) -> tuple[Screw | None, bool]:
     for screw in SCREWS.values():
         if abs(hole.diameter - screw.nominal - printer.screw_clearance_mm) < 0.01:
             return screw, False
-        if abs(hole.diameter - thread_hole(screw, printer)) < 0.01:
+        if any(abs(hole.diameter - size) < 0.01 for size in holding_holes(screw, printer)):
             return screw, True
     return None, False
+
+
+def _is_trap(hole: Round, screw: Screw, printer: Printer) -> bool:
+    """Whether a hole leads a screw into a nut that the part carries."""
+    trap = trap_of(screw, printer)
+    return trap is not None and abs(hole.diameter - trap.hole) < 0.01
 
 
 def _partner(part: str, hole: Round, screw: Screw, rounds: dict[str, list[Round]], printer: Printer) -> _Behind | None:
@@ -173,8 +213,10 @@ def _partner(part: str, hole: Round, screw: Screw, rounds: dict[str, list[Round]
             gap = max(gaps)
             if gap > NEAR or abs(gap) > other.length + 0.1:
                 continue
-            threaded = min(abs(other.diameter - size) for size in (screw.nominal, thread_hole(screw, printer))) < 0.01
-            fixing: Fixing = "thread" if threaded else "nut"
+            sizes = (screw.nominal, *holding_holes(screw, printer))
+            threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
+            in_trap = _is_trap(other, screw, printer)
+            fixing: Fixing = "trap" if in_trap else "thread" if threaded else "nut"
             head = 1 if gaps[0] > gaps[1] else -1
             behind = _Behind(name, fixing, other.length if threaded else CASE_EAR, head)
             order = (not threaded, round(abs(gap), 3))
@@ -188,6 +230,8 @@ def _length(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     known = LENGTHS[screw.name]
     if fixing == "grub":
         return next((n for n in known if n >= grip - 0.1), known[-1])
+    if fixing == "trap":  # the hole ends at the nut, and behind it there is room
+        return next((n for n in known if n >= grip + depth + screw.nut_height - 0.1), known[-1])
     if fixing == "thread":
         most = [n for n in known if n <= grip + depth - THREAD_FREE + 1e-6]
         wanted = [n for n in most if n >= grip + HOLDS * screw.nominal]

@@ -1,52 +1,72 @@
 """Engraved label of a printed part: task, angles and configuration; FRONT where the lidar's front comes. Millimetres.
 
-The label goes into the largest flat faces that have room for it and a wall behind it; where none has, the part goes
-without. It is the last cut: drawings, screws and moving parts know nothing of it. The lettering is our own
-(`cad/glyphs.py`), so no font and no licence of one is involved.
+The label goes where it can be read on the assembled scanner: into the largest flat face that nothing lies on or stands
+before, with room for it and a wall behind it, its lines as level as the face allows. A part with little room gets the
+configuration alone; where no face can be read, a hidden one that mates with nothing takes the label, and where there
+is none either, the part goes without. The label is the last cut: drawings, screws and moving parts know nothing of it.
+The lettering is our own (`cad/glyphs.py`), so no font and no licence of one is involved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
 
 import cadquery as cq
 import numpy as np
 import shapely  # type: ignore[import-untyped]
+import shapely.affinity  # type: ignore[import-untyped]
 
 from cad import solids
-from cad.assembly import Assembly
-from cad.glyphs import STROKE, letters, text_width
+from cad.assembly import Assembly, turns
+from cad.engrave import Groove, engrave, groove_of
+from cad.findings import Finding
+from cad.flats import Flat, flat_at, flats_of
+from cad.glyphs import letters, text_width
 from cad.holes import Piercing
 from cad.mesh import Mesh, checked_mesh
-from cad.remarks import shaft_is_turned
+from cad.sight import Sight
 from design.errors import BuildError
 from design.frames import Array
+from design.left_out import LeftOut
 from design.scanner import Scanner
 
-DEPTH = 0.6
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 LEADING = 1.65  # from line to line, of the height
 MARGIN = 1.5  # of a face around its label
-FACES = 6  # that are tried, the largest first
+HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
+FACES = 12  # that are tried, the largest first
+LEAST_MM2 = 200.0  # of a face: the configuration alone takes more
 STEP = 2.0  # between the places that are tried on a face
+PLACES = 5  # of these, the nearest to its middle, that are looked at closely
 LONGEST = (16, 8)  # letters of a line, the first that fits
-HAIRLINE = 2e-3
 DIGITS = 8  # of the configuration's hash
+CARRIERS = ("alignment_linkage", "sub_plate")
 FRONT_INSET = 10.0  # of its middle from the edge
+TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Labelled:
-    """Printed parts with their labels, their meshes, and the names of those that have no room for one."""
+    """What came of the labels of one scanner.
 
-    parts: dict[str, cq.Solid]
-    meshes: dict[str, Mesh]
-    without: tuple[str, ...]
+    Attributes:
+        parts: with their labels, by name.
+        meshes: of these.
+        findings: labels that cannot be read on the assembled scanner.
+        left_out: labels for which there was no room.
+    """
+
+    parts: dict[str, cq.Solid] = field(default_factory=dict)
+    meshes: dict[str, Mesh] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    left_out: list[LeftOut] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class _Lines:
+class Lines:
     """Lettering, its origin at the lower left corner of its last line."""
 
     lines: tuple[str, ...]
@@ -58,51 +78,119 @@ class _Lines:
         width = max(text_width(line, self.height) for line in self.lines)
         return width, self.height * (1 + LEADING * (len(self.lines) - 1))
 
-
-@dataclass(frozen=True, slots=True)
-class _Pose:
-    """Axes of the lettering as columns, its face's normal the last, and the place of its origin."""
-
-    axes: Array
-    origin: Array
-
-    def location(self) -> cq.Location:
-        """For the kernel."""
-        return solids.location(self.axes, self.origin)
+    def outlines(self, stroke: float) -> list[shapely.Polygon]:
+        """Of its grooves, about its origin."""
+        return [
+            shapely.affinity.translate(letter, 0.0, LEADING * self.height * i)
+            for i, line in enumerate(reversed(self.lines))
+            for letter in letters(line, self.height, stroke)
+        ]
 
 
 @dataclass(frozen=True, slots=True)
-class _Flat:
-    """A planar face: `frame` has its normal as third column, the outline is in its first two."""
+class Place:
+    """Where lettering stands on a face: its axes are the columns of `turn` (2, 2), its origin is at (x, y)."""
 
-    frame: Array
-    origin: Array
-    outline: shapely.Polygon
+    flat: Flat
+    x: float
+    y: float
+    turn: Array
 
-    def pose(self, x: float, y: float, turn: Array) -> _Pose:
-        """Of lettering whose axes are the columns of `turn` (2, 2), its origin at (x, y)."""
-        axes = np.column_stack([self.frame[:, :2] @ turn, self.frame[:, 2]])
-        return _Pose(axes, self.origin + self.frame[:, :2] @ [x, y])
+    def put(self, points: Array) -> Array:
+        """Points of the lettering, shape (n, 2), in the axes of the face."""
+        return np.asarray(points @ self.turn.T + [self.x, self.y])
+
+    def outlines(self, lines: Lines, stroke: float) -> list[shapely.Polygon]:
+        """Of the grooves of some lines, in the axes of the face."""
+        return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]
 
 
-FRONT = _Lines(("FRONT",), HEIGHTS[0])
+@dataclass(frozen=True, slots=True)
+class Label:
+    """Lettering, its place, and whether it can be read on the assembled scanner."""
+
+    place: Place
+    lines: Lines
+    seen: bool
+
+
+FRONT = Lines(("FRONT",), HEIGHTS[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A part that takes a label.
+
+    Attributes:
+        flats: faces that it may go to, the largest first.
+        piercing: of the part.
+        groove: of the lettering.
+        wall: that stays behind it.
+        up: direction in the rotation frame that is up as the scanner stands.
+        front: where FRONT stands, if it does.
+    """
+
+    flats: Sequence[Flat]
+    piercing: Piercing
+    groove: Groove
+    wall: float
+    up: Array
+    front: Place | None
+
+    def room(self, flat: Flat) -> shapely.Polygon:
+        """What of a face the middle lines of strokes may take."""
+        half = self.groove.width / 2
+        taken = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
+        if self.front is not None and flat.face.isSame(self.front.flat.face):
+            width, height = FRONT.size
+            corners = self.front.put(np.array([[0, 0], [width, 0], [width, height], [0, height]]))
+            word = shapely.Polygon(flat.along(self.front.flat.at(corners)))
+            taken.append(word.buffer(MARGIN + 2 * half, join_style="mitre"))
+        outline = shapely.Polygon(flat.outline.exterior)
+        return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(taken))
+
+    def turns(self, flat: Flat) -> list[Array]:
+        """Ways to turn lettering on a face: the more upright first, of equal ones lengthwise."""
+        return sorted(TURNS, key=lambda turn: -round(float(flat.frame[:, :2] @ turn[:, 1] @ self.up), 1))
+
+    def is_thick(self, flat: Flat, points: Array) -> bool:
+        """Whether a wall stays behind grooves, at points of a face."""
+        into = -flat.frame[:, 2]
+        deep = (self.groove.depth + self.wall) * into
+        return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
     """Engrave every printed part that has room."""
-    parts: dict[str, cq.Solid] = {}
-    meshes: dict[str, Mesh] = {}
-    without = []
+    sight, done = Sight(assembly), Labelled()
+    groove, up = groove_of(scanner.printer), scanner.angles.T_world_rot(0.0)[2, :3]
     for name, solid in assembly.made.items():
-        if name == "servo_shaft" and shaft_is_turned(assembly.stack):
+        if name in assembly.drive.turned():
             continue
-        texts = label_texts(scanner, name, config_hash)
-        engraved = _engraved(solid, texts, _front(assembly, name), scanner.printer.min_wall_mm)
-        if engraved is None:
-            without.append(name)
-        else:
-            parts[name], meshes[name] = engraved
-    return Labelled(parts, meshes, tuple(without))
+        front = None
+        if name in CARRIERS:
+            front = _front(assembly, name, groove)
+            if front is None:
+                why = "a hole of the seat is in the way of the word; the V in the edge says it too"
+                done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
+        flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not sight.touched(flat)]
+        ground = Ground(flats, Piercing(solid), groove, scanner.printer.min_wall_mm, up, front)
+        reads = partial(sight.reads, turning=turns(name))
+        label = label_on(ground, label_texts(scanner, name, config_hash), reads)
+        if label is None:
+            why = "none of its flat faces that mate with nothing has room for one"
+            done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
+        elif not label.seen:
+            message = f"{name}: its label is hidden on the assembled scanner: no face in sight has room for it"
+            done.findings.append(Finding("label_hidden", "note", name, message))
+        words = [] if front is None else [(front, FRONT)]
+        words += [] if label is None else [(label.place, label.lines)]
+        if words:
+            try:
+                done.parts[name], done.meshes[name] = engraved(solid, words, groove)
+            except BuildError as error:  # a part without its label is better than none
+                done.left_out.append(LeftOut(f"label of {name}", str(error), 1, "labels"))
+    return done
 
 
 def label_texts(scanner: Scanner, name: str, config_hash: str) -> list[str]:
@@ -115,51 +203,59 @@ def label_texts(scanner: Scanner, name: str, config_hash: str) -> list[str]:
     return [text for text in texts if text is not None]
 
 
-def _front(assembly: Assembly, name: str) -> _Pose | None:
-    """Where FRONT stands on the plates that carry the lidar: its letters' feet to the middle, its heads to the V."""
-    if name not in ("alignment_linkage", "sub_plate"):
-        return None
-    linkage, stack = assembly.linkage, assembly.stack
-    height = linkage.top if name == "alignment_linkage" else linkage.seat
-    turned = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    width, letter = FRONT.size
-    corner = np.array([linkage.half_x - FRONT_INSET - letter / 2, width / 2, height])
-    return _Pose(stack.R() @ turned, stack.R() @ corner)
+def label_on(ground: Ground, texts: list[str], reads: Callable[[Flat, Array], bool]) -> Label | None:
+    """Where a label goes, and how its texts are broken into lines; None where nothing has room.
 
-
-def _engraved(solid: cq.Solid, texts: list[str], front: _Pose | None, wall: float) -> tuple[cq.Solid, Mesh] | None:
-    """The part with its label, and its mesh; None where it has no room, or the cut spoils it."""
-    piercing, flats = Piercing(solid), _flats(solid)
-    for height, longest in ((height, longest) for longest in LONGEST for height in HEIGHTS):
-        label = _Lines(tuple(text[i : i + longest] for text in texts for i in range(0, len(text), longest)), height)
-        pose = next(_places(flats, label.size, piercing, wall, front), None)
-        if pose is None:
-            continue
-        cuts = _grooves(label, pose) + ([] if front is None else _grooves(FRONT, front))
-        try:
-            with solids.building("label", "lettering", "lines", label.lines):
-                cut = solids.checked(solid.cut(*cuts), "label", "lettering", "lines", label.lines)
-                return cut, checked_mesh(cut, "label")
-        except BuildError:  # a part without its label is better than none
-            return None
+    Args:
+        ground: the part.
+        texts: of the label; where they do not fit, the last one alone.
+        reads: whether an eye before a face sees all of these points of it.
+    """
+    for seen, some, longest, height in product((True, False), (texts, texts[-1:]), LONGEST, HEIGHTS):
+        lines = Lines(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
+        for place in _places(ground, lines.size):
+            points = place.put(_grid(lines.size))
+            if (not seen or reads(place.flat, points)) and ground.is_thick(place.flat, points):
+                return Label(place, lines, seen)
     return None
 
 
-def _places(
-    flats: list[_Flat], size: tuple[float, float], piercing: Piercing, wall: float, front: _Pose | None
-) -> Iterator[_Pose]:
-    """Poses of the label, on the largest face first, there nearest to its middle, lengthwise before upright."""
-    for flat in flats:
-        room = flat.outline
-        if front is not None:
-            width, height = FRONT.size
-            corners = front.origin + np.array([[0, 0], [width, 0], [width, height], [0, height]]) @ front.axes[:, :2].T
-            room = room.difference(shapely.Polygon((corners - flat.origin) @ flat.frame[:, :2]))
-        room = room.buffer(-MARGIN - STROKE / 2, join_style="mitre")
-        for turn in (np.eye(2), np.array([[0.0, -1.0], [1.0, 0.0]])):
+def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lines]], groove: Groove) -> tuple[cq.Solid, Mesh]:
+    """The part with lettering, and its mesh.
+
+    Raises:
+        BuildError: the grooves spoil the part.
+    """
+    grooves = [(place.flat, place.outlines(lines, groove.width)) for place, lines in words]
+    with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]):
+        cut = engrave(solid, grooves, groove.depth)
+        cut = solids.checked(cut, "label", "lettering", "lines", [lines.lines for _, lines in words])
+    return cut, checked_mesh(cut, "label")
+
+
+def _front(assembly: Assembly, name: str, groove: Groove) -> Place | None:
+    """Where FRONT stands on the plates that carry the lidar: its letters' feet to the middle, its heads to the V."""
+    linkage, R = assembly.linkage, assembly.stack.R()
+    height = linkage.top if name == "alignment_linkage" else linkage.seat
+    width, letter = FRONT.size
+    middle = linkage.half_x - FRONT_INSET
+    flat = flat_at(assembly.made[name], R @ [middle, 0.0, height], R[:, 2])
+    if flat is None:
+        return None
+    x, y = flat.along((R @ [middle - letter / 2, width / 2, height])[None])[0]
+    turn = flat.frame[:, :2].T @ R[:, :2] @ [[0.0, 1.0], [-1.0, 0.0]]
+    place = Place(flat, float(x), float(y), turn)
+    word = shapely.MultiPolygon(place.outlines(FRONT, groove.width))
+    return place if flat.outline.contains(word) else None
+
+
+def _places(ground: Ground, size: tuple[float, float]) -> Iterator[Place]:
+    """Of lettering of a size: on the largest face first, the more upright way first, there nearest to its middle."""
+    for flat in ground.flats:
+        room = ground.room(flat)
+        for turn in ground.turns(flat):
             for x, y in _corners(room, size, turn):
-                if _thick(flat, x, y, size, turn, piercing, wall):
-                    yield flat.pose(x, y, turn)
+                yield Place(flat, x, y, turn)
 
 
 def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
@@ -178,65 +274,10 @@ def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> l
     middle = np.array(room.centroid.coords[0])
     away = np.round(np.linalg.norm(corners + box.mean(axis=0) - middle, axis=1), 3)
     order = np.lexsort((*corners.T, away))
-    return [(float(x), float(y)) for x, y in corners[order][fits[order]][:5]]
+    return [(float(x), float(y)) for x, y in corners[order][fits[order]][:PLACES]]
 
 
-def _thick(
-    flat: _Flat, x: float, y: float, size: tuple[float, float], turn: Array, piercing: Piercing, wall: float
-) -> bool:
-    """Whether a wall stays behind the grooves, at points all over the label."""
-    into = -flat.frame[:, 2]
-    for u in np.linspace(0.0, size[0], 6):
-        for v in np.linspace(0.0, size[1], 4):
-            at = flat.origin + flat.frame[:, :2] @ (np.array([x, y]) + turn @ [u, v])
-            if piercing.between(at + 0.05 * into, at + (DEPTH + wall) * into):
-                return False
-    return True
-
-
-def _flats(solid: cq.Solid) -> list[_Flat]:
-    """The largest planar faces."""
-    faces = [face for face in solid.Faces() if face.geomType() == "PLANE"]
-    places = [(-round(face.Area(), 1), *np.round(face.Center().toTuple(), 3)) for face in faces]
-    flats = []
-    for i in sorted(range(len(faces)), key=places.__getitem__)[:FACES]:
-        face = faces[i]
-        normal = np.array(face.normalAt().toTuple())
-        helper = np.eye(3)[int(np.argmin(np.abs(np.round(normal, 6))))]
-        along = np.cross(helper, normal) / np.linalg.norm(np.cross(helper, normal))
-        frame = np.column_stack([along, np.cross(normal, along), normal])
-        origin = np.array(face.Center().toTuple())
-        points, triangles = face.copy().tessellate(0.05, 0.3)
-        flat = (np.array([p.toTuple() for p in points]) - origin) @ frame[:, :2]
-        pieces = shapely.polygons(flat[np.array(triangles)])
-        # closed over the hairlines between triangles
-        outline = shapely.union_all(pieces[shapely.area(pieces) > 1e-6], grid_size=1e-4).buffer(HAIRLINE)
-        flats.append(_along_edge(_Flat(frame, origin, max(shapely.get_parts(outline), key=shapely.area))))
-    return flats
-
-
-def _along_edge(flat: _Flat) -> _Flat:
-    """The same face with its first axis along its longest straight edge."""
-    corners = np.asarray(shapely.simplify(flat.outline.exterior, 5 * HAIRLINE).coords)
-    edges = np.round(np.diff(corners, axis=0), 2)
-    along = edges[int(np.argmax(np.round(np.linalg.norm(edges, axis=1), 1)))]
-    x, y = along / np.linalg.norm(along) * (1 if tuple(along) > (0, 0) else -1)
-    turn = np.array([[x, -y], [y, x]])
-    outline = shapely.transform(flat.outline, lambda points: points @ turn)
-    return _Flat(np.column_stack([flat.frame[:, :2] @ turn, flat.frame[:, 2]]), flat.origin, outline)
-
-
-def _grooves(label: _Lines, pose: _Pose) -> list[cq.Shape]:
-    """What to cut: one prism per run of strokes that meet."""
-    cuts: list[cq.Shape] = []
-    for i, line in enumerate(reversed(label.lines)):
-        up = np.array([0.0, LEADING * label.height * i])
-        for part in letters(line, label.height):
-            wires = [_wire(np.asarray(ring.coords)[:-1] + up) for ring in (part.exterior, *part.interiors)]
-            prism = cq.Solid.extrudeLinear(wires[0], wires[1:], cq.Vector(0, 0, DEPTH + 0.5))
-            cuts.append(prism.moved(pose.location()))
-    return cuts
-
-
-def _wire(points: Array) -> cq.Wire:
-    return cq.Wire.makePolygon([cq.Vector(float(x), float(y), -DEPTH) for x, y in points], close=True)
+def _grid(size: tuple[float, float]) -> Array:
+    """Points all over lettering of a size, shape (n, 2)."""
+    u, v = np.meshgrid(np.linspace(0.0, size[0], 6), np.linspace(0.0, size[1], 4), indexing="ij")
+    return np.column_stack([u.ravel(), v.ravel()])

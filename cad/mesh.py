@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import cadquery as cq
 import numpy as np
 from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
 
 from design.errors import BuildError
 from design.frames import Array
@@ -43,15 +46,34 @@ class Mesh:
 
 def mesh_of(solid: cq.Solid) -> Mesh:
     """Tessellate a solid canonically."""
-    points, triangles = solid.copy().tessellate(CHORD_ERROR, CHORD_ANGLE)
-    raw = np.round(np.array([(p.x, p.y, p.z) for p in points], dtype=float), DECIMALS) + 0.0  # no -0.0
+    points, triangles = _tessellated(solid)
+    raw = np.round(points, DECIMALS) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
-    faces = index.reshape(-1)[np.array(triangles, dtype=np.int64)]
+    faces = index.reshape(-1)[triangles]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     first = np.argmin(faces, axis=1)
     faces = np.stack([faces[np.arange(len(faces)), (first + k) % 3] for k in range(3)], axis=1)
     return Mesh(vertices, faces[np.lexsort(faces.T[::-1])])
+
+
+def _tessellated(solid: cq.Solid) -> tuple[Array, NDArray[np.int64]]:
+    """Points face by face, shape (n, 3), and triangles, (m, 3), without the vectors that cadquery makes of them."""
+    shape = solid.copy()
+    shape.mesh(CHORD_ERROR, CHORD_ANGLE)
+    points: list[tuple[float, float, float]] = []
+    triangles = []
+    for face in shape.Faces():
+        place = TopLoc_Location()
+        found = BRep_Tool.Triangulation_s(face.wrapped, place)
+        if found is None:  # a face too small for a triangle
+            continue
+        to_shape, first = place.Transformation(), len(points) - 1
+        points += [found.Node(i).Transformed(to_shape).Coord() for i in range(1, found.NbNodes() + 1)]
+        corners = np.array([found.Triangle(i).Get() for i in range(1, found.NbTriangles() + 1)], dtype=np.int64)
+        inside_out = face.wrapped.Orientation() == TopAbs_REVERSED
+        triangles.append(first + (corners[:, [0, 2, 1]] if inside_out else corners))
+    return np.array(points), np.concatenate(triangles)
 
 
 def checked_mesh(solid: cq.Solid, part: str) -> Mesh:

@@ -6,7 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from cad.deck import Deck
+from cad.drive import Drive
 from cad.findings import Finding
+from cad.head import Head
 from cad.loads import RATED_AT_MM, Weight, rated_moment_nm, supported, weight_of
 from cad.screws import SCREWS
 from cad.sizing import Stack
@@ -17,8 +19,6 @@ from design.scanner import Scanner
 if TYPE_CHECKING:
     from cad.assembly import Assembly
     from cad.mass import Inertial
-
-SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
 
 # Which values of a product shape which parts.
 SHAPING = {
@@ -55,55 +55,46 @@ SHAPING = {
 }
 
 
-def shaft_is_turned(stack: Stack) -> bool:
-    """Whether the shaft is too thin to be printed."""
-    return stack.shaft_diameter < SHAFT_PRINTABLE
-
-
 def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial]) -> tuple[Finding, ...]:
     """Everything worth a line, in the order of the parts."""
-    found = []
-    stack = assembly.stack
-    if shaft_is_turned(stack):
-        found.append(
-            Finding(
-                "turn_from_metal",
-                "note",
-                "servo_shaft",
-                f"servo_shaft: {stack.shaft_diameter:g} mm is too thin to print (0.9 deg of bending with the axis "
-                "horizontal): have it turned from aluminium or steel after its STEP file",
-            )
-        )
-    found += _tilt_moment(scanner, assembly, bodies)
+    drive = assembly.drive
+    found = drive.findings(bodies)
     if assembly.deck.flat:
         found.append(_held_by_screws(scanner, assembly.deck))
-    products = (scanner.lidar, scanner.servo, scanner.slip_ring, assembly.stack.bearing, scanner.printer)
-    for product in products:
-        if product is not None:
-            found += unverified(product)
+    for product in products_of(scanner, drive):
+        found += unverified(product, drive)
     return tuple(found)
 
 
-def left_out_of(scanner: Scanner, stack: Stack, deck: Deck) -> tuple[LeftOut, ...]:
+def products_of(scanner: Scanner, drive: Drive) -> list[Product]:
+    """Every product that shapes parts, each once."""
+    found: list[Product | None] = [scanner.lidar, scanner.servo, scanner.slip_ring, *drive.products(), scanner.printer]
+    return list({product.name: product for product in found if product is not None}.values())
+
+
+def left_out_of(drive: Drive, deck: Deck) -> tuple[LeftOut, ...]:
     """Parts that this scanner does not need."""
-    out = []
-    if scanner.slip_ring is None:
-        out.append(LeftOut("slip_ring_adapter", "this scanner has no slip ring", 1, "parts"))
-    if stack.bearing is None:
-        why = f"the horn of {scanner.servo.name} carries an axis this upright alone"
-        if scanner.servo.radial_load_n is None:
-            why = f"{why}, by what such a horn is trusted with: its maker rates none"
-        out.append(LeftOut("bearing_cage", why, 1, "parts"))
+    out = drive.left_out()
     if deck.flat:
         out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)
 
 
-def _tilt_moment(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial]) -> list[Finding]:
-    """What the weight of all that turns puts on the horn, against its rating."""
+def turn_from_metal(part: str, why: str) -> Finding:
+    """That a shaft is for the lathe, and why."""
+    return Finding(
+        "turn_from_metal",
+        "note",
+        part,
+        f"{part}: {why}: have it turned from aluminium or steel after its STEP file",
+    )
+
+
+def tilt_moment(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> list[Finding]:
+    """What the weight of all that turns puts on a horn that carries it, against its rating."""
     from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 
-    rated, stack, servo = rated_moment_nm(scanner), assembly.stack, scanner.servo
+    rated, servo = rated_moment_nm(scanner), scanner.servo
     if rated is None:
         return []
     weight = rotor_weight(scanner, stack, bodies)
@@ -126,7 +117,7 @@ def _tilt_moment(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertia
     ]
 
 
-def rotor_weight(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> Weight:
+def rotor_weight(scanner: Scanner, stack: Head, bodies: dict[str, Inertial]) -> Weight:
     """Weight of all that turns, from the bodies of `link_bodies`."""
     from cad.mass import together
 
@@ -148,19 +139,19 @@ def _held_by_screws(scanner: Scanner, deck: Deck) -> Finding:
     )
 
 
-def unverified(product: Product) -> list[Finding]:
+def unverified(product: Product, drive: Drive) -> list[Finding]:
     """Values of a product that nobody has verified and that shape a part."""
-    provenance = product.provenance()
+    provenance, shaping = product.provenance(), {**SHAPING, **drive.shaping()}
     return [
         Finding(
             "unverified",
             "warning",
             product.name,
             f"{product.name}: {field} = {_shown(getattr(product, field))} is not verified "
-            f"({provenance[field].source}): measure yours, it shapes {SHAPING[field]}",
+            f"({provenance[field].source}): measure yours, it shapes {shaping[field]}",
         )
         for field in product.unverified()
-        if field in SHAPING
+        if field in shaping
     ]
 
 

@@ -19,17 +19,6 @@ from design.frames import Array
 from design.scanner import Scanner
 
 GAP_MM = 15.0  # between the products of the exploded view
-ALONG_AXIS = (  # in the order of `assembly.md`: what comes later is lifted further
-    "base_mount",
-    "servo",
-    "servo_shaft",
-    "cage_base",
-    "slip_ring_adapter",
-    "ring",
-    "bearing_cage",
-    "bearing",
-    "alignment_linkage",
-)
 ALONG_LIDAR = ("sub_plate", "lidar")  # what leaves the linkage along the lidar's z, in this order
 
 
@@ -105,7 +94,7 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
     axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
     lifts: dict[str, Array] = {}
     top = -np.inf
-    for product in sorted(points.keys() - set(ALONG_LIDAR), key=ALONG_AXIS.index):
+    for product in sorted(points.keys() - set(ALONG_LIDAR), key=assembly.drive.stacked().index):
         low, high = float(points[product][:, 2].min()), float(points[product][:, 2].max())
         lift = max(0.0, top + GAP_MM - low)
         lifts[product] = lift * axis

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from design.catalogue import Printer
@@ -16,6 +17,8 @@ class Screw:
     head_diameter: float
     head_height: float
     core: float  # hole that the thread is cut into, ISO 2306
+    nut_across: float  # across the flats of a hexagon nut, ISO 4032
+    nut_height: float  # at most, ISO 4032
     insert: float | None = None  # hole for a heat-set insert: Accu's chart (-0, +0.1), NopSCADlib
 
     @property
@@ -27,12 +30,12 @@ class Screw:
 SCREWS = {
     screw.name: screw
     for screw in (
-        Screw("M2", 2.0, 3.8, 2.0, 1.6),
-        Screw("M2.5", 2.5, 4.5, 2.5, 2.05),
-        Screw("M3", 3.0, 5.5, 3.0, 2.5, 4.0),
-        Screw("M4", 4.0, 7.0, 4.0, 3.3),
-        Screw("M5", 5.0, 8.5, 5.0, 4.2),
-        Screw("M6", 6.0, 10.0, 6.0, 5.0),
+        Screw("M2", 2.0, 3.8, 2.0, 1.6, 4.0, 1.6),
+        Screw("M2.5", 2.5, 4.5, 2.5, 2.05, 5.0, 2.0),
+        Screw("M3", 3.0, 5.5, 3.0, 2.5, 5.5, 2.4, 4.0),
+        Screw("M4", 4.0, 7.0, 4.0, 3.3, 7.0, 3.2),
+        Screw("M5", 5.0, 8.5, 5.0, 4.2, 8.0, 4.7),
+        Screw("M6", 6.0, 10.0, 6.0, 5.0, 10.0, 5.2),
     )
 }
 INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts is deeper
@@ -41,3 +44,37 @@ INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts 
 def thread_hole(screw: Screw, printer: Printer) -> float:
     """Diameter of the hole in a part that a screw holds on to: the core of a thread, or the seat of an insert."""
     return screw.insert if printer.thread == "insert" and screw.insert is not None else screw.core
+
+
+@dataclass(frozen=True, slots=True)
+class Trap:
+    """Room for a hexagon nut in a part, and the hole through it.
+
+    Attributes:
+        hole: diameter, with half of a screw's clearance: it leads the screw into the nut, and no other hole is alike.
+        across: across the flats of the pocket.
+        depth: of a pocket, thickness of a slot.
+    """
+
+    hole: float
+    across: float
+    depth: float
+
+    @property
+    def corner(self) -> float:
+        """From the axis to a corner of the pocket."""
+        return self.across / math.sqrt(3)
+
+
+def trap_of(screw: Screw, printer: Printer) -> Trap | None:
+    """Nut trap of a screw; None where the profile asks for none."""
+    if printer.thread != "nut":
+        return None
+    fit = printer.fit_clearance_mm
+    return Trap(screw.nominal + printer.screw_clearance_mm / 2, screw.nut_across + fit, screw.nut_height + fit)
+
+
+def holding_holes(screw: Screw, printer: Printer) -> tuple[float, ...]:
+    """Diameters of all holes in parts that a screw may hold on to."""
+    trap = trap_of(screw, printer)
+    return (thread_hole(screw, printer),) if trap is None else (screw.core, trap.hole)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.sizing import CAGE_SEAT_WALL, WINDOWS_REACH, Stack, stack_of
+from cad.drive import drive_of
+from cad.head import Head
 from design import scene
 from design.errors import BuildError
 from design.frames import Array
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
 SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
 BEAM_RAYS = 6
-STRIP = 0.3  # mm under the top of a ring's stator that its drawing does not vouch for
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class PartsWorkshop:
     def bound(self, setting_rad: Array) -> Shadow | Refused:
         """The cone that ring, bearing and cage fill in any case."""
         try:
-            stack = stack_of(at_setting(self.scanner, setting_rad))
+            stack = drive_of(at_setting(self.scanner, setting_rad)).stack
         except BuildError as error:
             return Refused(str(error))
         bearings = self.scanner.lidar.bearings_rad()
@@ -53,7 +53,7 @@ class PartsWorkshop:
             assembly = self.assembly(scanner)
         except BuildError as error:
             return Refused(str(error))
-        return shadow_of(scanner, triangles_of(assembly.meshes()))
+        return shadow_of(scanner, triangles_of(assembly.outlines()))
 
     def assembly(self, scanner: Scanner) -> Assembly:
         """Parts of these products at the angles of `scanner`; those that were made for a shadow are kept.
@@ -106,22 +106,11 @@ def bundles(scanner: Scanner) -> tuple[Array, Array]:
     return APERTURE_M * off + scanner.angles.T_rot_laser()[:3, 3], directions
 
 
-def beams_in_cone(stack: Stack, bearings_rad: Array) -> Mask:
+def beams_in_cone(stack: Head, bearings_rad: Array) -> Mask:
     """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
     q = stack.R()[2]
     down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))
-    return np.asarray(down > math.cos(sure_half_angle(stack)))
-
-
-def sure_half_angle(stack: Stack) -> float:
-    """Half angle [rad] of that cone: of solids of revolution only, a little inside their edges."""
-    rims = []
-    if stack.ring_radius > 0:
-        rims.append((stack.ring_radius, stack.ring_top - 1.0 - STRIP))
-    if stack.bearing is not None:
-        rims.append((stack.bearing.outer_mm / 2 + CAGE_SEAT_WALL, stack.cage_top))
-        rims.append((stack.cage_outer - WINDOWS_REACH, stack.cage_roof + WINDOWS_REACH))
-    return max((math.atan2(radius, -z) for radius, z in rims), default=0.0)
+    return np.asarray(down > math.cos(stack.sure_half_angle))
 
 
 def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:

@@ -22,23 +22,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
+from cad.head import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, HUB_WALL, Axis, Head
 from cad.loads import WAIST, bearing_of
 from cad.screws import SCREWS, Screw
-from design.catalogue import Bearing, Lidar, Servo
+from design.catalogue import Lidar, Servo
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
 
-HUB_HEIGHT = 14.0
-HUB_WALL = 11.0  # around the spigot: thread length of the radial screws
-HUB_GAP = 10.0  # the rotor's wires leave the ring's end face here
 RING_GAP = 3.0
-SPIGOT = 11.0  # length of the shaft inside the hub
-CLAMP_ABOVE_BOTTOM = 5.0  # of the radial screws, from the hub's lower face
 SHAFT_PLAIN = 12.0  # without a ring
 SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
 SHAFT_MIN = 8.0
@@ -47,8 +42,6 @@ BODY_GAP = 0.6  # around the lidar's body
 SUB_PLATE = 4.0  # thickness
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0
-BEARING_STEP = 0.5  # between the hub's face and the bearing: only the inner ring touches
-JOURNAL_END = 1.0  # of the journal below the bearing
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
@@ -56,10 +49,10 @@ BEARING_PLAY = 0.3  # along the axis: the horn alone carries along it
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
+STRIP = 0.3  # under the top of a ring's stator that its drawing does not vouch for
 CAGE_LIP = 1.5  # under the bearing's outer ring, thick and wide
 H_FLOOR = (45.0, 58.0)  # for an upright lidar and from 60 deg of tilt: stiffness and shadow (measured study)
 
-Axis = Literal["x", "y"]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -84,66 +77,15 @@ class Envelope:
         return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.under)])
 
 
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """The scanner along its axis: radii, lengths and the z of each plane (rotation frame).
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stack(Head):
+    """The scanner along its axis with the servo on it: horn, shaft through the ring, hub (rotation frame, mm)."""
 
-    Where the hub would cover a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
-    to the linkage from the lidar's side by its ears.
-    """
-
-    h: float
-    R_rot_laser: tuple[tuple[float, float, float], ...]
-    ring_length: float
-    ring_radius: float
     ring_bore: float
-    shaft_diameter: float
     flange_radius: float
     flange_thickness: float
     collar_radius: float
     collar_height: float
-    bearing: Bearing | None
-    sub_plate: Axis | None  # of the laser frame, along which its ears stick out
-
-    @property
-    def hub_radius(self) -> float:
-        """Of the linkage's hub."""
-        return self.shaft_diameter / 2 + HUB_WALL
-
-    @property
-    def shoulder(self) -> float:
-        """Height of the plane that parts what turns from what stands still, but for the journal."""
-        return -self.h - HUB_HEIGHT
-
-    @property
-    def journal(self) -> float:
-        """Length of the hub below its shoulder."""
-        return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
-
-    @property
-    def hub_bottom(self) -> float:
-        """Height of the hub's lower face."""
-        return self.shoulder - self.journal
-
-    @property
-    def clamp(self) -> float:
-        """Height of the radial screws."""
-        return self.shoulder + CLAMP_ABOVE_BOTTOM
-
-    @property
-    def spigot(self) -> float:
-        """Length of the shaft inside the hub."""
-        return SPIGOT + self.journal
-
-    @property
-    def spigot_top(self) -> float:
-        """Height of the shaft's upper end, which is the floor of the hub's bore."""
-        return self.hub_bottom + self.spigot
-
-    @property
-    def bearing_top(self) -> float:
-        """Height of the bearing's upper face."""
-        return self.shoulder - BEARING_STEP
 
     @property
     def bearing_middle(self) -> float:
@@ -193,11 +135,6 @@ class Stack:
         return self.ring_bottom - (RING_GAP if self.bearing is None else WAIST) - self.collar_height
 
     @property
-    def flat(self) -> float:
-        """Distance from the axis of the flat that keys the spigot."""
-        return self.shaft_diameter / 2 - 1.0
-
-    @property
     def shadow_half_angle(self) -> float:
         """Half angle [rad] of the cone about -z that ring, or cage, hide from the optical centre."""
         ring = math.atan2(max(self.ring_radius, self.hub_radius), -self.ring_top)
@@ -206,31 +143,31 @@ class Stack:
         seat = math.atan2(self.bearing.outer_mm / 2 + CAGE_SEAT_WALL, -self.cage_top)
         return max(ring, seat, math.atan2(self.cage_outer, -self.cage_roof))
 
-    def R(self) -> Array:
-        """Laser in the rotation frame, shape (3, 3)."""
-        return np.array(self.R_rot_laser)
+    @property
+    def sure_half_angle(self) -> float:
+        """Half angle [rad] of that cone by solids of revolution only, a little inside their edges."""
+        rims = []
+        if self.ring_radius > 0:
+            rims.append((self.ring_radius, self.ring_top - 1.0 - STRIP))
+        if self.bearing is not None:
+            rims.append((self.bearing.outer_mm / 2 + CAGE_SEAT_WALL, self.cage_top))
+            rims.append((self.cage_outer - WINDOWS_REACH, self.cage_roof + WINDOWS_REACH))
+        return max((math.atan2(radius, -z) for radius, z in rims), default=0.0)
 
 
 def stack_of(scanner: Scanner) -> Stack:
-    """Lay out the stack of one scanner.
+    """Lay out the stack of one scanner with its servo on the axis.
 
     Raises:
         BuildError: the ring has no bore, a bore too small for a shaft, or the lidar would hang upside down.
     """
-    R = exact(scanner.angles.R_rot_laser())
-    if R[2, 2] < -1e-9:
-        tilt = math.degrees(math.acos(R[2, 2]))
-        raise BuildError(
-            f"alignment_linkage: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
-            "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
-        )
+    R = lidar_pose(scanner)
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
-    h = _hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius, None)
-    rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
+    h = hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius, None)
     alone = Stack(
         h=h,
-        R_rot_laser=rows,
+        R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,
         ring_bore=bore,
@@ -246,17 +183,42 @@ def stack_of(scanner: Scanner) -> Stack:
     stack = replace(alone, bearing=bearing)
     if not covered_screws(scanner.lidar, stack):
         return stack
-    # the ears on the sides that lean less reach no lower than the lidar's corners
-    axis: Axis = "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
-    return replace(stack, h=_hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
+    axis = leaning_least(R)
+    return replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
 
 
-def covered_screws(lidar: Lidar, stack: Stack) -> list[int]:
+def lidar_pose(scanner: Scanner) -> Array:
+    """Laser in the rotation frame, shape (3, 3).
+
+    Raises:
+        BuildError: the lidar would hang upside down.
+    """
+    R = exact(scanner.angles.R_rot_laser())
+    if R[2, 2] < -1e-9:
+        tilt = math.degrees(math.acos(R[2, 2]))
+        raise BuildError(
+            f"alignment_linkage: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
+            "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
+        )
+    return R
+
+
+def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:
+    """A matrix (3, 3) as a record holds it."""
+    return tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
+
+
+def leaning_least(R: Array) -> Axis:
+    """The laser's axis along which a sub-plate's ears reach no lower than the lidar's corners."""
+    return "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
+
+
+def covered_screws(lidar: Lidar, stack: Head) -> list[int]:
     """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
     return [i for i, hole in enumerate(lidar.mount_holes_mm) if not _driver_passes(lidar, stack, hole)]
 
 
-def _driver_passes(lidar: Lidar, stack: Stack, hole: tuple[float, float]) -> bool:
+def _driver_passes(lidar: Lidar, stack: Head, hole: tuple[float, float]) -> bool:
     """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
     R, room = stack.R(), SCREWS[lidar.mount_screw].head_room
     depth = np.linspace(0.0, 150.0, 601)
@@ -372,7 +334,7 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)
 
 
-def _hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None) -> float:
+def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None) -> float:
     """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
     envelope = envelope_of(lidar, sub_plate)
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]

@@ -14,18 +14,18 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from cad.drive import Drive
 from cad.mass import Inertial
-from cad.sizing import Stack
 from design.frames import Array
 from design.scanner import Scanner
 
 
-def urdf_text(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
+def urdf_text(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
     """The text of `scanner.urdf`.
 
     Args:
         scanner: angles and products.
-        stack: the layout that the parts were made with.
+        drive: the layout that the parts were made with.
         bodies: mass properties of the links servo, rot (rotation frame) and laser (laser frame).
         meshes: names of the parts whose STL files belong to the links servo and rot.
     """
@@ -34,7 +34,7 @@ def urdf_text(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial], meshe
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
         '  <link name="world"/>',
-        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *_servo_shapes(scanner, stack)]),
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *_standing_shapes(drive)]),
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
@@ -90,13 +90,11 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _servo_shapes(scanner: Scanner, stack: Stack) -> list[tuple[str, str]]:
-    low, high = np.array(scanner.servo.case_min_mm), np.array(scanner.servo.case_max_mm)
-    centre = (low + high) / 2 + [0.0, 0.0, stack.horn]
-    shapes = [(_origin(centre / 1000), _box(high - low))]
-    if scanner.slip_ring is not None:
-        middle = (0.0, 0.0, (stack.ring_top + stack.ring_bottom) / 2000)
-        shapes.append((_origin(middle), _cylinder(stack.ring_radius, stack.ring_length)))
+def _standing_shapes(drive: Drive) -> list[tuple[str, str]]:
+    shapes = []
+    for centre, size in drive.shapes():
+        shape = _box(size) if len(size) == 3 else _cylinder(*size)
+        shapes.append((_origin(np.array(centre) / 1000), shape))
     return shapes
 
 

@@ -1,4 +1,4 @@
-"""Products that a scanner is made of: lidars, servos, slip rings, bearings, printers; and ready-made ones beside it.
+"""Products that a scanner is made of: lidars, servos, slip rings, bearings, belts, printers; ready-made ones beside it.
 
 One TOML file per product. Every value is written with its source and whether it was verified:
 
@@ -128,8 +128,27 @@ class Servo(Product):
     case_rear_holes_z_mm: float
 
 
+class Flange(Record):
+    """The flange of a capsule, by which its stator is held; mm."""
+
+    diameter_mm: float = Field(gt=0)
+    thickness_mm: float = Field(gt=0)
+    below_top_mm: float = Field(ge=0, description="of its face towards the rotor below the body's end there")
+    circle_mm: float = Field(gt=0)
+    holes: int = Field(gt=1)
+    hole_mm: float = Field(gt=0)
+    screw: Literal["M2.5", "M3", "M4", "M5"]
+
+
+class Rotor(Record):
+    """The stub of a capsule's rotor, out of which its leads come; mm."""
+
+    diameter_mm: float = Field(gt=0)
+    length_mm: float = Field(gt=0)
+
+
 class SlipRing(Product):
-    """A slip ring; `bore_mm = 0` is a capsule."""
+    """A slip ring; `bore_mm = 0` is a capsule, `length_mm` that of its body, and it needs `flange` and `rotor`."""
 
     kind: Literal["slip_ring"]
     bore_mm: float = Field(ge=0)
@@ -139,6 +158,25 @@ class SlipRing(Product):
     max_rpm: float | None = Field(default=None, gt=0)
     circuits: str
     price_usd: float | None = Field(default=None, gt=0)
+    # left out of the record where there is none, so that a ring with a bore keeps its digest
+    flange: Flange | None = Field(default=None, exclude_if=lambda value: value is None)
+    rotor: Rotor | None = Field(default=None, exclude_if=lambda value: value is None)
+
+    @model_validator(mode="after")
+    def _capsules_have_a_flange(self) -> SlipRing:
+        if self.bore_mm > 0:
+            return self
+        if self.flange is None or self.rotor is None:
+            raise ValueError("bore_mm = 0 is a capsule: tell its flange and rotor, or take a through bore (12.7 mm)")
+        if self.flange.circle_mm + self.flange.hole_mm > self.flange.diameter_mm:
+            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} leaves no edge around its holes")
+        if self.flange.circle_mm - self.flange.hole_mm < self.outer_diameter_mm:
+            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} puts its holes into outer_diameter_mm")
+        if self.flange.below_top_mm + self.flange.thickness_mm > self.length_mm:
+            raise ValueError(f"flange.below_top_mm {self.flange.below_top_mm:g} lies beyond length_mm")
+        if self.rotor.diameter_mm >= self.outer_diameter_mm:
+            raise ValueError(f"rotor.diameter_mm {self.rotor.diameter_mm:g} is not below outer_diameter_mm")
+        return self
 
 
 class Bearing(Product):
@@ -156,6 +194,29 @@ class Bearing(Product):
     def _rings_have_walls(self) -> Bearing:
         if self.outer_mm < self.bore_mm + 8.0:
             raise ValueError(f"outer_mm {self.outer_mm:g} leaves no ring around bore_mm {self.bore_mm:g}")
+        return self
+
+
+class Belt(Product):
+    """A closed toothed belt of one profile and width, in the lengths that shops keep."""
+
+    kind: Literal["belt"]
+    pitch_mm: float = Field(gt=0)
+    width_mm: float = Field(gt=0)
+    thickness_mm: float = Field(gt=0, description="with its teeth")
+    tooth_height_mm: float = Field(gt=0)
+    pitch_line_mm: float = Field(gt=0, description="from the tips of a pulley's teeth out to the belt's cords")
+    groove_radius_mm: float = Field(gt=0, description="of the pulley's groove")
+    teeth: tuple[int, ...] = Field(min_length=1, description="of the lengths in stock")
+    working_tension_n: float = Field(gt=0, description="that the teeth carry all their life")
+    stiffness_n: float = Field(gt=0, description="tension for a strain of 1")
+    mass_g: float = Field(gt=0)
+    price_usd: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _teeth_are_inside(self) -> Belt:
+        if self.tooth_height_mm >= self.thickness_mm or 2 * self.groove_radius_mm >= self.pitch_mm:
+            raise ValueError(f"tooth_height_mm {self.tooth_height_mm:g} or groove_radius_mm leaves no belt or no tooth")
         return self
 
 
@@ -189,15 +250,18 @@ class Printer(Product):
     bed_mm: Triple
     density_g_cm3: float = Field(gt=0)
     modulus_gpa: float = Field(gt=0, description="of elasticity, printed solid")
-    thread: Literal["cut", "insert"] = Field(default="cut", description="what screws that end in a part hold on to")
+    thread: Literal["cut", "insert", "nut"] = Field(
+        default="cut", description="what screws that end in a part hold on to"
+    )
 
 
-P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Printer, Multibeam)
+P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Belt, Printer, Multibeam)
 KINDS: dict[str, type[Product]] = {
     "lidar": Lidar,
     "servo": Servo,
     "slip_ring": SlipRing,
     "bearing": Bearing,
+    "belt": Belt,
     "printer": Printer,
     "multibeam": Multibeam,
 }
@@ -226,6 +290,11 @@ class Catalogue:
         """All bearings, smallest bore first."""
         found = [product for product in self.products.values() if isinstance(product, Bearing)]
         return tuple(sorted(found, key=lambda bearing: (bearing.bore_mm, bearing.outer_mm, bearing.name)))
+
+    def belts(self) -> tuple[Belt, ...]:
+        """All belts, the narrowest first."""
+        found = [product for product in self.products.values() if isinstance(product, Belt)]
+        return tuple(sorted(found, key=lambda belt: (belt.width_mm, belt.pitch_mm, belt.name)))
 
     def named(self, name: str) -> Product:
         """The product of that name, of whatever kind.

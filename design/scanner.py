@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from design.angles import AngleSet
-from design.catalogue import Bearing, Catalogue, Lidar, Printer, Servo, SlipRing
+from design.catalogue import Bearing, Belt, Catalogue, Lidar, Printer, Servo, SlipRing
 from design.deck_holes import Circle, Rectangle
 
 
@@ -15,6 +15,7 @@ class Scanner:
 
     Attributes:
         bearings: those that a tilted axis may choose from, smallest bore first.
+        belts: those that a capsule ring's scanner may choose from, the narrowest first.
         deck: holes that the base mount is screwed to; None where the mount may choose them.
     """
 
@@ -24,6 +25,7 @@ class Scanner:
     slip_ring: SlipRing | None
     printer: Printer
     bearings: tuple[Bearing, ...]
+    belts: tuple[Belt, ...] = ()
     deck: Rectangle | Circle | None = None
 
 
@@ -40,5 +42,6 @@ def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue, deck: Recta
         slip_ring=None if angles.slip_ring is None else catalogue.get(angles.slip_ring, SlipRing),
         printer=catalogue.get(printer, Printer),
         bearings=catalogue.bearings(),
+        belts=catalogue.belts(),
         deck=deck,
     )

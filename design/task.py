@@ -12,16 +12,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from design.camera import Camera
-from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue, read_toml
+from design.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
 from design.deck_holes import DeckHoles
 from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
-from design.record import Record, explain
+from design.record import Record
 from design.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
+from design.shipped import named_record, names_in
 from design.surface import Surface, surface_of
 
 SHIPPED = Path(__file__).parent / "tasks"
@@ -187,12 +188,7 @@ def load_task(path: Path) -> LoadedTask:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
             cannot do the motion.
     """
-    source = _find(path)
-    table = read_toml(source, "the task file")
-    try:
-        task = Task.model_validate(table)
-    except ValidationError as error:
-        raise TaskError(explain(error, source, Task)) from error
+    task, source = named_record(path, Task, SHIPPED, "task")
     products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
     check_products(task, products, source)
     limits = task.limits
@@ -209,16 +205,7 @@ def load_task(path: Path) -> LoadedTask:
 
 def shipped_tasks() -> list[str]:
     """Names of the tasks that come with the package."""
-    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
-
-
-def _find(path: Path) -> Path:
-    if path.suffix == ".toml" or path.is_file():
-        return path
-    named = SHIPPED / f"{path}.toml"
-    if path.parent == Path() and named.exists():
-        return named
-    raise TaskError(f"{path}: no such task file, and no shipped task of that name: {', '.join(shipped_tasks())}")
+    return names_in(SHIPPED)
 
 
 def check_products(task: Task, products: Catalogue, source: Path) -> None:
@@ -249,11 +236,6 @@ def check_products(task: Task, products: Catalogue, source: Path) -> None:
     if ring is None:
         word = "turns without end" if isinstance(task.motion, Spin | Shortest) else "goes all around"
         raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
-    if ring.bore_mm == 0:
-        raise TaskError(
-            f"{source}: slip_ring = '{ring.name}': bore_mm = 0: a capsule ring lets no shaft through, so in "
-            "direct drive the servo cannot reach the lidar past the ring's stator; take a through-bore ring (12.7 mm)"
-        )
 
 
 def _table(region: Map | Mesh, folder: Path) -> Array:

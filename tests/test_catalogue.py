@@ -35,8 +35,8 @@ def test_all_products_of_the_issue_are_there(shipped):
     by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
     assert by_kind[Lidar] == {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX", "LMS 200"}
     assert by_kind[Servo] == {"MX-64R", "MX-28", "XM430-W350", "AX-12A"}
-    assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210"}
-    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "sla", "cnc"}
+    assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"}
+    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -122,7 +122,7 @@ def test_what_the_issue_says_of_the_rings(shipped):
         ("utm-30lx", Lidar, ["did you mean 'UTM-30LX'"]),
         ("MX-64R", Lidar, ["lidar"]),
         ("MX64", Servo, ["servo", "did you mean 'MX-64R'"]),
-        ("zzz", SlipRing, ["slip ring", "known: SNU11-P0210, UH1256-02-0610-06S"]),
+        ("zzz", SlipRing, ["slip ring", "known: SNU11-P0210, SRC022A-6, UH1256-02-0610-06S"]),
         ("fdm", Printer, ["printer", "did you mean 'fdm-0.4'"]),
         ("UTM30LX", Product, ["did you mean 'UTM-30LX'"]),
     ],

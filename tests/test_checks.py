@@ -16,6 +16,7 @@ from cad.checks.clearance import clearance_checks, distance_over_a_turn
 from cad.checks.islands import islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
+from cad.drive import drive_of
 from cad.mass import Inertial
 from cad.mesh import Mesh, mesh_of
 from cad.sizing import stack_of
@@ -144,7 +145,7 @@ def test_loads_against_hand_calculation():
     alone = replace(scanner, bearings=())
     stack = stack_of(alone)
     lever = -stack.horn / 1000 - 0.030
-    found = {c.kind: c for c in mechanics_checks(alone, stack, bodies(0.5, -0.030))}
+    found = {c.kind: c for c in mechanics_checks(alone, drive_of(alone), bodies(0.5, -0.030))}
     weight = 0.5 * 9.80665
     assert found["tilt_moment"].value == pytest.approx(weight * lever, rel=1e-3)
     assert found["tilt_moment"].severity == "error"
@@ -152,32 +153,33 @@ def test_loads_against_hand_calculation():
     about_axis = 0.5 * (0.03**2 + 0.012**2)
     assert found["spin_up_torque"].value == pytest.approx(weight * 0.012 + about_axis * 2 * np.pi / 0.2, rel=1e-3)
     assert found["axial_load"].value == pytest.approx(0, abs=1e-6)
-    held = {c.kind: c for c in mechanics_checks(scanner, stack_of(scanner), bodies(0.5, -0.030))}
+    held = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}
     assert held["tilt_moment"].severity == "pass" and held["bearing_load"].value > weight
-    heavy = {c.kind: c.severity for c in mechanics_checks(scanner_for(0, 0, 30, -30), stack, bodies(3.0, -0.030))}
+    upright = scanner_for(0, 0, 30, -30)
+    heavy = {c.kind: c.severity for c in mechanics_checks(upright, drive_of(upright), bodies(3.0, -0.030))}
     assert heavy["axial_load"] == "error"
 
 
 def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
     scanner = scanner_for(0, 90, 30, -30)
-    found = {c.kind: c for c in mechanics_checks(scanner, stack_of(scanner), bodies(0.5, -0.030))}["flanks"]
+    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}["flanks"]
     assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
     grams, at, azimuth = (
         float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.message).groups()
     )
     assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
     upright = scanner_for(0, 0, 30, -30)
-    found = {c.kind: c for c in mechanics_checks(upright, stack_of(upright), bodies(0.5, -0.030))}["flanks"]
+    found = {c.kind: c for c in mechanics_checks(upright, drive_of(upright), bodies(0.5, -0.030))}["flanks"]
     assert found.severity == "pass"
     exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
-    assert {c.kind: c.severity for c in mechanics_checks(exact, stack_of(exact), bodies(0.5, -0.03))}[
+    assert {c.kind: c.severity for c in mechanics_checks(exact, drive_of(exact), bodies(0.5, -0.03))}[
         "flanks"
     ] == "note"
 
 
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
-    found = {c.kind: c for c in mechanics_checks(scanner, stack_of(scanner), bodies(0.3, -0.03))}
+    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.3, -0.03))}
     for kind in ("tilt_moment", "axial_load"):
         assert (found[kind].severity, found[kind].limit) == ("note", None)
         assert "gives no rating" in found[kind].message

@@ -50,7 +50,7 @@ def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count
     scanner = scanner_for(alpha_rot, beta_rot, deck)
     stack = stack_of(scanner)
     where = deck_of(scanner, stack)
-    mesh = checked_mesh(base_mount(mount_of(scanner, stack, where)), "base_mount")
+    mesh = checked_mesh(base_mount(mount_of(scanner, where)), "base_mount")
     turn = scanner.angles.T_world_rot(0.0)[:3, :3]
     world = mesh.vertices @ turn.T + np.array(where.t_world_rot)
     assert np.abs(world[:, 2]).min() < 1e-6

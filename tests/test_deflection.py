@@ -145,7 +145,7 @@ def test_the_modulus_moves_the_linkage_and_not_the_shaft(made):
         "rot": Inertial(0.2, np.array([0, 0, -0.05]), 1e-4 * np.eye(3)),
         "laser": Inertial(0.37, np.array([0, 0, -0.012]), 1e-4 * np.eye(3)),
     }
-    args = (assembly.stack, assembly.linkage, bodies, made.result.meshes)
+    args = (assembly.drive, assembly.linkage, bodies, made.result.meshes)
     stiff = replace(scanner, printer=scanner.printer.model_copy(update={"modulus_gpa": 23.0}))
     one, other = sag_of(scanner, *args), sag_of(stiff, *args)
     shaft = (10 * other.rotation_rad - one.rotation_rad) / 9  # what the modulus does not change

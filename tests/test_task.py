@@ -21,7 +21,12 @@ slip_ring = "UH1256-02-0610-06S"
 mode = "spin"
 period_s = 18.0
 """
-CAPSULE = (PRODUCTS / "uh1256.toml").read_text(encoding="utf-8").replace("value = 12.7", "value = 0.0")
+BARE = (PRODUCTS / "uh1256.toml").read_text(encoding="utf-8").replace("value = 12.7", "value = 0.0")
+FLANGE = "diameter_mm = 80.0, thickness_mm = 3.0, below_top_mm = 5.0, circle_mm = 70.0, holes = 3, hole_mm = 5.4"
+CAPSULE = f"""{BARE}
+flange = {{ value = {{ {FLANGE}, screw = "M5" }}, source = "a test", verified = false }}
+rotor = {{ value = {{ diameter_mm = 10.0, length_mm = 8.0 }}, source = "a test", verified = false }}
+"""
 RING = 'slip_ring = "UH1256-02-0610-06S"'
 ROLLING = np.radians([0, 90, 0, -90])
 
@@ -84,7 +89,7 @@ WRONG = {
     "name of a ring": (swap("0610-06S", "0610"), ["task.toml", "slip_ring", "did you mean 'UH1256-02-0610-06S'"]),
     "name of a printer": (ahead('printer = "fdm-0.5"'), ["task.toml", "printer", "did you mean 'fdm-0.4'"]),
     "servo for a lidar": (swap('"UTM-30LX"', '"MX-64R"'), ["task.toml", "sensor", "MX-64R"]),
-    "ring without bore": (ahead('catalogue = ["capsule.toml"]'), ["task.toml", "slip_ring", "bore_mm = 0", "12.7"]),
+    "capsule without a flange": (ahead('catalogue = ["bare.toml"]'), ["bare.toml", "bore_mm = 0", "flange", "12.7"]),
     "spin without ring": (swap(RING, ""), ["task.toml", "slip_ring", "spin"]),
     "catalogue file missing": (ahead('catalogue = ["none.toml"]'), ["none.toml", "cannot read"]),
     "catalogue no list": (ahead('catalogue = "capsule.toml"'), ["task.toml", "catalogue"]),
@@ -168,6 +173,7 @@ def test_wrong_input_is_one_line_that_names_file_and_field(tmp_path, text, words
     path = tmp_path / "task.toml"
     path.write_text(text, encoding="utf-8")
     (tmp_path / "capsule.toml").write_text(CAPSULE, encoding="utf-8")
+    (tmp_path / "bare.toml").write_text(BARE, encoding="utf-8")
     save_maps(tmp_path)
     with pytest.raises(TaskError) as caught:
         load_task(path)
@@ -242,7 +248,15 @@ def load_text(tmp_path, text):
 
 
 def test_all_shipped_tasks_load_under_their_own_name(load_shipped):
-    assert set(load_shipped) == {"ceiling", "ground_ahead", "indoor_urg", "pitching", "rolling", "uniform"}
+    assert set(load_shipped) == {
+        "capsule_ring",
+        "ceiling",
+        "ground_ahead",
+        "indoor_urg",
+        "pitching",
+        "rolling",
+        "uniform",
+    }
     assert all(loaded.task.name == name for name, loaded in load_shipped.items())
     assert len({loaded.sha256() for loaded in load_shipped.values()}) == len(load_shipped)
     ahead = load_shipped["ground_ahead"].task

@@ -25,12 +25,24 @@ LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
 CLEARANCE = 0.4  # between what turns and what stands still
 FAR = 5.0  # distances beyond it are not worked out
 SHARED_MM3 = 0.05  # of two bodies that touch: the noise of their meshes
-UNITS = (("servo_case", "servo_horn"), ("ring_stator", "ring_rotor"), ("bearing_outer", "bearing_inner"))
+UNITS = (
+    ("servo_case", "servo_horn"),
+    ("ring_stator", "ring_rotor"),
+    ("bearing_outer", "bearing_inner"),
+    ("bearing_outer_upper", "bearing_inner_upper"),
+    ("bearing_outer_lower", "bearing_inner_lower"),
+    ("belt", "shaft_pulley"),  # it lies around the pulley and turns with it
+)
 
 
-def clearance_checks(meshes: Mapping[str, Mesh]) -> list[Check]:
-    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together."""
-    return [_turning(meshes), _together(meshes)]
+def clearance_checks(meshes: Mapping[str, Mesh], sweeps: Mapping[str, Mesh] | None = None) -> list[Check]:
+    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together.
+
+    Args:
+        meshes: of all bodies by name.
+        sweeps: what some of them fill that turn about an axis of their own.
+    """
+    return [_turning({**meshes, **(sweeps or {})}), _together(meshes)]
 
 
 def distance_over_a_turn(one: Mesh, other: Mesh) -> float:

@@ -15,15 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cad.checks.check import Check, Severity, tidy
-from cad.loads import ALUMINIUM_PA
+from cad.drive import Drive
 from cad.mass import Inertial, together
 from cad.mesh import Mesh
 from cad.parts.alignment_linkage import AlignmentLinkage
-from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
-from cad.remarks import shaft_is_turned
-from cad.sizing import Stack
 from cad.statics.sag import Sag, linkage_sag, with_shaft
-from cad.statics.shaft import shaft_bend
 from design.frames import Array
 from design.scanner import Scanner
 
@@ -44,7 +40,7 @@ class Beams:
 
 def deflection_checks(
     scanner: Scanner,
-    stack: Stack,
+    drive: Drive,
     linkage: AlignmentLinkage,
     bodies: Mapping[str, Inertial],
     meshes: Mapping[str, Mesh],
@@ -53,7 +49,7 @@ def deflection_checks(
 
     Args:
         scanner: angles and products.
-        stack: its layout.
+        drive: its layout.
         linkage: parameters of the linkage.
         bodies: of `build.link_bodies`.
         meshes: of all parts.
@@ -61,7 +57,7 @@ def deflection_checks(
     down = -scanner.angles.T_world_rot(0.0)[2, :3]
     limit = math.degrees(math.atan(scanner.lidar.range_sigma_mm / FAR_MM))
     try:
-        sag = sag_of(scanner, stack, linkage, bodies, meshes)
+        sag = sag_of(scanner, drive, linkage, bodies, meshes)
     except RuntimeError as error:
         message = f"alignment_linkage: nothing carries the seat: no equilibrium by finite elements ({error})"
         return [Check("deflection", "error", None, tidy(limit), "deg", "alignment_linkage", message)]
@@ -79,20 +75,18 @@ def deflection_checks(
 
 def sag_of(
     scanner: Scanner,
-    stack: Stack,
+    drive: Drive,
     linkage: AlignmentLinkage,
     bodies: Mapping[str, Inertial],
     meshes: Mapping[str, Mesh],
 ) -> Sag:
     """Of everything between horn and lidar; arguments as for `deflection_checks`."""
-    printer, cage = scanner.printer, cage_of(scanner, stack)
+    stack, printer = drive.stack, scanner.printer
     seat = np.array([linkage.half_x, linkage.half_y, linkage.seat])
     printed = [meshes[name] for name in CARRIERS if name in meshes]
     sag = linkage_sag(stack, printed, seat, bodies["laser"], 1000 * printer.modulus_gpa, printer.density_g_cm3)
-    modulus = ALUMINIUM_PA if shaft_is_turned(stack) else 1e9 * printer.modulus_gpa
-    shaft = shaft_bend(stack, modulus, 0.0 if cage is None else stiffness_n_per_m(cage))
     rotor = together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
-    return with_shaft(sag, shaft, stack, rotor)
+    return with_shaft(sag, drive.bend(), stack, rotor)
 
 
 def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[Beams, Beams]:

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from cad.checks.check import Check, at_most, note, tidy
+from cad.drive import Drive
 from cad.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
 from cad.mass import Inertial, together
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
@@ -25,24 +26,29 @@ BALANCE_AT_MM = 50.0  # from the axis, where a counterweight is worked out
 NO_TORQUE_NM = 1e-3  # less than any ring or bearing rubs with
 
 
-def mechanics_checks(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> list[Check]:
+def mechanics_checks(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial]) -> list[Check]:
     """Everything that has to do with weight.
 
     Args:
         scanner: angles and products.
-        stack: its layout.
+        drive: its layout.
         bodies: of `build.link_bodies`.
     """
     rotor = together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
-    weight = rotor_weight(scanner, stack, bodies)
-    shared = _shared(scanner, stack, weight)
+    weight = rotor_weight(scanner, drive.stack, bodies)
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", "centre of mass off the axis"),
         *_torques(scanner, rotor, weight),
         _flanks(scanner, rotor, weight),
-        *_forces(scanner, stack, weight, shared),
-        _slope(scanner, shared),
+        *drive.load_checks(bodies),
     ]
+
+
+def direct_loads(scanner: Scanner, stack: Stack, bodies: dict[str, Inertial]) -> list[Check]:
+    """What horn and bearing carry where the servo is on the axis; arguments as for `mechanics_checks`."""
+    weight = rotor_weight(scanner, stack, bodies)
+    shared = _shared(scanner, stack, weight)
+    return [*_forces(scanner, stack, weight, shared), _slope(scanner, shared)]
 
 
 def _shared(scanner: Scanner, stack: Stack, weight: Weight) -> Supported:
@@ -51,18 +57,24 @@ def _shared(scanner: Scanner, stack: Stack, weight: Weight) -> Supported:
 
 
 def _torques(scanner: Scanner, rotor: Inertial, weight: Weight) -> list[Check]:
-    servo, motion = scanner.servo, scanner.angles.motion
+    servo = scanner.servo
     limit = TORQUE_SHARE * servo.stall_torque_nm
     static = weight.across_n * weight.off_axis_m
-    period = SLOWEST_PERIOD_S if motion is None else getattr(motion, "period_s", SLOWEST_PERIOD_S)
-    x, y = rotor.centre_m[:2]
-    about_axis = float(rotor.inertia_kg_m2[2, 2] + rotor.mass_kg * (x**2 + y**2))
-    spin_up = static + about_axis * 2 * math.pi / period / SPIN_UP_S
+    spin_up = spin_up_nm(scanner, rotor, weight)
     what = f"of {servo.name}, a fifth of its stall torque"
     return [
         at_most("static_torque", static, limit, "N m", "servo", f"torque that holds the imbalance, {what}"),
         at_most("spin_up_torque", spin_up, limit, "N m", "servo", f"torque to full speed in {SPIN_UP_S:g} s, {what}"),
     ]
+
+
+def spin_up_nm(scanner: Scanner, rotor: Inertial, weight: Weight) -> float:
+    """Torque that brings the rotor to full speed in SPIN_UP_S against its imbalance."""
+    motion = scanner.angles.motion
+    period = SLOWEST_PERIOD_S if motion is None else getattr(motion, "period_s", SLOWEST_PERIOD_S)
+    x, y = rotor.centre_m[:2]
+    about_axis = float(rotor.inertia_kg_m2[2, 2] + rotor.mass_kg * (x**2 + y**2))
+    return weight.across_n * weight.off_axis_m + about_axis * 2 * math.pi / period / SPIN_UP_S
 
 
 def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight) -> Check:

@@ -6,17 +6,16 @@ They look at the parts without their labels: a groove between two strokes is no 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from cad.assembly import Assembly, make_parts
-from cad.build import PartsResult, link_bodies, write_files
+from cad.build import link_bodies
 from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
 from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
-from cad.remarks import shaft_is_turned, unverified
+from cad.remarks import products_of, unverified
 from cad.shadow import shadow_of, triangles_of
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
@@ -24,19 +23,17 @@ from design.shadow import Shadow, own_body_bytes
 Say = Callable[[str], None]
 
 
-def check_parts(scanner: Scanner, made: PartsResult, folder: Path, progress: Say) -> list[Check]:
-    """Check the parts of a build and write `checks.json` and `own_body.npz` into its folder.
+def check_files(scanner: Scanner, assembly: Assembly, progress: Say) -> dict[str, bytes]:
+    """`checks.json` and `own_body.npz` of a build.
 
     Args:
         scanner: angles and products.
-        made: its parts, of `build.build_parts`.
-        folder: the build folder.
+        assembly: its parts.
         progress: called with a line of text before each step.
     """
-    checks, shadow = run_checks(scanner, made.assembly, progress)
+    checks, shadow = run_checks(scanner, assembly, progress)
     own_body = own_body_bytes(shadow, scanner.lidar.bearings_rad())
-    write_files(folder, {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body})
-    return checks
+    return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}
 
 
 def check_scanner(scanner: Scanner, progress: Say) -> list[Check]:
@@ -53,24 +50,23 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     """Checks and shadow."""
     progress("casting the beams")
     meshes = assembly.meshes()
-    triangles = triangles_of(meshes)
+    outlines = assembly.outlines()
+    triangles = triangles_of(outlines)
     shadow = shadow_of(scanner, triangles)
     progress("checking clearance, loads and walls")
-    turned = {"servo_shaft"} if shaft_is_turned(assembly.stack) else set()
-    printed = {name: solid for name, solid in assembly.made.items() if name not in turned}
-    products = (scanner.lidar, scanner.servo, scanner.slip_ring, assembly.stack.bearing, scanner.printer)
+    drive = assembly.drive
+    printed = {name: solid for name, solid in assembly.made.items() if name not in drive.turned()}
     doubts = [
         Check("unverified", "note", None, None, "", product.name, finding.message)
-        for product in products
-        if product is not None
-        for finding in unverified(product)
+        for product in products_of(scanner, drive)
+        for finding in unverified(product, drive)
     ]
     bodies = link_bodies(scanner, assembly)
     checks = [
-        *clearance_checks(meshes),
+        *clearance_checks(meshes, outlines),
         *beam_checks(scanner, shadow, triangles),
-        *mechanics_checks(scanner, assembly.stack, bodies),
-        *deflection_checks(scanner, assembly.stack, assembly.linkage, bodies, meshes),
+        *mechanics_checks(scanner, drive, bodies),
+        *deflection_checks(scanner, drive, assembly.linkage, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes),
         *doubts,
     ]

@@ -15,6 +15,7 @@ from cad.holes import Round
 from cad.joints import Joint
 from design.scanner import Scanner
 
+HOLDS = ("thread", "trap")  # what of a joint a part holds itself
 AT_M = 10.0  # distance at which a wrong angle is judged
 
 
@@ -50,8 +51,8 @@ def drawing_of(
     """The sheet of one part."""
     lidar_axis = assembly.stack.R()[:, 2] if name in _carriers(joints) else None
     metal = name in turned
-    half_fit = number(scanner.printer.fit_clearance_mm / 2)
-    part = part_of(assembly.made[name], rounds, lidar_axis, f"  0/-{half_fit}" if metal else "")
+    tolerance = _tolerance(scanner, assembly) if metal else ("", "")
+    part = part_of(assembly.made[name], rounds, lidar_axis, f"  {tolerance[0]}" if metal else "")
     views = views_of(part)
     material = "aluminium or steel, turned" if metal else f"{scanner.printer.name}, solid"
     cells = (
@@ -64,17 +65,23 @@ def drawing_of(
         ("general tolerances", "ISO 2768-m" if metal else "ISO 2768-c"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, metal)
+    notes = _notes(scanner, part, tolerance)
     return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
 def _carriers(joints: list[Joint]) -> set[str]:
     """The part that the lidar is screwed to, and the one that this is screwed to in turn."""
     seats = {joint.part for joint in joints if joint.onto.startswith("lidar")}
-    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing == "thread"} - {"lidar_body"}
+    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing in HOLDS} - {"lidar_body"}
 
 
-def _notes(scanner: Scanner, part: Part, metal: bool) -> list[str]:
+def _tolerance(scanner: Scanner, assembly: Assembly) -> tuple[str, str]:
+    """Of the outer diameters of turned parts, and what for."""
+    fit = f"0/-{number(scanner.printer.fit_clearance_mm / 2)}", "half of the fit in the printed hub"
+    return assembly.drive.tolerance() or fit
+
+
+def _notes(scanner: Scanner, part: Part, tolerance: tuple[str, str]) -> list[str]:
     printer, angles = scanner.printer, scanner.angles.angles_deg
     box = part.solid.BoundingBox()
     notes = [
@@ -82,8 +89,8 @@ def _notes(scanner: Scanner, part: Part, metal: bool) -> list[str]:
         f"Z 0 is {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
         f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
     ]
-    if metal:
-        notes.append(f"Outer diameters 0/-{number(printer.fit_clearance_mm / 2)}: half of the fit in the printed hub.")
+    if tolerance[0]:
+        notes.append(f"Outer diameters {tolerance[0]}: {tolerance[1]}.")
     else:
         notes.append(
             f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "

@@ -17,12 +17,13 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
+from cad.head import Head
 from cad.loads import JOURNAL_WALL
 from cad.mesh import checked_mesh
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.sub_plate import EAR_SCREW, ear_screws, plate_marks
-from cad.screws import SCREWS, Screw, thread_hole
-from cad.sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, Stack, box_corners, envelope_of
+from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
+from cad.sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, box_corners, envelope_of
 from cad.solids import building, checked
 from design.errors import BuildError
 from design.frames import Array
@@ -36,13 +37,15 @@ WIRES_HALF_WIDTH = 5.0
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
 HEEL = 8.0  # how far the neck reaches below a lying plate
 RETRIES = 5
+TRAP_WAY = 15.0  # below the plate: the neck may begin there
+TRAP_WALL = 1.2  # between wires and a nut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlignmentLinkage:
     """Lengths in mm, angles in rad, directions in the rotation frame."""
 
-    stack: Stack
+    stack: Head
     seat: float  # z of the lidar's base in the laser frame
     top: float  # z of the plate's upper face: the seat, or below a sub-plate
     half_x: float
@@ -53,6 +56,7 @@ class AlignmentLinkage:
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: float  # diameter
     clamp_thread: float  # diameter
+    trap: Trap | None  # of all these screws, if they hold in nuts
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
@@ -63,7 +67,7 @@ class AlignmentLinkage:
     clamp_azimuths: tuple[float, ...]
 
 
-def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
+def linkage_of(scanner: Scanner, stack: Head) -> AlignmentLinkage:
     """Parameters of the linkage of one scanner.
 
     Raises:
@@ -84,6 +88,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in lidar.mount_holes_mm)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
+    trap = trap_of(CLAMP_SCREW, printer)
     return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
@@ -94,8 +99,9 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         body=envelope.body,
         ears=None if stack.sub_plate is None else _grown(envelope.under),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
-        ear_thread=thread_hole(EAR_SCREW, printer),
-        clamp_thread=thread_hole(CLAMP_SCREW, printer),
+        ear_thread=thread_hole(EAR_SCREW, printer) if trap is None else trap.hole,
+        clamp_thread=thread_hole(CLAMP_SCREW, printer) if trap is None else trap.hole,
+        trap=trap,
         cables=envelope.cables,
         fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
         fan=_free_bearings(stack, lidar.bearings_rad()),
@@ -125,37 +131,64 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     raise BuildError(f"{fault} (after {RETRIES + 1} attempts)")
 
 
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """What the linkage is made of, each shape in its place: `alignment_linkage` and `cad/draft.py` put it together.
+
+    Both do it in this order: plate and neck, less room and beside, of which the body of the plate stays; with the hub,
+    less the room; less the holes.
+    """
+
+    plate: cq.Shape
+    neck: cq.Shape
+    room: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
+    beside: list[cq.Shape]  # the fan, and fins of the neck
+    hub: cq.Shape
+    holes: list[cq.Shape]  # and marks
+
+
+def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
+    """The shapes; `attempt` turns the neck a little.
+
+    Raises:
+        BuildError: the kernel fails at one.
+    """
+    with building(PART, "plate and neck", "tilt", _tilt(p)):
+        laser = solids.location(p.stack.R())
+        fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
+        neck = _neck_corners(p, attempt) @ p.stack.R()
+        beside = [*fan, *fins_beside(p.top, p.body, p.cables, neck)]
+        marked = [*_holes(p), *_plate_marks(p)]
+        return Shapes(
+            plate=_plate(p).moved(laser),
+            neck=_neck(p, attempt),
+            room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p))],
+            beside=[shape.moved(laser) for shape in beside],
+            hub=_hub(p),
+            holes=[*(shape.moved(laser) for shape in marked), *_clamps(p), *_wires(p), _index_groove(p), _bore(p)],
+        )
+
+
 def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
-    tilt = f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
-    stack = p.stack
-    laser = solids.location(stack.R())
+    tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
     with building(PART, "plate and neck", "tilt", tilt):
-        plate = _plate(p)
-        body = plate.moved(laser).fuse(_neck(p, attempt))
-        body = checked(body, PART, "plate and neck", "tilt", tilt)
+        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck), PART, "plate and neck", "tilt", tilt)
     with building(PART, "free room of lidar, cables and fan", "tilt", tilt):
-        lidar_room = [shape.moved(laser) for shape in _lidar_room(p)]
-        drivers = [shape.moved(laser) for shape in _drivers(p)]
-        fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z).moved(laser) for start, end in p.fan]
-        neck = _neck_corners(p, attempt) @ stack.R()
-        fins = [shape.moved(laser) for shape in fins_beside(p.top, p.body, p.cables, neck)]
-        body = body.cut(*lidar_room, *drivers, *fan, *fins)
         # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
-        body = _largest(body)
+        body = _largest(body.cut(*shapes.room, *shapes.beside))
     with building(PART, "hub", "h", f"{stack.h} mm"):
-        hub = _hub(p)
-        body = body.fuse(hub).cut(*lidar_room, *drivers)
-        body = checked(body, PART, "hub", "h", f"{stack.h} mm")
+        body = checked(body.fuse(shapes.hub).cut(*shapes.room), PART, "hub", "h", f"{stack.h} mm")
     with building(PART, "holes and marks", "h", f"{stack.h} mm"):
-        holes = [shape.moved(laser) for shape in _holes(p)]
-        marks = [shape.moved(laser) for shape in _plate_marks(p)]
-        body = body.cut(*holes, *marks, *_clamps(p), *_wires(p), _index_groove(p), _bore(p)).clean()
-        body = checked(body, PART, "holes and marks", "h", f"{stack.h} mm")
-    bottom = body.BoundingBox().zmin
+        linkage = checked(body.cut(*shapes.holes).clean(), PART, "holes and marks", "h", f"{stack.h} mm")
+    bottom = linkage.BoundingBox().zmin
     if abs(bottom - stack.hub_bottom) > 1e-3:
         raise BuildError(f"{PART}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub")
-    checked_mesh(body, PART)
-    return body
+    checked_mesh(linkage, PART)
+    return linkage
+
+
+def _tilt(p: AlignmentLinkage) -> str:
+    return f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
 
 
 def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
@@ -181,7 +214,7 @@ def _neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     return np.concatenate(layers)
 
 
-def _heel(plate: Array, stack: Stack) -> Array:
+def _heel(plate: Array, stack: Head) -> Array:
     """The lower half of the plate's corners, moved down: else a lying plate hangs on a wedge that ends in an edge."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
@@ -229,7 +262,15 @@ def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
     pocket = p.top - p.screw.head_height - 0.5
     pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
     low = p.top - PLATE_THICKNESS - 1.0
-    return pockets + [solids.upright(p.ear_thread / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
+    traps = [] if p.trap is None else [_ear_trap(p, p.trap, hole) for hole in p.ear_screws]
+    return pockets + traps + [solids.upright(p.ear_thread / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
+
+
+def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.Solid:
+    """Pocket in the plate's lower face and the nut's way into it; its flats face the ends of the ear."""
+    outline = solids.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
+    low = p.top - PLATE_THICKNESS
+    return solids.prism(outline, low - TRAP_WAY, low + trap.depth)
 
 
 def _grown(box: Box) -> Box:
@@ -238,7 +279,7 @@ def _grown(box: Box) -> Box:
     return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
-def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
+def _free_bearings(stack: Head, bearings: Array) -> tuple[tuple[float, float], ...]:
     """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there."""
     first, last = float(bearings.min()), float(bearings.max())
     q = stack.R()[2]
@@ -289,6 +330,8 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
+    if p.trap is not None:  # clear of the corners of the traps on either side
+        inner = max(inner, (_trap_floor(p, p.trap) + p.trap.across / 2) * math.sqrt(0.5) + TRAP_WALL)
     low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
     channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
     return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
@@ -308,7 +351,16 @@ def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
         cuts.append(solids.cylinder(p.clamp_thread / 2, centre, out, 80.0))
         # 1.5 mm into the hub: a spot face, not a tangent plane
         cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - 1.5) * out, out, 80.0))
+        if p.trap is not None:  # from within the bore, where the shaft holds the nut in and the screw pushes it out
+            frame = np.stack([[-out[1], out[0], 0.0], [0.0, 0.0, 1.0], out], axis=1)
+            pocket = solids.prism(solids.polygon(p.trap.corner, 6, math.pi / 2), 0.0, _trap_floor(p, p.trap))
+            cuts.append(pocket.moved(solids.location(frame, centre)))
     return cuts
+
+
+def _trap_floor(p: AlignmentLinkage, trap: Trap) -> float:
+    """Distance from the axis of the floor of a radial screw's nut trap."""
+    return (p.stack.shaft_diameter + p.fit) / 2 + trap.depth
 
 
 def _bore(p: AlignmentLinkage) -> cq.Shape:

@@ -1,4 +1,4 @@
-"""Base mount: holds the servo case on a deck with the rotation axis where the angles want it.
+"""Base mount: holds the servo case, or the tower of a belt, on a deck with the rotation axis where the angles want it.
 
 Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm; the deck is that of `cad/deck.py`. Two rails with feet take
 the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut that stays
@@ -16,14 +16,15 @@ import numpy as np
 
 from cad import solids
 from cad.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, Deck
-from cad.screws import SCREWS, Screw
-from cad.sizing import Stack
+from cad.drive import drive_of
+from cad.screws import Screw
 from cad.solids import building, checked
 from design.frames import Array
 from design.scanner import Scanner
 
 PART = "base_mount"
-RAIL_HALF_WIDTH = 4.0
+RAIL_HALF_WIDTH = 4.0  # least
+RAIL_WALL = 1.3  # of a rail beside the heads of its screws
 FOOT_RADIUS = 3.0
 UNDER_HEAD = 5.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
@@ -41,16 +42,15 @@ class BaseMount:
     deck_hole: float
 
 
-def mount_of(scanner: Scanner, stack: Stack, deck: Deck) -> BaseMount:
+def mount_of(scanner: Scanner, deck: Deck) -> BaseMount:
     """Parameters of the mount of one scanner."""
-    servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.case_screw]
+    carried, printer = drive_of(scanner).carried(), scanner.printer
     return BaseMount(
         deck=deck,
-        rear=stack.horn + servo.case_min_mm[2],
-        ears=stack.horn + servo.case_rear_holes_z_mm,
-        screw=screw,
-        hole=screw.nominal + printer.screw_clearance_mm,
+        rear=carried.rear,
+        ears=carried.ears,
+        screw=carried.screw,
+        hole=carried.screw.nominal + printer.screw_clearance_mm,
         deck_hole=deck.screw.nominal + printer.screw_clearance_mm,
     )
 
@@ -106,5 +106,6 @@ def _rail(p: BaseMount, side: float) -> cq.Solid:
     x = side * p.deck.rear_holes[0][0]
     _, cy, cz = p.deck.back_centre
     y = p.deck.back_half[1] - 0.8
-    low = (x - RAIL_HALF_WIDTH, cy - y, cz - BACK_THICKNESS / 2)
-    return solids.box(low, (x + RAIL_HALF_WIDTH, cy + y, cz + PLUG_GAP - SEAT_GAP))
+    half = max(RAIL_HALF_WIDTH, p.screw.head_room + RAIL_WALL)
+    low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
+    return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

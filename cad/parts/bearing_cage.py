@@ -19,7 +19,7 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.screws import SCREWS, Screw, thread_hole
+from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
 from cad.sizing import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.solids import building, checked
 from design.catalogue import Bearing, Servo
@@ -37,6 +37,7 @@ HEAD_WALL = 2.0  # beside the recess of a head
 CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
 UNDER_CAGE_HEAD = 3.5  # of a leg
+TRAP_WALL = 3.0  # of the boss outside a nut
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x, the ring's wires leave at +-y
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
 POISSON = 0.35
@@ -58,6 +59,7 @@ class BearingCage:
     holes: tuple[tuple[float, float], ...]
     cage_hole: float  # diameter, in the legs
     cage_thread: float  # diameter, in the boss
+    trap: Trap | None  # of the radial screws, if they hold in nuts
     legs: tuple[float, ...]  # azimuths of the bell's radial screws
     fit: float  # diametral clearance of a sliding fit
 
@@ -69,7 +71,7 @@ class BearingCage:
     @property
     def high(self) -> float:
         """Height of the boss, and of the whole base."""
-        return min(self.low + BASE_HEIGHT, self.stack.ring_bottom - RING_ABOVE_BASE)
+        return _boss_top(self.stack, self.low)
 
     @property
     def foot(self) -> float:
@@ -98,6 +100,11 @@ def cage_of(scanner: Scanner, stack: Stack) -> BearingCage | None:
             f"{BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two pairs of front holes "
             f"at least {least:.2f} mm from the axis, outside the turning flange"
         )
+    trap = trap_of(CAGE_SCREW, printer)
+    if trap is not None and not has_room(
+        trap, stack, stack.horn + servo.case_max_mm[2] + SEAT_GAP, printer.min_wall_mm
+    ):
+        trap = None
     return BearingCage(
         stack=stack,
         bearing=stack.bearing,
@@ -109,7 +116,8 @@ def cage_of(scanner: Scanner, stack: Stack) -> BearingCage | None:
         hole=hole,
         holes=holes,
         cage_hole=CAGE_SCREW.nominal + printer.screw_clearance_mm,
-        cage_thread=thread_hole(CAGE_SCREW, printer),
+        cage_thread=thread_hole(CAGE_SCREW, printer) if trap is None else trap.hole,
+        trap=trap,
         legs=tuple(_leg_screw(middle, holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
         fit=printer.fit_clearance_mm,
     )
@@ -184,7 +192,27 @@ def cage_base(p: BearingCage) -> cq.Solid:
             out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
             start = (stack.cage_inner - SCREW_DEPTH) * out + [0.0, 0.0, (p.foot + p.high) / 2]
             cuts.append(solids.cylinder(p.cage_thread / 2, start, out, SCREW_DEPTH + 1.0))
+            if p.trap is not None:
+                cuts.append(_slot(p, p.trap, azimuth))
         return checked(body.cut(*cuts).clean(), BASE, "feet and screw holes", "case_holes_mm", p.holes)
+
+
+def _boss_top(stack: Stack, low: float) -> float:
+    return min(low + BASE_HEIGHT, stack.ring_bottom - RING_ABOVE_BASE)
+
+
+def has_room(trap: Trap, stack: Stack, low: float, wall: float) -> bool:
+    """Whether a nut in the boss has a floor below it and does not reach the ring above."""
+    quarter = (_boss_top(stack, low) - low) / 4
+    return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2
+
+
+def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
+    """Slot in the boss that a nut is dropped into from above, before the ring and the bell come."""
+    middle, half = (p.foot + p.high) / 2, trap.across / 2
+    outer = p.stack.cage_inner - p.fit / 2 - TRAP_WALL
+    slot = solids.box((outer - trap.depth, -half, middle - trap.corner), (outer, half, p.high + 1.0))
+    return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
 def stiffness_n_per_m(p: BearingCage) -> float:

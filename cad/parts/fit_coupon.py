@@ -2,26 +2,32 @@
 
 Frame: its own, mm, lying on the bed. One row of bores for the shaft's spigot, one of holes for each screw that the
 scanner's catalogue parts take; the number under each hole is its clearance on the diameter, and that of the printer's
-profile is among them. The bore that slides without play, and the hole that the screw just falls through, belong in the
-profile (`fit_clearance_mm`, `screw_clearance_mm`).
+profile is among them; a profile with nut traps gets a row of pockets. The bore that slides without play, and the hole
+that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cadquery as cq
+import numpy as np
+import shapely  # type: ignore[import-untyped]
 
 from cad import solids
-from cad.glyphs import grooves, text_width
-from cad.screws import SCREWS
-from cad.sizing import Stack
+from cad.engrave import Groove, engrave, groove_of
+from cad.flats import Flat, flat_at
+from cad.glyphs import letters, text_width
+from cad.head import Head
+from cad.screws import SCREWS, Trap, trap_of
 from cad.solids import building, checked
+from design.frames import Array
 from design.scanner import Scanner
 
 PART = "fit_coupon"
+NUT = SCREWS["M3"]  # that the parts trap
 THICKNESS = 5.0
-DEPTH = 0.6  # of the lettering
 LETTER = 4.5
 STEP = 0.1  # from one clearance to the next
 COLUMNS = 5
@@ -31,20 +37,28 @@ MARGIN = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitCoupon:
-    """Rows of (heading, nominal diameter, clearances)."""
+    """Rows of (heading, nominal diameter, clearances), and how they are engraved.
+
+    `trap` is that of the last row, whose pockets for nuts have the clearance across their flats; None without one.
+    """
 
     title: str
+    groove: Groove
     rows: tuple[tuple[str, float, tuple[float, ...]], ...]
+    trap: Trap | None
 
 
-def coupon_of(scanner: Scanner, stack: Stack) -> FitCoupon:
+def coupon_of(scanner: Scanner, stack: Head) -> FitCoupon:
     """Parameters of the coupon of one scanner's printer."""
     printer = scanner.printer
     fits = _around(printer.fit_clearance_mm)
     rows = [(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
     for name in sorted({scanner.lidar.mount_screw, scanner.servo.case_screw}):
         rows.append((name, SCREWS[name].nominal, _around(printer.screw_clearance_mm)))
-    return FitCoupon(title=printer.name, rows=tuple(rows))
+    trap = trap_of(NUT, printer)
+    if trap is not None:
+        rows.append(("NUT", NUT.nut_across, fits))
+    return FitCoupon(title=printer.name, groove=groove_of(printer), rows=tuple(rows), trap=trap)
 
 
 def fit_coupon(p: FitCoupon) -> cq.Solid:
@@ -57,23 +71,41 @@ def fit_coupon(p: FitCoupon) -> cq.Solid:
     heights = [max(nominal + max(fits), LETTER) + LETTER + 5.0 for _, nominal, fits in p.rows]
     width = 2 * MARGIN + heading + PITCH * COLUMNS
     depth = 2 * MARGIN + sum(heights) + LETTER + 3.0
-    holes, letters = [], []
+    holes: list[cq.Solid] = []
     y = depth - MARGIN - LETTER
-    letters += grooves(p.title, LETTER, MARGIN, y, THICKNESS, DEPTH)
-    for (name, nominal, fits), height in zip(p.rows, heights, strict=True):
+    words = [(p.title, MARGIN, y)]
+    for k, ((name, nominal, fits), height) in enumerate(zip(p.rows, heights, strict=True), start=1):
         y -= height
+        trap = p.trap if k == len(p.rows) else None
         middle = y + LETTER + 2.0 + (height - LETTER - 5.0) / 2 + 1.5
-        letters += grooves(name, LETTER, MARGIN, middle - LETTER / 2, THICKNESS, DEPTH)
+        words.append((name, MARGIN, middle - LETTER / 2))
         for i, fit in enumerate(fits):
             x = MARGIN + heading + PITCH * (i + 0.5)
-            holes.append(solids.upright((nominal + fit) / 2, -1.0, THICKNESS + 1.0, x, middle))
+            bore = nominal + fit if trap is None else trap.hole
+            holes.append(solids.upright(bore / 2, -1.0, THICKNESS + 1.0, x, middle))
+            if trap is not None:
+                pocket = solids.polygon((nominal + fit) / math.sqrt(3), 6)
+                holes.append(solids.prism(pocket + np.array([x, middle]), THICKNESS - trap.depth, THICKNESS + 1.0))
             mark = f"{fit:.2f}".rstrip("0").ljust(3, "0")
-            letters += grooves(mark, LETTER, x - text_width(mark, LETTER) / 2, y, THICKNESS, DEPTH)
+            words.append((mark, x - text_width(mark, LETTER) / 2, y))
     with building(PART, "plate and holes", "rows", len(p.rows)):
         plate = solids.box((0.0, 0.0, 0.0), (width, depth, THICKNESS)).cut(*holes)
         plate = checked(plate, PART, "plate and holes", "rows", len(p.rows))
     with building(PART, "lettering", "title", p.title):
-        return checked(plate.cut(*letters).clean(), PART, "lettering", "title", p.title)
+        top = flat_at(plate, np.array([0.5, 0.5, THICKNESS]), np.array([0.0, 0.0, 1.0]))
+        assert top is not None
+        outlines = [outline for word in words for outline in _letters(*word, p.groove.width, top)]
+        return checked(engrave(plate, [(top, outlines)], p.groove.depth), PART, "lettering", "title", p.title)
+
+
+def _letters(text: str, x: float, y: float, stroke: float, top: Flat) -> list[shapely.Polygon]:
+    """Outlines of a word whose lower left corner is at (x, y) on the plate, in the axes of its upper face."""
+    corner = np.array([x, y, THICKNESS])
+
+    def put(points: Array) -> Array:
+        return top.along(corner + np.column_stack([points, np.zeros(len(points))]))
+
+    return [shapely.transform(outline, put) for outline in letters(text, LETTER, stroke)]
 
 
 def _around(clearance: float) -> tuple[float, ...]:

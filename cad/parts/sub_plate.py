@@ -13,8 +13,9 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
+from cad.head import Axis, Head
 from cad.screws import SCREWS
-from cad.sizing import BODY_GAP, EAR_REACH, SUB_PLATE, Axis, Stack, ear_corner
+from cad.sizing import BODY_GAP, EAR_REACH, SUB_PLATE, ear_corner
 from cad.solids import building, checked
 from design.catalogue import Lidar
 from design.frames import Array
@@ -30,7 +31,7 @@ CHAMFER = 3.0
 class SubPlate:
     """Lengths in mm, in the laser frame."""
 
-    stack: Stack
+    stack: Head
     seat: float
     half_x: float
     half_y: float
@@ -42,7 +43,7 @@ class SubPlate:
     ear_holes: tuple[tuple[float, float], ...]
 
 
-def sub_plate_of(scanner: Scanner, stack: Stack) -> SubPlate | None:
+def sub_plate_of(scanner: Scanner, stack: Head) -> SubPlate | None:
     """Parameters of the sub-plate of one scanner; None where a driver reaches all screws of the lidar."""
     if stack.sub_plate is None:
         return None

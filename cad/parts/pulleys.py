@@ -1,0 +1,173 @@
+"""The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
+
+Frame: rotation frame at gamma = 0 (`cad/belt_sizing.py`), mm. Teeth between two rims; a groove is a half circle with
+flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press, half of
+the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
+
+    shaft_pulley  lies on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
+    drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above; shortens the lever of the belt
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cadquery as cq
+import numpy as np
+
+from cad import solids
+from cad.belt_sizing import BOSS, GRUB, RIM, BeltStack
+from cad.screws import SCREWS, Screw, thread_hole
+from cad.solids import building, checked
+from design.errors import BuildError
+from design.scanner import Scanner
+
+SHAFT_PULLEY = "shaft_pulley"
+DRIVE_PULLEY = "drive_pulley"
+CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
+MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
+UNDER_HEAD = 4.0  # of the drive pulley, above the horn
+GRUBS_DEG = (45.0, 135.0)  # azimuths from +x: on both sides of the flat
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pulley:
+    """Lengths in mm."""
+
+    stack: BeltStack
+    fit: float  # diametral clearance of a sliding fit
+    thread: float  # diameter, of the grub screws
+    screw: Screw  # of the horn
+    hole: float  # diameter
+    circle: float  # diameter
+    holes: int
+    first_hole_deg: float  # from +y of the servo
+    boss_radius: float  # of the horn's
+    boss_height: float
+
+
+def pulley_of(scanner: Scanner, stack: BeltStack) -> Pulley:
+    """Parameters of both pulleys of one scanner.
+
+    Raises:
+        BuildError: the heads of the horn's screws leave no wall below the teeth, or around the horn's boss.
+    """
+    servo, printer = scanner.servo, scanner.printer
+    screw = SCREWS[servo.horn_screw]
+    root = stack.tip_radius - stack.belt.tooth_height_mm
+    if servo.horn_circle_mm / 2 + screw.head_room + printer.min_wall_mm > root:
+        raise BuildError(
+            f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}: the heads of the {screw.name} screws "
+            f"of {servo.name} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
+        )
+    boss = servo.horn_boss_diameter_mm / 2
+    if servo.horn_circle_mm / 2 - screw.head_room - printer.min_wall_mm < boss:
+        raise BuildError(
+            f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}: the heads of the {screw.name} screws "
+            f"of {servo.name} leave no wall around its boss of {2 * boss:g} mm"
+        )
+    return Pulley(
+        stack=stack,
+        fit=printer.fit_clearance_mm,
+        thread=thread_hole(GRUB, printer),
+        screw=screw,
+        hole=screw.nominal + printer.screw_clearance_mm,
+        circle=servo.horn_circle_mm,
+        holes=servo.horn_holes,
+        first_hole_deg=servo.horn_first_hole_deg,
+        boss_radius=boss,
+        boss_height=servo.horn_boss_height_mm,
+    )
+
+
+def shaft_pulley(p: Pulley) -> cq.Solid:
+    """Make the pulley on the shaft.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    stack = p.stack
+    with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth):
+        boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
+        body = checked(_toothed(stack, None, boss), SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth)
+    with building(SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter):
+        bore = solids.upright(stack.tube_diameter / 2 + p.fit / 4, stack.teeth_low - 1.0, stack.pulley_top + 1.0)
+        middle = np.array([0.0, 0.0, stack.pulley_top - BOSS / 2])
+        grubs = []
+        for azimuth in np.radians(GRUBS_DEG):
+            out = (math.cos(azimuth), math.sin(azimuth), 0.0)
+            grubs.append(solids.cylinder(p.thread / 2, middle, out, 80.0))
+        cut = body.cut(bore, *grubs).clean()
+        return checked(cut, SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter)
+
+
+def drive_pulley(p: Pulley) -> cq.Solid:
+    """Make the pulley on the horn.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    stack, horn = p.stack, p.stack.horn
+    with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth):
+        foot = solids.upright(foot_radius(p), horn, stack.teeth_low + 0.5)
+        body = checked(_toothed(stack, foot, None), DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth)
+    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle):
+        centres = solids.polygon(p.circle / 2, p.holes, math.radians(90.0 + p.first_hole_deg))
+        cuts = []
+        for x, y in centres.tolist():
+            cuts.append(solids.upright(p.hole / 2, horn - 1.0, stack.teeth_top + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.head_room, horn + UNDER_HEAD, stack.teeth_top + 1.0, x, y))
+        if p.boss_radius > 0:
+            cuts.append(solids.upright(p.boss_radius + p.fit / 4, horn - 1.0, horn + p.boss_height + 0.5))
+        cut = body.cut(*cuts).clean()
+        made = checked(cut, DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle)
+    return made.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+
+
+def drive_envelope(p: Pulley) -> cq.Solid:
+    """What the pulley on the horn fills while it turns about its own axis."""
+    stack = p.stack
+    rim, tip = stack.rim_radius, stack.tip_radius
+    low, high = stack.teeth_low, stack.teeth_top
+    foot = solids.upright(foot_radius(p), stack.horn, low + 0.5)
+    with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth):
+        whole = foot.fuse(
+            solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
+        )
+        swept = checked(whole, DRIVE_PULLEY, "sweep", "teeth", stack.teeth)
+    return swept.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+
+
+def foot_radius(p: Pulley) -> float:
+    """Of what lies on the horn."""
+    return p.circle / 2 + p.screw.nominal / 2 + 2.0
+
+
+def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -> cq.Shape:
+    """Teeth between two rims about the axis, each rim in one with what is on its far side.
+
+    Rims and teeth touch and do not overlap: the kernel then glues them in half the time.
+    """
+    low, high = stack.teeth_low + RIM, stack.teeth_top - RIM
+    teeth = cq.Solid.extrudeLinear(_outline(stack), [], cq.Vector(0, 0, high - low))
+    lower: cq.Shape = solids.upright(stack.rim_radius, stack.teeth_low, low)
+    upper: cq.Shape = solids.upright(stack.rim_radius, high, stack.teeth_top)
+    lower, upper = (rim.fuse(more) if more else rim for rim, more in ((lower, below), (upper, above)))
+    return teeth.moved(cq.Location(cq.Vector(0, 0, low))).fuse(lower, upper, glue=True)
+
+
+def _outline(stack: BeltStack) -> cq.Wire:
+    """Of the teeth, in the plane z = 0: per tooth a flank, the groove's half circle in chords, a flank, the tip."""
+    groove, tip = stack.belt.groove_radius_mm, stack.tip_radius
+    centre = tip - stack.belt.tooth_height_mm + groove
+    half = (groove + MOUTH) / tip  # rad, of the mouth
+    bow = math.pi * (1 + np.arange(CHORDS + 1) / CHORDS)
+    around = np.stack([centre + groove * np.sin(bow), groove * np.cos(bow)], axis=1)  # outwards, sideways
+    mouth = tip * np.array([[math.cos(half), math.sin(half)]])
+    one = np.concatenate([mouth * [1.0, -1.0], around, mouth])
+    turn = math.pi / 2 + 2 * math.pi * np.arange(stack.teeth) / stack.teeth
+    out = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    side = np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+    points = (one[:, :1] * out[:, None] + one[:, 1:] * side[:, None]).reshape(-1, 2)
+    return cq.Wire.makePolygon([cq.Vector(float(x), float(y), 0.0) for x, y in points], close=True)

@@ -1,0 +1,86 @@
+"""A second process beside the first, for work that does not wait for it. On one core all is done in the first.
+
+The result is the same either way: what is called must depend on its arguments alone, and these are copied.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import ParamSpec, Protocol, TypeVar
+
+from design.errors import BuildError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class Begin(Protocol):
+    """Begin some work, and get what waits for its result; an error of the work is raised there."""
+
+    def __call__(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
+        """`work` and what it is called with."""
+        ...
+
+
+@contextmanager
+def second_process() -> Iterator[Begin]:
+    """What begins work in a second process; the process ends with the block, its work done or not.
+
+    Functions, arguments and results are pickled: functions of modules only.
+    """
+    if _cores() < 2 or multiprocessing.current_process().daemon:
+        yield in_turn
+        return
+    # spawned and not forked: a fork of a process with threads may lock up
+    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _deaf)
+
+    def beside(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
+        future = pool.submit(work, *args, **kwargs)
+
+        def result() -> T:
+            try:
+                return future.result()
+            except BrokenExecutor as error:
+                raise BuildError("the second process of the build was killed: is there memory enough?") from error
+
+        return result
+
+    try:
+        yield beside
+    finally:
+        for process in list((getattr(pool, "_processes", None) or {}).values()):
+            process.kill()
+        pool.shutdown(cancel_futures=True)
+
+
+def in_turn(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
+    """Begin nothing: the work is done when its result is asked for, on a copy of what it is given.
+
+    The copy is what a second process would get: a solid that was pickled differs in the last bit of a direction, and a
+    drawing may round that up or down.
+    """
+    packed = pickle.dumps((args, kwargs))
+
+    def result() -> T:
+        given, named = pickle.loads(packed)
+        return work(*given, **named)
+
+    return result
+
+
+def _cores() -> int:
+    """That this process may use."""
+    if hasattr(os, "sched_getaffinity"):  # Linux
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _deaf() -> None:
+    """Ctrl-C reaches both: the first process ends this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
