@@ -14,8 +14,8 @@ import cadquery as cq
 
 from cad import bought, solids
 from cad.deck import Deck, deck_of
-from cad.drive import Drive, drive_of
-from cad.head import Head
+from cad.drives.drive import Drive, drive_of
+from cad.drives.head import Head
 from cad.mesh import Mesh, mesh_of
 from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of

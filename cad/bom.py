@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from cad.assembly import Assembly
-from cad.drive import Drive
+from cad.drives.drive import Drive
 from cad.joints import Joint
 from cad.remarks import products_of
 from cad.screws import INSERT_LENGTH, SCREWS

@@ -1,7 +1,7 @@
 """Bought parts, true to size, as far as the catalogue knows them. Millimetres.
 
 The lidar is made in its body frame (origin on the base at the optical axis, x to the front, z up), servo and
-slip ring and bearing in the rotation frame at gamma = 0 (`cad/sizing.py`).
+slip ring and bearing in the rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`).
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import math
 import cadquery as cq
 
 from cad import solids
+from cad.drives.direct_sizing import Stack
 from cad.screws import SCREWS
-from cad.sizing import Stack
 from design.catalogue import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cad.deck import deck_of
-from cad.drive import drive_of
+from cad.drives.drive import drive_of
 from cad.findings import Finding
 from cad.kernel import require_kernel
 from cad.remarks import findings_of, left_out_of
@@ -82,7 +82,7 @@ def build_parts(
     require_kernel()
     from cad.assembly import alone, as_tree, make_parts
     from cad.export import step_text
-    from cad.label import labelled_parts
+    from cad.labels.label import labelled_parts
     from cad.mesh import checked, stl_bytes
     from cad.urdf import urdf_text
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.carried import Carried
-from cad.drive import drive_of
-from cad.head import Head
+from cad.drives.carried import Carried
+from cad.drives.direct_sizing import rotor_radius
+from cad.drives.drive import drive_of
+from cad.drives.head import Head
 from cad.screws import SCREWS, Screw
-from cad.sizing import rotor_radius
 from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
 from design.frames import Array

@@ -15,7 +15,7 @@ from design.catalogue import Bearing
 from design.scanner import Scanner
 
 if TYPE_CHECKING:
-    from cad.sizing import Stack
+    from cad.drives.direct_sizing import Stack
 
 STANDARD_GRAVITY = 9.80665
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn

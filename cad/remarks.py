@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING
 
 from cad.deck import Deck
-from cad.drive import Drive
+from cad.drives.direct_sizing import Stack
+from cad.drives.drive import Drive
+from cad.drives.head import Head
 from cad.findings import Finding
-from cad.head import Head
 from cad.loads import RATED_AT_MM, Weight, rated_moment_nm, supported, weight_of
 from cad.screws import SCREWS
-from cad.sizing import Stack
 from design.catalogue import Product
 from design.left_out import LeftOut
 from design.scanner import Scanner

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.drive import drive_of
-from cad.head import Head
+from cad.drives.drive import drive_of
+from cad.drives.head import Head
 from design import scene
 from design.errors import BuildError
 from design.frames import Array

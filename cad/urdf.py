@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cad.drive import Drive
+from cad.drives.drive import Drive
 from cad.mass import Inertial
 from design.frames import Array
 from design.scanner import Scanner

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from cad.assembly import make_parts, turns
 from cad.build import config_hash, link_bodies
+from cad.drives.direct_sizing import stack_of
 from cad.loads import Weight, bearing_of, supported, waist_nm_per_rad
 from cad.mesh import checked_mesh
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 from cad.remarks import findings_of, left_out_of, rotor_weight
-from cad.sizing import stack_of
 from design.angles import Angles, AngleSet
 from design.catalogue import Bearing, Servo, load_catalogue
 from design.errors import BuildError

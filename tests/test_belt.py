@@ -11,16 +11,16 @@ import shapely
 import trimesh
 
 from cad.assembly import make_parts, turns
-from cad.belt import BeltDrive
-from cad.belt_loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
-from cad.belt_sizing import QUARTERS, TRAVEL, belt_stack_of, drive_corners
 from cad.bom import items_of
 from cad.build import config_hash
 from cad.checks.run import run_checks
 from cad.deck import mount_offset_mm
-from cad.direct import DirectDrive
 from cad.drawings.files import drawing_of
-from cad.drive import drive_of
+from cad.drives.belt import BeltDrive
+from cad.drives.belt_loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
+from cad.drives.belt_sizing import QUARTERS, TRAVEL, belt_stack_of, drive_corners
+from cad.drives.direct import DirectDrive
+from cad.drives.drive import drive_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
 from cad.joints import joints_of

@@ -16,10 +16,10 @@ from cad.checks.clearance import clearance_checks, distance_over_a_turn
 from cad.checks.islands import islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
-from cad.drive import drive_of
+from cad.drives.direct_sizing import stack_of
+from cad.drives.drive import drive_of
 from cad.mass import Inertial
 from cad.mesh import Mesh, mesh_of
-from cad.sizing import stack_of
 from cad.solids import box, upright
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue

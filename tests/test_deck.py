@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cad.deck import deck_of
+from cad.drives.direct_sizing import stack_of
 from cad.mesh import checked_mesh
 from cad.parts.base_mount import base_mount, mount_of
-from cad.sizing import stack_of
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.deck_holes import Circle, Rectangle

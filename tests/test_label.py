@@ -9,13 +9,13 @@ import trimesh
 
 from cad import solids
 from cad.build import config_hash
-from cad.engrave import engrave, groove_of
-from cad.flats import flat_at, flats_of
-from cad.glyphs import letters, text_width
 from cad.holes import Piercing
-from cad.label import DIGITS, Ground, engraved, label_on, label_texts
+from cad.labels.engrave import engrave, groove_of
+from cad.labels.flats import flat_at, flats_of
+from cad.labels.glyphs import letters, text_width
+from cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
+from cad.labels.sight import Sight
 from cad.mesh import checked_mesh
-from cad.sight import Sight
 from cad.solids import box, upright
 
 STROKE = 0.8

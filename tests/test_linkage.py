@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from cad.checks.printing import thin_walls
 from cad.deck import deck_of
 from cad.draft import draft_linkage
+from cad.drives.direct_sizing import covered_screws, envelope_of, rotor_radius, stack_of
 from cad.kernel import require_kernel
 from cad.mesh import checked_mesh
 from cad.parts.alignment_linkage import alignment_linkage, linkage_of
 from cad.parts.base_mount import base_mount, mount_of
 from cad.parts.sub_plate import ear_screws, sub_plate, sub_plate_of
-from cad.sizing import covered_screws, envelope_of, rotor_radius, stack_of
 from cad.solids import box, building, checked
 from design.angles import Angles, AngleSet
 from design.catalogue import SlipRing, load_catalogue

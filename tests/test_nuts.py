@@ -9,6 +9,7 @@ import pytest
 from cad import solids
 from cad.assembly import make_parts
 from cad.bom import items_of
+from cad.drives.direct_sizing import stack_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
 from cad.joints import joints_of, without_traps
@@ -16,7 +17,6 @@ from cad.parts.alignment_linkage import alignment_linkage, linkage_of
 from cad.parts.bearing_cage import cage_of, has_room
 from cad.parts.fit_coupon import coupon_of, fit_coupon
 from cad.screws import SCREWS, trap_of
-from cad.sizing import stack_of
 from design.angles import Angles
 from design.catalogue import load_catalogue
 

@@ -13,7 +13,7 @@ from lib3mf import get_wrapper
 from scipy.spatial.transform import Rotation
 
 from benchmarks.slicer import PROGRAM, sliced
-from cad.glyphs import GLYPHS, text_width
+from cad.labels.glyphs import GLYPHS, text_width
 from cad.mesh import Mesh
 from cad.print_pose import on_bed, print_pose
 from cad.threemf import threemf_bytes

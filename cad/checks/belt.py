@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from cad.belt_loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
-from cad.belt_sizing import BeltStack
 from cad.checks.check import Check, at_most, note, tidy
 from cad.checks.mechanics import spin_up_nm
+from cad.drives.belt_loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
+from cad.drives.belt_sizing import BeltStack
 from cad.loads import RATED_AT_MM, rated_moment_nm
 from cad.mass import Inertial, together
 from cad.remarks import rotor_weight

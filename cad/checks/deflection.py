@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cad.checks.check import Check, Severity, tidy
-from cad.drive import Drive
+from cad.drives.drive import Drive
 from cad.mass import Inertial, together
 from cad.mesh import Mesh
 from cad.parts.alignment_linkage import AlignmentLinkage

@@ -11,12 +11,12 @@ import math
 import numpy as np
 
 from cad.checks.check import Check, at_most, note, tidy
-from cad.drive import Drive
+from cad.drives.direct_sizing import Stack
+from cad.drives.drive import Drive
 from cad.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
 from cad.mass import Inertial, together
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 from cad.remarks import rotor_weight
-from cad.sizing import Stack
 from design.scanner import Scanner
 
 TORQUE_SHARE = 0.2  # of the stall torque that a servo gives all day

@@ -1,6 +1,6 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm. A hub clamps the shaft's spigot (blind bore with a flat at
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. A hub clamps the shaft's spigot (blind bore with a flat at
 +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must stay free, leads
 to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a square
 notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub, its lower end is
@@ -17,13 +17,13 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.head import Head
+from cad.drives.direct_sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, box_corners, envelope_of
+from cad.drives.head import Head
 from cad.loads import JOURNAL_WALL
 from cad.mesh import checked_mesh
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.sub_plate import EAR_SCREW, ear_screws, plate_marks
 from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
-from cad.sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS, SUB_PLATE, Box, box_corners, envelope_of
 from cad.solids import building, checked
 from design.errors import BuildError
 from design.frames import Array

@@ -1,6 +1,6 @@
 """Bearing cage: holds a thin-section bearing around the hub's journal where the axis is tilted too far for the horn.
 
-Frame: rotation frame at gamma = 0 (`cad/sizing.py`), mm. Two parts, since the cage must come down over the ring:
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Two parts, since the cage must come down over the ring:
 
     cage_base     thick plate on the ears of the servo's front, with a boss that centres the cage; with a ring it is
                   the plate of `slip_ring_adapter`
@@ -19,8 +19,8 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
+from cad.drives.direct_sizing import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
-from cad.sizing import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.solids import building, checked
 from design.catalogue import Bearing, Servo
 from design.errors import BuildError

@@ -1,6 +1,6 @@
 """Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
 
-Frame: rotation frame at gamma = 0 (`cad/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`. A tube
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`. A tube
 with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's screws;
 at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the arms. A
 round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints upside down.
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.belt_sizing import (
+from cad.drives.belt_sizing import (
     BOSS,
     CASE_ROOM,
     DISC,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.head import Head
+from cad.drives.head import Head
 from cad.loads import STANDARD_GRAVITY
 from cad.mass import Inertial
 from cad.mesh import Mesh

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
-from cad.belt import BeltDrive
-from cad.belt_sizing import belt_stack_of
-from cad.carried import Carried
-from cad.direct import DirectDrive
+from cad.drives.belt import BeltDrive
+from cad.drives.belt_sizing import belt_stack_of
+from cad.drives.carried import Carried
+from cad.drives.direct import DirectDrive
+from cad.drives.direct_sizing import stack_of
+from cad.drives.head import Head
 from cad.findings import Finding
-from cad.head import Head
 from cad.screws import Screw
-from cad.sizing import stack_of
 from design.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner

@@ -19,7 +19,7 @@ from OCP.gp import gp_Vec
 from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Wire
 
 from cad import solids
-from cad.flats import Flat
+from cad.labels.flats import Flat
 from design.catalogue import Printer
 from design.frames import Array
 

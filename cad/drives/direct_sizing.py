@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.head import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, HUB_WALL, Axis, Head
+from cad.drives.head import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, HUB_WALL, Axis, Head
 from cad.loads import WAIST, bearing_of
 from cad.screws import SCREWS, Screw
 from design.catalogue import Lidar, Servo

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.carried import Carried
-from cad.direct_words import DIRECT_STEPS
+from cad.drives.carried import Carried
+from cad.drives.direct_sizing import Stack
+from cad.drives.direct_words import DIRECT_STEPS
 from cad.findings import Finding
 from cad.loads import ALUMINIUM_PA
 from cad.screws import SCREWS, Screw
-from cad.sizing import Stack
 from design.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner

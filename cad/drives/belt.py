@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.belt_sizing import (
+from cad.drives.belt_sizing import (
     FOOT_HALF,
     FOOT_HOLE,
     FOOT_SCREW,
@@ -20,8 +20,8 @@ from cad.belt_sizing import (
     case_corners,
     drive_corners,
 )
-from cad.belt_words import belt_steps
-from cad.carried import Carried
+from cad.drives.belt_words import belt_steps
+from cad.drives.carried import Carried
 from cad.findings import Finding
 from cad.screws import Screw
 from design.catalogue import Bearing, Belt, Product
@@ -141,7 +141,7 @@ class BeltDrive:
 
     def bought(self) -> dict[str, cq.Solid]:
         """Servo, bearings, capsule and belt."""
-        from cad.belt_bought import belt_bought
+        from cad.drives.belt_bought import belt_bought
 
         return belt_bought(self.stack)
 
@@ -182,7 +182,7 @@ class BeltDrive:
 
     def bend(self) -> ShaftBend:
         """The shaft beyond its bearings, and the belt."""
-        from cad.belt_loads import belt_shaft_bend
+        from cad.drives.belt_loads import belt_shaft_bend
 
         return belt_shaft_bend(self.stack)
 

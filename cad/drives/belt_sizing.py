@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.head import BEARING_STEP, HUB_WALL, Head
+from cad.drives.direct_sizing import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
+from cad.drives.head import BEARING_STEP, HUB_WALL, Head
 from cad.screws import SCREWS
-from cad.sizing import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
 from design.catalogue import Bearing, Belt, Flange, Rotor, Servo, SlipRing
 from design.errors import BuildError
 from design.frames import Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from cad import bought, solids
-from cad.belt_sizing import BeltStack
+from cad.drives.belt_sizing import BeltStack
 from cad.parts.capsule_holder import flange_centres
 from cad.solids import building, checked
 

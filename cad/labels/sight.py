@@ -10,7 +10,7 @@ import numpy as np
 import shapely  # type: ignore[import-untyped]
 
 from cad.assembly import Assembly, turns
-from cad.flats import Flat
+from cad.labels.flats import Flat
 from design import scene
 from design.frames import Array
 

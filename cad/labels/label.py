@@ -4,7 +4,7 @@ The label goes where it can be read on the assembled scanner: into the largest f
 before, with room for it and a wall behind it, its lines as level as the face allows. A part with little room gets the
 configuration alone; where no face can be read, a hidden one that mates with nothing takes the label, and where there
 is none either, the part goes without. The label is the last cut: drawings, screws and moving parts know nothing of it.
-The lettering is our own (`cad/glyphs.py`), so no font and no licence of one is involved.
+The lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import shapely.affinity  # type: ignore[import-untyped]
 
 from cad import solids
 from cad.assembly import Assembly, turns
-from cad.engrave import Groove, engrave, groove_of
 from cad.findings import Finding
-from cad.flats import Flat, flat_at, flats_of
-from cad.glyphs import letters, text_width
 from cad.holes import Piercing
+from cad.labels.engrave import Groove, engrave, groove_of
+from cad.labels.flats import Flat, flat_at, flats_of
+from cad.labels.glyphs import letters, text_width
+from cad.labels.sight import Sight
 from cad.mesh import Mesh, checked_mesh
-from cad.sight import Sight
 from design.errors import BuildError
 from design.frames import Array
 from design.left_out import LeftOut

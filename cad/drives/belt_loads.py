@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.belt_sizing import BeltStack
+from cad.drives.belt_sizing import BeltStack
 from cad.loads import ALUMINIUM_PA, Weight
 from cad.statics.shaft import ShaftBend
 
