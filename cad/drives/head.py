@@ -1,7 +1,7 @@
 """The upper end of every scanner: the hub that carries the linkage on its shaft, whatever drives it. Plain numpy.
 
-What is below the hub is a layout of its own: `cad/drives/direct_sizing.py` with the servo on the axis, `cad/drives/belt_sizing.py` with it
-beside the axis.
+What is below the hub is a layout of its own: `cad/drives/direct_sizing.py` with the servo on the axis,
+`cad/drives/belt_sizing.py` with it beside the axis.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. A hub clamps the shaft's spigot (blind bore with a flat at
-+y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must stay free, leads
-to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a square
-notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub, its lower end is
-the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel along the journal. Under a
-sub-plate (`sub_plate.py`) the plate lies lower, with threads for its ears and pockets for the heads of its screws.
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. A hub clamps the shaft's spigot (blind bore
+with a flat at +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must
+stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x
+(FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub,
+its lower end is the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel along the
+journal. Under a sub-plate (`sub_plate.py`) the plate lies lower, with threads for its ears and pockets for the heads
+of its screws.
 """
 
 from __future__ import annotations

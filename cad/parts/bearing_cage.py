@@ -1,6 +1,7 @@
 """Bearing cage: holds a thin-section bearing around the hub's journal where the axis is tilted too far for the horn.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Two parts, since the cage must come down over the ring:
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Two parts, since the cage must come down over
+the ring:
 
     cage_base     thick plate on the ears of the servo's front, with a boss that centres the cage; with a ring it is
                   the plate of `slip_ring_adapter`

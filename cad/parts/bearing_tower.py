@@ -1,10 +1,10 @@
 """Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`. A tube
-with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's screws;
-at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the arms. A
-round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints upside down.
-An index groove in the edge of its top at +y meets the groove of the linkage's hub.
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`.
+A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
+screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
+arms. A round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints
+upside down. An index groove in the edge of its top at +y meets the groove of the linkage's hub.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Slip-ring adapter of the belt layout: a disc in the tower that the capsule's flange is screwed to.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; turned with the servo's side. The capsule hangs through
-its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower from
-below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is not in
-line.
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; turned with the servo's side. The capsule hangs
+through its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower
+from below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is
+not in line.
 """
 
 from __future__ import annotations

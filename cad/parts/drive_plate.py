@@ -1,7 +1,8 @@
 """Drive plate of the belt layout: holds the servo by its front ears and slides on the tower's arms to tighten the belt.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's place and turn are those of the stack. A flat
-plate with an opening for horn and pulley, feet down to the ears, and four slots along the line of centres.
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's place and turn are those of the
+stack. A flat plate with an opening for horn and pulley, feet down to the ears, and four slots along the line of
+centres.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Main shaft of the belt layout: a tube in two bearings, with the spigot that the linkage sits on. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. The spigot is the one of `servo_shaft`, its flat at +y. A
-collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave through two
-windows below the web under the spigot.
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. The spigot is the one of `servo_shaft`, its flat
+at +y. A collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave
+through two windows below the web under the spigot.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. Teeth between two rims; a groove is a half circle with
-flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press, half of
-the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. Teeth between two rims; a groove is a half circle
+with flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press,
+half of the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
 
     shaft_pulley  lies on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
     drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above; shortens the lever of the belt

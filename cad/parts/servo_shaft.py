@@ -1,10 +1,10 @@
 """Servo shaft: from the servo's horn through the slip ring to the linkage's hub. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Horn flange with the horn's holes and a pocket for its
-boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends could
-not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and bearing
-are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do not
-depend on the scan plane: one shaft serves every linkage.
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Horn flange with the horn's holes and a pocket
+for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends
+could not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and
+bearing are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do
+not depend on the scan plane: one shaft serves every linkage.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. A step that only the inner ring touches, and two grub
-screws 90 deg apart; a driver reaches them through the window of the tower.
+Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. A step that only the inner ring touches, and two
+grub screws 90 deg apart; a driver reaches them through the window of the tower.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Slip-ring adapter: keeps the ring's stator from turning, from the servo's front holes.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. The rotor of the ring is clamped to the shaft and carries
-the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in their
-groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides round the horn flange from
--y after the shaft is on, then the ring comes down over the spigot between the arms.
+Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. The rotor of the ring is clamped to the shaft
+and carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in
+their groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides round the horn flange
+from -y after the shaft is on, then the ring comes down over the spigot between the arms.
 
 Under the cage of a bearing (`bearing_cage.py`) it is a thick closed plate with a boss that centres the cage, held by
 every pair of ears beside the flange; it comes down over the shaft. Without a ring it has no arms and is `cage_base`.

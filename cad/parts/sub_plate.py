@@ -1,8 +1,8 @@
 """Sub-plate: between lidar and linkage where the hub would cover one of the lidar's screws.
 
-Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. On the bench it is
-screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where nothing is in
-the way. The heads of the lidar's screws stand in pockets of the linkage.
+Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. On the
+bench it is screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where
+nothing is in the way. The heads of the lidar's screws stand in pockets of the linkage.
 """
 
 from __future__ import annotations
