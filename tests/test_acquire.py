@@ -223,7 +223,7 @@ def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
         for attempt in range(5):
             recording = out / f"{attempt}.mcap"
             with program("scan", out, "--turns", turns, "-o", recording) as process:
-                said, complaints = process.communicate(timeout=60)
+                said, complaints = process.communicate(timeout=120)
             assert process.returncode == 0, complaints
             error_m, share = residuals_m(read_ply(recording.with_suffix(".ply")), angles, room(None))
             spread, bias = abs(error_m.std() / sigma_m - 1), abs(error_m.mean()) / sigma_m

@@ -192,7 +192,7 @@ def test_a_strained_servo_protects_itself():
 
 def test_pyax12_drives_the_ax_12a():
     with ServoTwin("AX-12A") as twin:
-        client = Connection(port=twin.port, baudrate=1_000_000)
+        client = Connection(port=twin.port, baudrate=1_000_000, waiting_time=0.1)  # of 20 ms: for a busy machine
         try:
             assert client.ping(1) and not client.ping(2)
             assert (client.get_model_number(1), client.get_present_position(1), client.get_present_voltage(1)) == (
