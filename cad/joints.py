@@ -1,10 +1,10 @@
 """Which screws hold the scanner together, read from the solids: where a hole of one part meets another body.
 
-A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance, or one that a screw
-holds on to (the core of a thread, the seat of an insert, the way into a trapped nut). What lies behind it on the same
-axis decides: a thread (the screw's own diameter, or such a hole in a part), a hole to pass through to a nut, or the
-spigot that a grub screw clamps; nothing means the robot's deck. Lengths are the shortest of the standards that hold.
-Millimetres.
+A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance and both its ends are
+open, or if its diameter is one that a screw holds on to (the core of a thread, the seat of an insert, the way into a
+trapped nut). What lies behind it on the same axis decides: a thread (the screw's own diameter, or such a hole in a
+part), a hole to pass through to a nut, or the spigot that a grub screw clamps; nothing means the robot's deck. Lengths
+are the shortest of the standards that hold. Millimetres.
 """
 
 from __future__ import annotations
@@ -181,7 +181,8 @@ def _screw_for(hole: Round, printer: Printer) -> tuple[Screw | None, bool]:
     if not hole.hole:
         return None, False
     for screw in SCREWS.values():
-        if abs(hole.diameter - screw.nominal - printer.screw_clearance_mm) < 0.01:
+        passes = abs(hole.diameter - screw.nominal - printer.screw_clearance_mm) < 0.01
+        if passes and hole.through:  # a blind one is a recess, such as that for the boss of a horn
             return screw, False
         if any(abs(hole.diameter - size) < 0.01 for size in holding_holes(screw, printer)):
             return screw, True

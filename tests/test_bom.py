@@ -136,6 +136,19 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert (seat.part, seat.count, seat.covered) == ("sub_plate", 4, 0)
 
 
+def test_a_recess_is_no_hole_for_a_screw(made):
+    """The boss of a horn lies in a blind pocket that has the size of a hole for M6."""
+    angles = made.scanner.angles.model_copy(
+        update={"angles_deg": Angles(alpha_rot=0, beta_rot=40, alpha_laser=-20, beta_laser=-70), "servo": "AX-12A"}
+    )
+    products = load_catalogue().products
+    scanner = replace(made.scanner, angles=angles, servo=products["AX-12A"], lidar=products["URG-04LX"])
+    assembly = make_parts(scanner)
+    joints = joints_of(scanner, assembly, {n: rounds_of(s) for n, s in (assembly.made | assembly.bought).items()})
+    assert "bearing_cage" in assembly.made
+    assert not [joint for joint in joints if joint.part == "servo_shaft" and joint.onto != "servo_horn"]
+
+
 def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
     printer = load_catalogue().products["fdm-0.4-insert"]
     scanner = replace(made.scanner, printer=printer)
