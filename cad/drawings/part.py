@@ -9,11 +9,13 @@ import cadquery as cq
 import numpy as np
 
 from cad.drawings.patterns import Pattern, on_axis, patterns_of
+from cad.drawings.slots import Slot, slots_of
 from cad.holes import Round
 from design.frames import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
 PLANE_MM2 = 3.0  # smaller faces get no ordinate
+SIDE_MM2 = 8.0  # nor do smaller upright ones: flanks of a pulley's teeth, ends of blind holes
 PLANES = 9  # the largest faces of one direction that do
 
 
@@ -24,6 +26,7 @@ class Part:
     Attributes:
         solid: rotation frame.
         patterns: its holes beside the axis.
+        slots: its slots, equal ones together.
         axial: its cylinders about the rotation axis.
         datum: height of the lowest point.
         lidar_axis: z of the lidar that it carries; None for other parts.
@@ -32,6 +35,7 @@ class Part:
 
     solid: cq.Solid
     patterns: list[Pattern]
+    slots: list[list[Slot]]
     axial: list[Round]
     datum: float
     lidar_axis: Array | None
@@ -42,7 +46,7 @@ def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, tole
     """Read a solid, whose cylinders are known."""
     axial = [item for item in rounds if on_axis(item)]
     datum = float(solid.BoundingBox().zmin)
-    return Part(solid, patterns_of(rounds), axial, datum, lidar_axis, tolerance)
+    return Part(solid, patterns_of(rounds), slots_of(solid), axial, datum, lidar_axis, tolerance)
 
 
 def parallel(a: Array, b: Array) -> bool:
@@ -55,12 +59,12 @@ def azimuth_deg(direction: Array) -> float:
     return round(math.degrees(math.atan2(-direction[0], direction[1])) % 360, 6) % 360
 
 
-def planes_across(solid: cq.Solid, normal: Array) -> list[float]:
+def planes_across(solid: cq.Solid, normal: Array, least_mm2: float = PLANE_MM2) -> list[float]:
     """Positions of the larger plane faces across a direction, the largest first."""
     areas: dict[float, float] = {}
     for face in solid.Faces():
         if face.geomType() == "PLANE" and parallel(np.array(face.normalAt().toTuple()), normal):
             place = round(float(np.array(face.Center().toTuple()) @ normal), 2) + 0.0
             areas[place] = areas.get(place, 0.0) + face.Area()
-    kept = sorted((place for place in areas if areas[place] >= PLANE_MM2), key=lambda place: (-areas[place], place))
+    kept = sorted((place for place in areas if areas[place] >= least_mm2), key=lambda place: (-areas[place], place))
     return kept[:PLANES]

@@ -68,11 +68,14 @@ def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
     out: list[Pattern] = []
     for pattern in patterns:  # by diameter, smallest first
         carrier = next((other for other in out if all(_in_line(hole, other) for hole in pattern.holes)), None)
+        hole = pattern.holes[0]
         if carrier is None:
             out.append(pattern)
-        else:
-            wider = max(carrier.heads, pattern.holes[0].diameter)
+        elif hole.diameter > carrier.holes[0].diameter:
+            wider = max(carrier.heads, hole.diameter)
             out[out.index(carrier)] = replace(carrier, heads=wider)
+        elif not hole.through:  # else one drill makes both
+            out.append(pattern)
     return sorted(out, key=lambda pattern: -len(pattern.holes))
 
 
@@ -87,6 +90,18 @@ def _in_line(hole: Round, pattern: Pattern) -> bool:
 def on_axis(item: Round) -> bool:
     """Whether a cylinder lies about the rotation axis."""
     return abs(item.direction[2]) > 1 - 1e-6 and math.hypot(item.low[0], item.low[1]) < 1e-3
+
+
+def along_pattern(pattern: Pattern, towards: Array) -> Array:
+    """The direction of the nearest two holes: a rectangle then lies straight."""
+    points = [np.array(hole.low) for hole in pattern.holes]
+    pairs = [(a, b) for i, a in enumerate(points) for b in points[i + 1 :]]
+    a, b = min(pairs, key=lambda pair: round(float(np.linalg.norm(pair[1] - pair[0])), 3))
+    side = (b - a) - ((b - a) @ towards) * towards
+    side /= np.linalg.norm(side)
+    level = np.cross([0.0, 0.0, 1.0], towards)
+    turned = [side, np.cross(towards, side), -side, -np.cross(towards, side)]
+    return max(turned, key=lambda v: round(float(v @ level), 6))
 
 
 def _circle(holes: list[Round]) -> float:

@@ -15,9 +15,10 @@ import numpy as np
 from cad import solids
 from cad.drawings import dimensions as dim
 from cad.drawings.marks import Bow, Layer, Mark, Point, Stroke, Text, box_of
-from cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from cad.drawings.patterns import Pattern, number
+from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
+from cad.drawings.patterns import Pattern, along_pattern, number
 from cad.drawings.project import Arc, Chain, Curve, Line, project
+from cad.drawings.slots import slot_words
 from design.frames import Array
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -80,7 +81,7 @@ def views_of(part: Part) -> list[View]:
     for pattern in inclined:
         if not any(parallel(pattern.direction, view.towards) for view in views):
             outwards = _outwards(pattern, part)
-            side = _along_pattern(pattern, outwards)
+            side = along_pattern(pattern, outwards)
             title = f"{next(letters)}  onto the inclined holes"
             up = np.cross(outwards, side)
             views.append(_view(part, title, side, up, pattern.centre, "onto"))
@@ -182,6 +183,15 @@ def _hole_marks(view: View, part: Part, scale: float, box: tuple[float, float, f
             callouts.append(((x * scale + diagonal, y * scale + diagonal), pattern.words()))
         elif view.kind == "top" and not _seen_along(pattern, view, part):
             callouts.append(_slanted(view, pattern, part, scale))
+    for slots in part.slots:
+        if parallel(slots[0].direction, view.towards):
+            flat = [view.flat(slot.middle) for slot in slots]
+            for x, y in flat:
+                marks += dim.centre_mark((x * scale, y * scale), slots[0].length / 2 * scale)
+                below[_key(x)] = min(y * scale, below.get(_key(x), math.inf))
+                beside[_key(y)] = min(x * scale, beside.get(_key(y), math.inf))
+            x, y = max(flat, key=lambda p: (round(p[0], 2), round(p[1], 2)))
+            callouts.append(((x * scale + slots[0].width / 2 * scale, y * scale), slot_words(slots)))
     if view.kind == "front":
         for item in part.axial:
             z = (item.low[2] + item.high[2]) / 2 - part.datum
@@ -194,9 +204,9 @@ def _hole_marks(view: View, part: Part, scale: float, box: tuple[float, float, f
         for z in (*planes_across(part.solid, view.up), *ends, *optical):
             beside[_key(z - part.datum)] = left
     elif view.kind in ("top", "onto"):
-        for value in planes_across(part.solid, view.right):
+        for value in planes_across(part.solid, view.right, SIDE_MM2):
             below.setdefault(_key(value - float(view.origin @ view.right)), low)
-        for value in planes_across(part.solid, view.up):
+        for value in planes_across(part.solid, view.up, SIDE_MM2):
             beside.setdefault(_key(value - float(view.origin @ view.up)), left)
     if view.kind in ("front", "top"):
         (x0, y0), (x1, y1) = _extent(part.solid, view)
@@ -267,18 +277,6 @@ def _outwards(pattern: Pattern, part: Part) -> Array:
         return part.lidar_axis
     middle = np.array(part.solid.Center().toTuple())
     return pattern.direction if (pattern.centre - middle) @ pattern.direction > 0 else -pattern.direction
-
-
-def _along_pattern(pattern: Pattern, towards: Array) -> Array:
-    """The direction of the nearest two holes: a rectangle then lies straight."""
-    points = [np.array(hole.low) for hole in pattern.holes]
-    pairs = [(a, b) for i, a in enumerate(points) for b in points[i + 1 :]]
-    a, b = min(pairs, key=lambda pair: round(float(np.linalg.norm(pair[1] - pair[0])), 3))
-    side = (b - a) - ((b - a) @ towards) * towards
-    side /= np.linalg.norm(side)
-    level = np.cross(Z, towards)
-    turned = [side, np.cross(towards, side), -side, -np.cross(towards, side)]
-    return max(turned, key=lambda v: round(float(v @ level), 6))
 
 
 def _shows_angle(view: View, pattern: Pattern) -> bool:
