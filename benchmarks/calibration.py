@@ -55,7 +55,8 @@ def main() -> None:
         if (seed + 1) % 10 == 0 and seed + 1 < runs:
             _print(done, seed + 1, setup, sd)
     _print(done, runs, setup, sd)
-    time_offset(beams)
+    for speeds_deg_s in ((20.0,), (20.0, 60.0)):
+        time_offset(beams, speeds_deg_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,13 +110,15 @@ def strays(found: Estimate, face: NDArray[np.int64]) -> tuple[int, int]:
     return int(met.size - most.sum()), int(met.size)
 
 
-def time_offset(beams: int) -> None:
-    """Both ways at two speeds: what of lag and backlash comes out."""
-    setup = Setup(beams=beams // 2, sweeps=((20.0, 360.0), (-20.0, 360.0), (60.0, 360.0), (-60.0, 360.0)))
+def time_offset(beams: int, speeds_deg_s: tuple[float, ...]) -> None:
+    """Both ways at some speeds: what of lag and backlash comes out."""
+    sweeps = tuple((way * speed, 360.0) for speed in speeds_deg_s for way in (1, -1))
+    setup = Setup(beams=beams // 2, sweeps=sweeps)
     truth = Truth(lag_s=0.0237, backlash_rad=float(np.radians(1 / 3)))
     found, took, _ = calibrated(setup, truth, 0)
     spread = np.sqrt(np.diag(found.covariance))
-    print(f"both ways at 20 and 60 deg/s, {found.tiles.beams.range_m.size:,} beams, {took:.1f} s:")
+    at_speeds = " and ".join(f"{speed:g}" for speed in speeds_deg_s)
+    print(f"both ways at {at_speeds} deg/s, {found.tiles.beams.range_m.size:,} beams, {took:.1f} s:")
     for name in ("lag_s", "backlash_rad"):
         k = [p.name for p in PARAMETERS].index(name)
         one = PARAMETERS[k]

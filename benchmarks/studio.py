@@ -35,6 +35,7 @@ import viser
 import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
 
 from design.angles import Angles, AngleSet
 from design.studio.facts import judge_of
@@ -278,8 +279,8 @@ def visitor(gate: Gate) -> Iterator[Any]:
     """A client as the page is one."""
     with connect(
         f"ws://127.0.0.1:{gate.port}/",
-        origin=f"http://127.0.0.1:{gate.port}",  # type: ignore[arg-type]
-        subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
+        origin=Origin(f"http://127.0.0.1:{gate.port}"),
+        subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
         additional_headers={"Cookie": f"scanwright-{gate.port}={gate.token}"},
         compression=None,
         max_size=None,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -16,10 +18,24 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from design.errors import RecordingError
-from firmware_io.bags import Message, open_bag
+from design.files import check_place
+from firmware_io.bags import Bag, Message, open_bag
 from firmware_io.files import foreign, whole_file
+from firmware_io.note import NOTE_TOPIC, NOTE_TYPE, note_in
 
 _VERSION: Final = 8  # of the metadata of ROS 2 bags: Humble and later read it
+_FOREVER: Final = QosTime(9223372036, 854775807)
+_LATCHED: Final = Qos(
+    history=QosHistory.KEEP_LAST,
+    depth=1,
+    reliability=QosReliability.RELIABLE,
+    durability=QosDurability.TRANSIENT_LOCAL,
+    deadline=_FOREVER,
+    lifespan=_FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=_FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -31,7 +47,7 @@ class Exported:
 
 
 def export_bag(recording: Path, out: Path) -> Exported:
-    """Write all messages of a recording as a bag, each at the time at which it was recorded.
+    """Write all messages of a recording as a bag, each at the time at which it was recorded, and its note as a topic.
 
     Args:
         recording: MCAP.
@@ -50,6 +66,7 @@ def export_bag(recording: Path, out: Path) -> Exported:
             return _ros1(recording, part)
     if out.exists():
         raise RecordingError(f"{out}: exists; a ROS 2 bag is a new folder")
+    check_place(out, RecordingError)
     try:
         return _ros2(recording, out)
     except BaseException:
@@ -61,14 +78,16 @@ def _ros1(recording: Path, part: Path) -> Exported:
     store = get_typestore(Stores.ROS1_NOETIC)
     with open_bag(recording) as bag, foreign(f"{part}: cannot write", Writer1, part) as writer:
         known, unknown = _known(bag.topics, store)
-        connections = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in known.items()}
-        messages = bag.messages(set(known))
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=store, latching=int(topic == NOTE_TOPIC))
+            for topic, kind in (_note_topic(bag) | known).items()
+        }
         written = _copied(
-            messages,
+            _noted(bag, set(known), store),
             lambda message: writer.write(
                 connections[message.topic],
                 message.receive_ns,
-                store.serialize_ros1(_of_store(message.body, store), known[message.topic]),
+                store.serialize_ros1(_of_store(message.body, store), connections[message.topic].msgtype),
             ),
         )
     return Exported(written, unknown)
@@ -79,16 +98,35 @@ def _ros2(recording: Path, out: Path) -> Exported:
     bag_out = foreign(f"{out}: cannot write", Writer2, out, version=_VERSION, storage_plugin=StoragePlugin.SQLITE3)
     with open_bag(recording) as bag, bag_out as writer:
         known, unknown = _known(bag.topics, store)
-        connections = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in known.items()}
+        connections = {
+            topic: writer.add_connection(
+                topic, kind, typestore=store, offered_qos_profiles=[_LATCHED] * (topic == NOTE_TOPIC)
+            )
+            for topic, kind in (_note_topic(bag) | known).items()
+        }
         written = _copied(
-            bag.messages(set(known)),
+            _noted(bag, set(known), store),
             lambda message: writer.write(
                 connections[message.topic],
                 message.receive_ns,
-                store.serialize_cdr(_of_store(message.body, store), known[message.topic]),
+                store.serialize_cdr(_of_store(message.body, store), connections[message.topic].msgtype),
             ),
         )
     return Exported(written, unknown)
+
+
+def _note_topic(bag: Bag) -> dict[str, str]:
+    return {NOTE_TOPIC: NOTE_TYPE} if note_in(bag) else {}
+
+
+def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
+    """The messages, and before them, at the time of the first one, the note where it is none of them yet."""
+    note = {} if NOTE_TOPIC in topics else note_in(bag)
+    for k, message in enumerate(bag.messages(topics)):
+        if note and k == 0:
+            text: Any = store.types[NOTE_TYPE]
+            yield Message(NOTE_TOPIC, message.receive_ns, text(data=json.dumps(note, sort_keys=True)))
+        yield message
 
 
 def _copied(messages: Iterable[Message], write: Callable[[Message], None]) -> dict[str, int]:

@@ -118,6 +118,8 @@ def open_bag(path: Path) -> Iterator[Bag]:
             if stream.read(7) != b"#ROSBAG":
                 raise RecordingError(f"{path}: not a ROS 1 bag: it does not begin with #ROSBAG")
         what += " (`rosbag reindex` restores one that was cut off)"
+    if path.suffix == ".mcap":
+        what += " (`scanwright repair` saves what is whole of one that was cut off)"
     reader = foreign(what, AnyReader, [path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
     foreign(what, reader.open)
     try:
@@ -140,9 +142,10 @@ def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
             raise RecordingError(f"{bag}: {source.topic}: no field '{name}' in {_kind(value)}{suggest(name, known)}")
         value = getattr(value, name)
         if index is not None:
-            length = len(value) if isinstance(value, _SEQUENCES) else 0
-            if int(index) >= length:
-                raise RecordingError(f"{bag}: {source.topic}: no {name}[{index}]: '{name}' holds {length} values")
+            if not isinstance(value, _SEQUENCES):
+                raise RecordingError(f"{bag}: {source.topic}: no {name}[{index}]: '{name}' is {_kind(value)}")
+            if int(index) >= len(value):
+                raise RecordingError(f"{bag}: {source.topic}: no {name}[{index}]: '{name}' holds {len(value)} values")
             value = value[int(index)]
         stamp_ns = _stamp(value) or stamp_ns
     return value, stamp_ns

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,16 @@ import numpy as np
 
 from design.angles import AngleSet
 from design.errors import RecordingError
+from design.files import check_place
 from firmware_io.calibration.entropy import witness
 from firmware_io.calibration.estimate import Estimate, estimate
 from firmware_io.calibration.model import Mount, gather, start_vector
 from firmware_io.calibration.report import report
 from firmware_io.calibration.tiles import fan_side
 from firmware_io.files import whole_file
+from firmware_io.lag import lag_of
 from firmware_io.own_body import OwnBody
-from firmware_io.recording import open_recording
+from firmware_io.recording import Recording, open_recording
 
 
 def calibrate_recordings(
@@ -46,6 +49,7 @@ def calibrate_recordings(
     """
     if out.suffix != ".json":
         raise RecordingError(f"{out}: an angle set is JSON; name it {out.with_suffix('.json').name}")
+    check_place(out, RecordingError)
     for k, recording in enumerate(recordings):
         if recording.resolve() in [other.resolve() for other in recordings[:k]]:
             raise RecordingError(f"{recording}: named twice; the same beams twice tell nothing more, but seem to")
@@ -55,7 +59,10 @@ def calibrate_recordings(
     beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
     mount, start = Mount.of(angles), start_vector(angles)
     say(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
-    found = estimate(beams, mount, start)
+    try:
+        found = estimate(beams, mount, start)
+    except RecordingError as refusal:
+        raise RecordingError(f"{refusal}{_late(opened)}") from refusal
     say("asking the entropy")
     seen = witness(mount, beams, fan_side(beams, mount), start, found.x, found.noise_m)
     record = {
@@ -67,6 +74,18 @@ def calibrate_recordings(
         part.write_text(calibrated(angles, found).to_json(), encoding="utf-8")
         beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return record
+
+
+def _late(opened: Sequence[Recording]) -> str:
+    """What recordings whose mounting errors cannot be found still tell of time; "" where they do not."""
+    for recording in opened:
+        with suppress(RecordingError):
+            lag = lag_of(recording)
+            return (
+                f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
+                f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"
+            )
+    return ""
 
 
 def report_path(out: Path) -> Path:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from design.errors import RecordingError, suggest
+from design.files import check_place
 from firmware_io.formats import e57, las, npz, pcd, ply, xyz
 from firmware_io.formats.record import Cloud
 
@@ -34,7 +35,21 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
     Raises:
         RecordingError: the format is not known, or the file is not what its suffix says.
     """
+    if path.is_dir():
+        raise RecordingError(f"{path}: this is a folder; name a cloud in it, a file")
+    if path.suffix in (".mcap", ".bag", ".db3"):
+        raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes the one of the other")
     return _READERS[_known(path)](path)
+
+
+def check_target(path: Path) -> None:
+    """Refuse what cannot be written, before the work that it is to hold.
+
+    Raises:
+        RecordingError: the format is not known, or no file can be there.
+    """
+    _known(path)
+    check_place(path, RecordingError)
 
 
 def write_clouds(path: Path, clouds: Sequence[Cloud]) -> tuple[list[Path], list[str]]:
@@ -54,5 +69,5 @@ def write_clouds(path: Path, clouds: Sequence[Cloud]) -> tuple[list[Path], list[
 def _known(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in _READERS:
-        raise RecordingError(f"{path}: clouds are {', '.join(_READERS)}{suggest(suffix, _READERS) if suffix else ''}")
+        raise RecordingError(f"{path}: '{suffix}' is no format of clouds{suggest(suffix, _READERS)}")
     return suffix

@@ -2,37 +2,25 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
+from design import files
 from design.errors import RecordingError
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`; rename it to `path` when the body ends well, delete it when not.
+def whole_file(path: Path) -> AbstractContextManager[Path]:
+    """A temporary name beside `path` that becomes `path` when the block ends well.
 
     Raises:
         RecordingError: the file cannot be written there.
     """
-    if path.is_dir():
-        raise RecordingError(f"{path}: this is a folder; name a file in it")
-    if not path.parent.is_dir():
-        raise RecordingError(f"{path}: the folder {path.parent} does not exist")
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot write: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    return files.whole_file(path, RecordingError)
 
 
 def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

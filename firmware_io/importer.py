@@ -19,6 +19,7 @@ from design.errors import RecordingError
 from firmware_io import ros
 from firmware_io.bags import Bag, Source, laser_scan_at, number_at, open_bag, parse_source
 from firmware_io.clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
+from firmware_io.note import held_by, note_in
 from firmware_io.recording import MessageWriter, RecordingWriter
 from firmware_io.samples import Floats, JointLog, Times
 
@@ -74,7 +75,8 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
         angle: TOPIC[:FIELD] of the axis angle; it may lie in the same message as the scan.
         angle_unit: unit of the angle in the bag.
         hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
-            the scan, holds from its first to its last beam.
+            the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
+            so itself, and its log stays as it is.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -107,7 +109,8 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
             log, cut = held_log(log, clock.scan_ns, survey.arc_ns)
             if cut:
                 warnings.append(f"{cut} scans end after the next one begins: their last beams take its angle")
-        else:
+        still = hold or held_by(note_in(opened))
+        if not still:
             warnings += _gap_warnings(log)
         note = {
             "schema": "scanwright/recording/1",
@@ -115,7 +118,7 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
             "scan": str(scan_source),
             "angle": str(angle_source),
             "angle_unit": angle_unit,
-            "hold": str(hold).lower(),
+            "hold": str(still).lower(),
             "warnings": "\n".join(warnings),
         }
         with RecordingWriter(out, note) as writer:

@@ -75,9 +75,10 @@ def _opened(path: Path) -> BinaryIO:
     if not path.is_file():
         raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
     stream = foreign(f"{path}: cannot read", path.open, "rb")
-    if stream.read(len(_MAGIC)) != _MAGIC:
+    magic = stream.read(len(_MAGIC))
+    if magic != _MAGIC:
         stream.close()
-        raise RecordingError(f"{path}: not an MCAP file; `scanwright import` converts bags")
+        raise RecordingError(f"{path}: {'not an MCAP file; `scanwright import` converts bags' if magic else 'empty'}")
     stream.seek(0)
     return stream
 

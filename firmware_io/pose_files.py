@@ -52,7 +52,8 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
     if topic not in found:
         known = {name for name, kind in found.items() if kind in _POSES}
         raise RecordingError(
-            f"poses {spec}: neither a file nor a topic of {recording} with poses{suggest(topic, known)}"
+            f"poses {spec}: neither a file nor a topic of {recording} with poses"
+            f"{suggest(topic, known) if known else ', which has none'}"
         )
     if found[topic] not in _POSES:
         raise RecordingError(f"{recording}: {topic} is {found[topic]}; poses are {', '.join(sorted(_POSES))}")

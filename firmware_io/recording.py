@@ -23,11 +23,11 @@ from design.errors import RecordingError, suggest
 from firmware_io import ros
 from firmware_io.files import foreign, whole_file
 from firmware_io.messages import note_of, read_messages, topics_of
+from firmware_io.note import NOTE, held_by
 from firmware_io.samples import JointLog, Scan, Times
 
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"
-_NOTE = "scanwright"
 _TYPES = {SCAN_TOPIC: ros.LASER_SCAN, JOINT_TOPIC: ros.JOINT_STATE}
 
 
@@ -55,7 +55,7 @@ class MessageWriter:
         self._path = path
         self._writer = Writer(cast(Any, stream))  # it asks for no more than a Sink
         self._writer.start(profile="ros2", library="scanwright")
-        self._writer.add_metadata(_NOTE, dict(note))
+        self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():
             self._writer.add_attachment(0, 0, name, f"text/{Path(name).suffix[1:]}", text.encode())
         self._channels = {topic: self._channel(topic) for topic in _TYPES}
@@ -189,7 +189,7 @@ def open_recording(path: Path) -> Recording:
         beams=np.array(beams),
         stamp_ns=np.array(stamps, np.int64),
         has_intensity=has_intensity,
-        held=note_of(path, _NOTE).get("hold") == "true",
+        held=held_by(note_of(path, NOTE)),
     )
 
 

@@ -153,14 +153,8 @@ class Motor:
     backlash_rad: float | None
 
 
-# e-manual, at 12 V; these two are not in the catalogue, which holds what scanners are built from.
-_MOTORS = {"MX-28": Motor(2.5, 55 * RPM, None), "XM430-W350": Motor(4.1, 46 * RPM, None)}
-
-
 def motor_of(model: str) -> Motor:
-    """The motor of a model, from the catalogue where it is there."""
-    if model in _MOTORS:
-        return _MOTORS[model]
+    """The motor of a model of the catalogue."""
     servo = load_catalogue().get(model, CatalogueServo)
     backlash_rad = None if servo.backlash_deg is None else math.radians(servo.backlash_deg)
     return Motor(servo.stall_torque_nm, servo.no_load_rpm * RPM, backlash_rad)

@@ -53,6 +53,8 @@ def repair(path: Path, out: Path) -> RepairSummary:
     """
     if not path.is_file():
         raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+    if out != path and out.suffix != ".mcap":
+        raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
     summary = RepairSummary()
     for _ in _whole_records(path, summary):
         pass

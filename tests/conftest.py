@@ -26,6 +26,59 @@ def data() -> Path:
     return Path(folder)
 
 
+SMALL = """
+name = "small"
+sensor = "UTM-30LX"
+servo = "MX-64R"
+slip_ring = "UH1256-02-0610-06S"
+[motion]
+period_s = 2.0
+[angles]
+step_deg = 15.0
+[[weight]]
+shape = "cone"
+axis = [1, 0, -1]
+half_angle_deg = 40
+[[mask]]
+shape = "cone"
+axis = [-1, 0, 0]
+half_angle_deg = 20
+"""
+CHEAPEST = """
+name = "ahead"
+sensor = "URG-04LX"
+servo = "AX-12A"
+[motion]
+mode = "sweep"
+limits_deg = [-90, 90]
+period_s = 12.0
+accel_deg_s2 = 200.0
+[angles]
+alpha_rot_deg = 0
+beta_rot_deg = 0
+alpha_laser_deg = 0
+beta_laser_deg = -60
+[density]
+ball_radius_deg = 3.0
+tolerance = 0.01
+[[weight]]
+shape = "band"
+theta_deg = [45, 135]
+"""
+
+
+@pytest.fixture(scope="session")
+def small_task() -> str:
+    """A task file whose J is quick: coarse steps, a cone that matters, and one that is masked."""
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def cheapest_task() -> str:
+    """The task file that takes least to build: all angles given, few parts, a wide ball."""
+    return CHEAPEST
+
+
 @pytest.fixture
 def command(monkeypatch, capsys):
     """Run a command as its user would: exit code, what it printed, and the lines of complaint (progress left out)."""

@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 
+from benchmarks.calibration import designed
 from benchmarks.rooms import FURNISHED, Setup, Truth, simulate, write
 from firmware_io.importer import import_bag
 from firmware_io.recording import open_recording
@@ -36,6 +37,24 @@ def test_a_recording_comes_back_from_its_bag(made, tmp_path, command, name):
         np.testing.assert_array_equal(one.bearing_rad, other.bearing_rad)
 
 
+@pytest.mark.parametrize("name", ["room.bag", "room"])
+def test_a_motor_that_stood_still_during_each_scan_still_does_behind_a_bag(made, tmp_path, command, name):
+    source = ("--scan", "/scan", "--angle", "/joint_states", "--angle-unit", "rad")
+    held, back = tmp_path / "held.mcap", tmp_path / "back.mcap"
+    assert command("import", made, *source, "--hold", "-o", held)[0] == 0
+    assert command("convert", held, tmp_path / name)[0] == 0
+    assert command("import", tmp_path / name, *source, "-o", back)[0] == 0
+    (tmp_path / "angles.json").write_text(designed(SETUP).to_json())
+    clouds = []
+    for recording in (held, back):
+        cloud = recording.with_suffix(".ply")
+        code, printed, _ = command("assemble", recording, "--angles", tmp_path / "angles.json", "-o", cloud)
+        assert code == 0
+        assert "held during each scan" in printed
+        clouds.append(cloud.read_bytes())
+    assert clouds[0] == clouds[1]
+
+
 def test_the_database_of_a_ros_2_bag_holds_the_messages_as_ros_lays_them_out(made, tmp_path, command):
     assert command("convert", made, tmp_path / "room")[0] == 0
     with sqlite3.connect(tmp_path / "room" / "room.db3") as database:
@@ -44,7 +63,11 @@ def test_the_database_of_a_ros_2_bag_holds_the_messages_as_ros_lays_them_out(mad
             "select data from messages join topics on topics.id = topic_id where name = '/scan' order by timestamp"
         ).fetchone()
     database.close()
-    assert topics == {"/scan": "sensor_msgs/msg/LaserScan", "/joint_states": "sensor_msgs/msg/JointState"}
+    assert topics == {
+        "/scan": "sensor_msgs/msg/LaserScan",
+        "/joint_states": "sensor_msgs/msg/JointState",
+        "/scanwright/note": "std_msgs/msg/String",
+    }
     scan = next(open_recording(made).scans())
     seconds, nanoseconds, letters = struct.unpack_from("<iII", data, 4)  # behind the encapsulation
     assert seconds * 10**9 + nanoseconds == scan.stamp_ns
@@ -55,7 +78,12 @@ def test_the_database_of_a_ros_2_bag_holds_the_messages_as_ros_lays_them_out(mad
 
 def test_what_cannot_be_written_is_one_line_and_leaves_nothing(made, tmp_path, command):
     (tmp_path / "there").mkdir()
-    for out, says in (("room.ply", "name it room.bag"), ("there", "exists"), ("no/room.bag", "does not exist")):
+    for out, says in (
+        ("room.ply", "name it room.bag"),
+        ("there", "exists"),
+        ("no/room.bag", "does not exist"),
+        ("no/room", "does not exist"),
+    ):
         code, _, complaints = command("convert", made, tmp_path / out)
         assert (code, len(complaints)) == (2, 1)
         assert says in complaints[0]

@@ -105,14 +105,20 @@ def test_errors_are_as_large_as_stated_and_the_start_may_be_far_off():
 
 
 def test_a_late_log_is_found_where_the_axis_turns_both_ways():
-    setup = Setup(beams=180, sweeps=((20.0, 360.0), (-20.0, 360.0)))
-    truth = Truth(lag_s=0.024)
+    setup = Setup(beams=120, sweeps=((20.0, 360.0), (-20.0, 360.0)))
+    truth = Truth(lag_s=0.024, backlash_rad=float(np.radians(1 / 3)))
     found, *_ = calibrated(setup, truth, 0)
     assert KEYS.index("lag_s") in found.choice.free
-    assert found.x[KEYS.index("lag_s")] == pytest.approx(0.024, abs=2e-4)
+    inside_s = 1 / 3 / 2 / 20  # half the backlash, at 20 deg/s
+    assert found.x[KEYS.index("lag_s")] == pytest.approx(0.024 - inside_s, abs=2e-4)
+    # one speed does not tell it from a lag, so what is stated covers it; the mounting errors are known all the same
+    stated = np.sqrt(np.diag(found.covariance))
+    assert stated[found.choice.free.tolist().index(KEYS.index("lag_s"))] == pytest.approx(inside_s, rel=0.02)
+    assert (stated[:4] < [5e-4, 5e-4, 1e-3, 1e-3]).all()
     assert np.abs(errors(found, truth)).max() < 4
     assert [held.why for held in found.choice.held] == [
-        "both ways at one speed: half of it, divided by the speed, is inside the time offset"
+        "both ways at one speed: half of it, divided by the speed, is inside the time offset, whose stated error "
+        "allows for 0.33 deg of it"
     ]
 
 
@@ -212,12 +218,16 @@ def test_the_same_beams_do_not_count_twice(room, tmp_path, command):
     assert "named twice" in complaints[0]
 
 
-def test_the_real_tilting_scanner_sees_nothing_twice(data, tmp_path, command):
+def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, command):
     source = {"scan": "/slice:laserScan", "angle": "/slice:stepAngle"}
-    import_bag(data / "tilting/room_240.bag", tmp_path / "r.mcap", **source, angle_unit="deg", hold=True)
+    import_bag(data / "tilting/first_scan.bag", tmp_path / "r.mcap", **source, angle_unit="deg", hold=True)
     angles = "design/angle_sets/tilting_urg.json"
     code, _, complaints = command("calibrate", tmp_path / "r.mcap", "--angles", angles, "-o", tmp_path / "a.json")
     assert (code, len(complaints)) == (2, 1)
     assert "nothing is seen twice" in complaints[0]
     assert "turned 60 deg" in complaints[0]
+    late_s, sd_s, play_s = map(float, re.findall(r"-?\d\.\d{3}", complaints[0]))
+    assert abs(late_s) < 0.1
+    assert 0.05 < sd_s < 0.08  # of the tenth of a second between two scans, half
+    assert play_s == pytest.approx(0.05 / (2 * 60 / 161.2), abs=2e-3)
     assert not (tmp_path / "a.json").exists()

@@ -300,5 +300,5 @@ def test_rubbish_is_one_line(tmp_path, suffix):
 
 
 def test_an_unknown_format_is_one_line(tmp_path):
-    with pytest.raises(RecordingError, match=r"clouds are .*did you mean '\.ply'"):
+    with pytest.raises(RecordingError, match=r"'\.plyy' is no format of clouds; did you mean '\.ply'"):
         write_clouds(tmp_path / "c.plyy", [some_cloud()])

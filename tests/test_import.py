@@ -255,6 +255,7 @@ WRONG_SOURCES = {
     ("/slice:laserScan", "/joint:position"): r"is a sequence of 2, not a number; name one number in it",
     ("/slice:laserScan", "/joint:position[2]"): r"no position\[2\]: 'position' holds 2 values",
     ("/slice:laserScan", "/joint:velocity[0]"): r"no velocity\[0\]: 'velocity' holds 0 values",
+    ("/slice:laserScan", "/slice:stepAngle[0]"): r"no stepAngle\[0\]: 'stepAngle' is a float",
     ("/slice:laserScan", "/text"): "is a str, not a number",
     ("/slice:laserScan", "/joint:position[x]"): "is not a path of fields",
     ("", "/joint"): "write TOPIC or TOPIC:FIELD",

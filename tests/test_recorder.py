@@ -218,6 +218,11 @@ def test_the_command_says_what_it_kept(tmp_path, journal, command):
     assert "left out 10 bytes" in said
     assert path.read_bytes() == data[: ends[2] + 10]
     assert "nothing to repair" in command("repair", out)[1]
+    code, _, complaints = command("repair", path, "-o", tmp_path / "mended.bag")
+    assert (code, complaints) == (
+        2,
+        [f"scanwright: {tmp_path / 'mended.bag'}: a recording is an MCAP file; name it mended.mcap"],
+    )
 
 
 @pytest.mark.parametrize("content", [b"", b"no recording" * 99, None])

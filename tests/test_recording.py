@@ -180,7 +180,7 @@ BROKEN = {
     folder: "this is a folder",
     other_topic: r"no topic /scan; did you mean '/scann'\?",
     missing: "no such file",
-    lambda path, _: path.write_bytes(b""): "not an MCAP file",
+    lambda path, _: path.write_bytes(b""): "r.mcap: empty",
     lambda path, scans: write(path, scans, joints=()): "/joint_states has no message",
     lambda path, _: write(path, ()): "/scan has no message",
     lambda path, scans: write(path, scans, joints=[(5, 0.0), (5, 1.0)]): "sample 1 is not later",

@@ -324,12 +324,17 @@ def test_given_poses_stay_in_their_world(command, tmp_path):
 
 
 def test_wrong_input_is_one_line(command, tmp_path):
-    (one,) = write_scans(tmp_path, shell(2, 1.5, 2.4), [pose(0, 0, 0)])
+    one, other = write_scans(tmp_path, shell(2, 1.5, 2.4), [pose(0, 0, 0)] * 2)
     (tmp_path / "p.tum").write_text("0 1 2 3 0 0 0 1\n")
+    (tmp_path / "r.mcap").touch()
     for words, says in (
         ([one], "1 cloud: registering takes two at least"),
-        ([one, one, "--start", tmp_path / "p.tum"], "1 poses for 2 clouds"),
-        ([one, one, "--spacing-m", "0"], "spacing 0.0 m: must be above 0"),
+        ([one, other, "--start", tmp_path / "p.tum"], "1 poses for 2 clouds"),
+        ([one, other, "--spacing-m", "0"], "spacing 0.0 m: must be above 0"),
+        ([one, other, "--poses", tmp_path / "no/p.tum"], "does not exist"),
+        ([one, one], "named twice"),
+        ([one, tmp_path], "this is a folder"),
+        ([one, tmp_path / "r.mcap"], "`scanwright assemble`"),
         ([one, tmp_path / "absent.las"], "absent.las: not a LAS file"),
     ):
         code, _, complaints = command("register", *words, "-o", tmp_path / "map.ply")

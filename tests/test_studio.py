@@ -24,31 +24,13 @@ from design.studio.state import MOST_DABS, Dab, painted, save_task, setting_of, 
 from design.studio.workbench import Body, Workbench
 from design.task import load_task
 
-TASK = """
-name = "small"
-sensor = "UTM-30LX"
-servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
-[motion]
-period_s = 2.0
-[angles]
-step_deg = 15.0
-[[weight]]
-shape = "cone"
-axis = [1, 0, -1]
-half_angle_deg = 40
-[[mask]]
-shape = "cone"
-axis = [-1, 0, 0]
-half_angle_deg = 20
-"""
 SETTING = setting_of((0, -55, -80, 75))
 
 
 @pytest.fixture
-def loaded(tmp_path):
+def loaded(tmp_path, small_task):
     path = tmp_path / "small.toml"
-    path.write_text(TASK)
+    path.write_text(small_task)
     return load_task(path)
 
 
@@ -85,9 +67,9 @@ def test_too_much_paint_or_paint_on_everything_is_refused(loaded):
     x=st.floats(-1, 1), y=st.floats(-1, 1), radius=st.floats(1, 60), value=st.floats(0.01, 1000),
     angles=st.tuples(st.floats(-180, 180), st.floats(-90, 90), st.floats(-90, 90), st.floats(-90, 90)),
 )  # fmt: skip
-def test_a_saved_task_reads_back_as_what_was_on_the_page(tmp_path_factory, x, y, radius, value, angles):
+def test_a_saved_task_reads_back_as_what_was_on_the_page(tmp_path_factory, small_task, x, y, radius, value, angles):
     folder = tmp_path_factory.mktemp("saved")
-    (folder / "small.toml").write_text(TASK)
+    (folder / "small.toml").write_text(small_task)
     now = painted(load_task(folder / "small.toml"), (Dab((x, y, 1.0), radius, "matters", value),))
     setting = setting_of(angles)
     again = load_task(save_task(now, folder, "mine", setting, overwrite=False))
@@ -97,10 +79,10 @@ def test_a_saved_task_reads_back_as_what_was_on_the_page(tmp_path_factory, x, y,
     assert again.task.motion == now.task.motion and again.task.density == now.task.density
 
 
-def test_saved_elsewhere_a_task_still_finds_its_files(tmp_path):
+def test_saved_elsewhere_a_task_still_finds_its_files(tmp_path, small_task):
     np.save(tmp_path / "map.npy", np.ones((4, 8)))
     source = tmp_path / "mapped.toml"
-    source.write_text(TASK + '[[weight]]\nshape = "map"\nfile = "map.npy"\n')
+    source.write_text(small_task + '[[weight]]\nshape = "map"\nfile = "map.npy"\n')
     (tmp_path / "elsewhere").mkdir()
     saved = save_task(load_task(source), tmp_path / "elsewhere", "mine", None, overwrite=False)
     np.testing.assert_array_equal(load_task(saved).maps[0], np.ones((4, 8)))

@@ -18,43 +18,6 @@ from design.studio.state import painted, setting_of
 from design.studio.workbench import Body, Workbench
 from design.task import load_task
 
-TASK = """
-name = "small"
-sensor = "UTM-30LX"
-servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
-[motion]
-period_s = 2.0
-[angles]
-alpha_rot_deg = 0
-alpha_laser_deg = 0
-step_deg = 15.0
-[[weight]]
-shape = "cone"
-axis = [1, 0, -1]
-half_angle_deg = 30
-"""
-CHEAPEST = """
-name = "small"
-sensor = "URG-04LX"
-servo = "AX-12A"
-[motion]
-mode = "sweep"
-limits_deg = [-90, 90]
-period_s = 12.0
-accel_deg_s2 = 200.0
-[angles]
-alpha_rot_deg = 0
-beta_rot_deg = 0
-alpha_laser_deg = 0
-beta_laser_deg = -60
-[density]
-ball_radius_deg = 3.0
-tolerance = 0.01
-[[weight]]
-shape = "band"
-theta_deg = [45, 135]
-"""
 HARMLESS = ("THREE.Clock", "GPU stall", "GL Driver Message", "inside passive event listener")
 
 
@@ -88,9 +51,10 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def studio(folder):
+def studio(folder, small_task):
     """One for all tests: each takes it as it finds it."""
-    with opened(folder, TASK) as found:
+    fewer = small_task.replace("[angles]\n", "[angles]\nalpha_rot_deg = 0\nalpha_laser_deg = 0\n")  # soon searched
+    with opened(folder, fewer) as found:
         yield found
 
 
@@ -186,8 +150,8 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     harmless(browser)
 
 
-def test_a_saved_task_builds(browser, tmp_path):
-    with opened(tmp_path, CHEAPEST) as (studio, gate):
+def test_a_saved_task_builds(browser, tmp_path, cheapest_task):
+    with opened(tmp_path, cheapest_task) as (studio, gate):
         page = browser.open(gate.address, width=600, height=400)
         page.set_default_timeout(300_000)
         studio.controls.look.value = "hidden"
@@ -200,9 +164,9 @@ def test_a_saved_task_builds(browser, tmp_path):
             seconds=300,
             meanwhile=lambda: seen.append(studio.controls.building.value),
         )
-        page.get_by_text(f"built {tmp_path / 'out' / 'small_mine'}: open its report.html").wait_for()
+        page.get_by_text(f"built {tmp_path / 'out' / 'ahead_mine'}: open its report.html").wait_for()
     assert seen == sorted(seen) and len(set(seen)) > 5
-    built = tmp_path / "out" / "small_mine"
+    built = tmp_path / "out" / "ahead_mine"
     assert load_angles(built / "angles.json").angles_deg.beta_laser == -60
     files = json.loads((built / "manifest.json").read_text())["files"]
     assert {"report.html", "assembly.step"} <= files.keys() and all((built / name).is_file() for name in files)

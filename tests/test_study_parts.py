@@ -15,27 +15,6 @@ from design.study.store import open_store
 from design.study.study import load_study
 
 TABLES = ("study.csv", "study.parquet")
-TASK = """
-name = "ahead"
-sensor = "URG-04LX"
-servo = "AX-12A"
-[motion]
-mode = "sweep"
-limits_deg = [-90, 90]
-period_s = 12.0
-accel_deg_s2 = 200.0
-[angles]
-alpha_rot_deg = 0
-beta_rot_deg = 0
-alpha_laser_deg = 0
-beta_laser_deg = -60
-[density]
-ball_radius_deg = 3.0
-tolerance = 0.01
-[[weight]]
-shape = "band"
-theta_deg = [45, 135]
-"""
 STUDY = 'name = "two"\ntasks = ["ahead.toml"]\nservos = ["AX-12A", "MX-64R"]\nfront = ["cost_usd", "J"]\nwinners = 0\n'
 
 
@@ -47,8 +26,8 @@ def only_looked_up(_client, units, store, _limit_s, _ticked):
         yield Finished(unit, known, "", None, 0.0)
 
 
-def test_two_candidates_from_the_command_to_the_table(tmp_path, command, monkeypatch):
-    (tmp_path / "ahead.toml").write_text(TASK)
+def test_two_candidates_from_the_command_to_the_table(tmp_path, cheapest_task, command, monkeypatch):
+    (tmp_path / "ahead.toml").write_text(cheapest_task)
     (tmp_path / "two.toml").write_text(STUDY)
     out = tmp_path / "out"
     code, printed, complaint = command("study", tmp_path / "two.toml", "--out", out, "--processes", 1)

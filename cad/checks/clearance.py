@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import manifold3d
 import numpy as np
-import shapely  # type: ignore[import-untyped]
+import shapely
 
 from cad.assembly import turns
 from cad.checks.check import Check, at_least, at_most

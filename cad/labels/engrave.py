@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
-import shapely  # type: ignore[import-untyped]
-import shapely.geometry  # type: ignore[import-untyped]
+import shapely
+import shapely.geometry
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism

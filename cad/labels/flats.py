@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
-import shapely  # type: ignore[import-untyped]
+import shapely
 
 from design.frames import Array
 

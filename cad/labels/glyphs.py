@@ -9,7 +9,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
-import shapely  # type: ignore[import-untyped]
+import shapely
 
 from design.frames import Array
 

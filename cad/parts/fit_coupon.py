@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
-import shapely  # type: ignore[import-untyped]
+import shapely
 
 from cad import solids
 from cad.drives.head import Head

@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from design.errors import BuildError
+from design.files import whole_file
 from design.study.columns import COLUMNS
 from design.study.crossing import AXES
 from design.task import NAMES
@@ -35,8 +35,8 @@ def write_tables(folder: Path, rows: Iterable[dict[str, Any]]) -> Counter[str]:
     schema = pa.schema([(name, pa.float64() if name in NUMBERS else pa.string()) for name in FIELDS])
     statuses: Counter[str] = Counter()
     with (
-        _replaced(folder / "study.csv") as text,
-        _replaced(folder / "study.parquet") as table,
+        whole_file(folder / "study.csv", BuildError) as text,
+        whole_file(folder / "study.parquet", BuildError) as table,
         text.open("w", encoding="utf-8", newline="") as file,
         pq.ParquetWriter(table, schema) as parquet,
     ):
@@ -60,16 +60,3 @@ def _groups(rows: Iterable[dict[str, Any]], size: int) -> Iterator[list[dict[str
             group = []
     if group:
         yield group
-
-
-@contextmanager
-def _replaced(path: Path) -> Iterator[Path]:
-    """A file beside `path` that takes its place when the block ends well."""
-    part = path.with_suffix(f"{path.suffix}.part")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:
-        raise BuildError(f"{path}: cannot write the table: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_io.calibration.edges import clear_of_edges
-from firmware_io.calibration.model import COUNT, LAG, MOUNT, Beams, Ints, Mount, rays
+from firmware_io.calibration.model import BACKLASH, COUNT, LAG, MOUNT, WIDEST_BACKLASH_RAD, Beams, Ints, Mount, rays
 from firmware_io.calibration.observable import Choice, check_fan, choose, several_speeds, spectrum
-from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, reduced, step, sums
+from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, moved_by_last, reduced, step, sums
 from firmware_io.calibration.surfaces import group, without_misfits
 from firmware_io.calibration.tiles import Tiles, flat_tiles
 from firmware_io.samples import Floats
@@ -33,7 +33,7 @@ class Estimate:
     Attributes:
         x: parameters, held ones as they were, shape (COUNT,).
         choice: which of them were found, and why the others were not.
-        covariance: of the found ones, shape (k, k).
+        covariance: of the found ones, shape (k, k): what the noise brings, and a backlash that had to be held.
         spectrum: singular values of their information, in units of their limits, shape (k,).
         tiles: what it was found from.
         grouping: their surfaces.
@@ -85,7 +85,7 @@ def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
     return Estimate(
         x=x,
         choice=choice,
-        covariance=scale * covariance(part),
+        covariance=scale * covariance(part) + _of_held_backlash(normal, grouping, choice.free, last.bulge_m),
         spectrum=spectrum(part, choice.free),
         tiles=tiles,
         grouping=grouping,
@@ -93,6 +93,14 @@ def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
         noise_m=tiles.noise_m * float(np.sqrt(scale)),
         bulge_m=last.bulge_m,
     )
+
+
+def _of_held_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float) -> Floats:
+    """Covariance that a backlash brings which is held at 0 and may be as wide as any is, shape (k, k)."""
+    if BACKLASH[0] in free:
+        return np.zeros((free.size, free.size))
+    moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * WIDEST_BACKLASH_RAD
+    return np.outer(moved, moved)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -68,6 +68,7 @@ PARAMETERS = (
 COUNT = len(PARAMETERS)
 MOUNT = (0, 1, 2, 3)
 BIAS, HARMONIC_1, HARMONIC_2, LAG, BACKLASH = (4,), (5, 6), (7, 8), (9,), (10,)
+WIDEST_BACKLASH_RAD = np.radians(20 / 60)  # the most that a maker in the catalogue tells of a servo's gear
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 
 from design.errors import RecordingError
 from firmware_io.calibration import model
-from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Beams, Ints, Mount
+from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, WIDEST_BACKLASH_RAD, Beams, Ints, Mount
 from firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
 from firmware_io.calibration.surfaces import seen_twice
 from firmware_io.calibration.tiles import Tiles
@@ -21,7 +21,10 @@ from firmware_io.samples import Floats
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
 FLATTEST_FAN_RAD = np.radians(3.0)
 _TWICE = 0.05  # share of the beams
-_INSIDE = "half of it, divided by the speed, is inside the time offset"
+_INSIDE = (
+    "half of it, divided by the speed, is inside the time offset, whose stated error allows for "
+    f"{np.degrees(WIDEST_BACKLASH_RAD):.2f} deg of it"
+)
 _ONE_LINE = 0.01  # share of the surface that faces across it
 
 

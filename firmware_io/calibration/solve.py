@@ -204,6 +204,12 @@ def covariance(part: Reduced) -> Floats:
     return found * np.outer(scale, scale)
 
 
+def moved_by_last(part: Reduced) -> Floats:
+    """What the other parameters take on for each unit that the last one is off while it is held, shape (k - 1,)."""
+    others = Reduced(part.information[:-1, :-1], part.right[:-1], part.plane_rows)
+    return covariance(others) @ part.information[:-1, -1]
+
+
 def bulge_m(normal: Floats, grouping: Grouping) -> float:
     """How far spots stand off their planes, beyond what noise does: standard deviation, from the median."""
     spot, _ = _per_spot(grouping, normal[:, _U, [_U, _E]])

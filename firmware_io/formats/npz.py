@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from zipfile import is_zipfile
 
 import numpy as np
 
@@ -15,6 +16,9 @@ _COLUMN = "column."
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file such as `write` makes."""
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        if not is_zipfile(stream):
+            raise RecordingError(f"{path}: not an archive of NumPy, or cut off")
     with foreign(f"{path}: cannot read", np.load, path, allow_pickle=False) as archive:
         missing = {"points_m", "shape", "T_world_cloud"} - set(archive)
         if missing:

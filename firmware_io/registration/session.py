@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from design.errors import RecordingError
-from firmware_io.cloud_files import read_clouds, write_clouds
+from design.files import check_place
+from firmware_io.cloud_files import check_target, read_clouds, write_clouds
 from firmware_io.registration.merge import merge
 from firmware_io.registration.pairwise import Pair
 from firmware_io.registration.picture import overlap_picture
@@ -68,8 +69,12 @@ def register_files(
     for name, value in (("spacing", spacing_m), ("map spacing", map_spacing_m)):
         if not (np.isfinite(value) and value > 0):
             raise RecordingError(f"{name} {value} m: must be above 0")
+    check_target(out)
+    check_place(poses, RecordingError)
     names, clouds, said = [], [], []
-    for path in paths:
+    for k, path in enumerate(paths):
+        if path.resolve() in [other.resolve() for other in paths[:k]]:
+            raise RecordingError(f"{path}: named twice; a cloud tells nothing of its own place")
         read, lines = read_clouds(path)
         names += [path.stem] if len(read) == 1 else [f"{path.stem}_{k}" for k in range(1, len(read) + 1)]
         clouds += read
