@@ -17,10 +17,10 @@ from contextlib import suppress
 import numpy as np
 
 from cad.assembly import make_parts
-from cad.build import link_bodies
 from cad.checks.check import Check
 from cad.checks.run import run_checks
 from cad.mass import of_solid
+from cad.weights import link_bodies
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.errors import BuildError
@@ -90,6 +90,8 @@ def _measured(scanner: Scanner) -> tuple[dict[str, float], list[Check]]:
         "rotor_g": 1000 * link_bodies(scanner, assembly)["rot"].mass_kg,
         "bearing": float(assembly.stack.bearing is not None),
         "sub_plate": float(assembly.stack.sub_plate is not None),
+        "counterweight": float("counterweight" in assembly.made),
+        "imbalance_nm": found["flanks"],
         "thin_wall_mm2": max((check.value or 0.0 for check in checks if check.kind == "wall"), default=0.0),
         "islands": max((check.value or 0.0 for check in checks if check.kind == "islands"), default=0.0),
     }

@@ -7,19 +7,26 @@ point cloud goes through.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import cadquery as cq
 
 from cad import bought, solids
+from cad.balance import PART as COUNTERWEIGHT
+from cad.balance import SCREW as BAR_SCREW
+from cad.balance import Counterweight, counterweight_of
 from cad.deck import Deck, deck_of
 from cad.drives.drive import Drive, drive_of
 from cad.drives.head import Head
 from cad.mesh import Mesh, mesh_of
-from cad.parts.alignment_linkage import AlignmentLinkage, alignment_linkage, linkage_of
+from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.base_mount import base_mount, mount_of
+from cad.parts.counterweight import counterweight
+from cad.parts.linkage_sizing import AlignmentLinkage, linkage_of
 from cad.parts.sub_plate import sub_plate, sub_plate_of
+from cad.screws import Screw
+from design.left_out import LeftOut
 from design.scanner import Scanner
 
 PRINTED, TURNED = (0.93, 0.45, 0.10), (0.75, 0.76, 0.78)
@@ -46,6 +53,7 @@ TURNING = (
     "shaft_ring",
     "alignment_linkage",
     "sub_plate",
+    "counterweight",
     "servo_horn",
     "ring_rotor",
     "bearing_inner",
@@ -60,6 +68,7 @@ class Assembly:
     drive: Drive
     deck: Deck
     linkage: AlignmentLinkage
+    counterweight: Counterweight | LeftOut  # or why there is none
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
     _meshes: dict[str, Mesh] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -68,6 +77,18 @@ class Assembly:
     def stack(self) -> Head:
         """Every number that more than one part needs."""
         return self.drive.stack
+
+    def metal(self) -> frozenset[str]:
+        """Names of the made parts that no printer makes."""
+        return self.drive.turned() | (frozenset({COUNTERWEIGHT}) & self.made.keys())
+
+    def slotted(self) -> list[tuple[str, str, Screw, int, float, float]]:
+        """Screws in slots: part, what they end in, size, number, grip and depth of thread."""
+        slots, bar = self.drive.slotted(), self.counterweight
+        if isinstance(bar, Counterweight):
+            grip = bar.ear.high - bar.ear.low
+            slots = [*slots, ("alignment_linkage", COUNTERWEIGHT, BAR_SCREW, len(bar.screws), grip, bar.section[1])]
+        return slots
 
     def mesh(self, name: str) -> Mesh:
         """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
@@ -106,6 +127,9 @@ def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True)
     drive = drive_of(scanner)
     stack = drive.stack
     deck, linkage = deck_of(scanner, stack), linkage_of(scanner, stack)
+    bar = counterweight_of(scanner, linkage)
+    if isinstance(bar, Counterweight):
+        linkage = replace(linkage, ear=bar.ear)
     made: dict[str, Callable[[], cq.Solid]] = {**drive.made()}
     made["alignment_linkage"] = lambda: alignment_linkage(linkage)
     between = sub_plate_of(scanner, stack)
@@ -118,13 +142,27 @@ def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True)
     optical = solids.location(stack.R(), T[:3, 3] * 1000)
     base = optical * cq.Location(cq.Vector(0, 0, -scanner.lidar.optical_height_mm))
     others |= {name: solid.moved(base) for name, solid in bought.lidar_solids(scanner.lidar).items()}
-    return Assembly(
+    assembly = Assembly(
         drive,
         deck,
         linkage,
+        bar,
         {name: make() for name, make in made.items() if wanted(name)},
         {name: solid for name, solid in others.items() if wanted(name)},
     )
+    return _balanced(scanner, assembly) if wanted(COUNTERWEIGHT) else assembly
+
+
+def _balanced(scanner: Scanner, assembly: Assembly) -> Assembly:
+    """With the counterweight, if there is one, cut to the solids; without the linkage, to its estimate."""
+    from cad.weights import rotor_moment
+
+    bar = assembly.counterweight
+    if isinstance(bar, LeftOut):
+        return assembly
+    if "alignment_linkage" in assembly.made:
+        bar = bar.balancing(rotor_moment(scanner, assembly))
+    return replace(assembly, counterweight=bar, made=assembly.made | {COUNTERWEIGHT: counterweight(bar)})
 
 
 def as_tree(assembly: Assembly) -> cq.Assembly:
@@ -146,4 +184,6 @@ def colour_of(name: str) -> tuple[float, float, float]:
         return WINDOW
     if name in ("servo_shaft", "main_shaft"):
         return TURNED
+    if name == COUNTERWEIGHT:
+        return STEEL
     return BOUGHT.get(name, BOUGHT.get(name.split("_")[0], PRINTED))

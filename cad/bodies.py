@@ -21,7 +21,7 @@ def bodies_of(scanner: Scanner, turning: bool) -> tuple[Body, ...]:
     require_kernel()
     from cad.assembly import make_parts, turns
     from cad.draft import coarse, draft_linkage
-    from cad.parts.alignment_linkage import PART
+    from cad.parts.linkage_sizing import PART
 
     assembly = make_parts(scanner, lambda name: name != PART and turns(name) == turning)
     meshes = {name: coarse(solid) for name, solid in (assembly.made | assembly.bought).items()}

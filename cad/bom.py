@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from cad.assembly import Assembly
+from cad.balance import PART as COUNTERWEIGHT
+from cad.balance import SCREW, Counterweight
 from cad.drives.drive import Drive
 from cad.joints import Joint
 from cad.remarks import products_of
@@ -47,7 +49,7 @@ class Item:
     """One row. Empty texts and None are unknown.
 
     Attributes:
-        kind: printed, turned, bought, screw, nut, insert, wiring or total.
+        kind: printed, turned, sawn, bought, screw, nut, insert, wiring or total.
         part: what it is.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
@@ -104,6 +106,8 @@ def items_of(
         made = "turned" if part in turned else "printed"
         file = f"parts/{part}.step" if part in turned else f"print/{part}.3mf"
         how = "aluminium or steel, after" if part in turned else f"{scanner.printer.name}, solid, from"
+        if isinstance(assembly.counterweight, Counterweight) and part == COUNTERWEIGHT:
+            made, how = "sawn", f"{assembly.counterweight.stock}, two threads {SCREW.name}, after"
         note = f"{how} {file}; drawing drawings/{part}.pdf"
         items.append(Item(made, part, number, 1, mass_g=round(masses_g[part], 1), note=note))
     items += _products(scanner, assembly.drive)

@@ -23,7 +23,6 @@ from design.scanner import Scanner
 
 if TYPE_CHECKING:
     from cad.assembly import Assembly
-    from cad.mass import Inertial
     from cad.mesh import Mesh
 
 
@@ -85,6 +84,7 @@ def build_parts(
     from cad.labels.label import labelled_parts
     from cad.mesh import checked, stl_bytes
     from cad.urdf import urdf_text
+    from cad.weights import density_g_cm3, link_bodies
 
     progress("making the parts")
     assembly = (make or make_parts)(scanner)
@@ -100,7 +100,7 @@ def build_parts(
         meshes_of_parts[name] = mesh
         files[f"parts/{name}.step"] = step_text(alone(name, solid), f"{name} config={digest}").encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
-        reports.append(_report(name, solid.Volume(), _density(name, scanner, assembly), mesh))
+        reports.append(_report(name, solid.Volume(), density_g_cm3(name, scanner, assembly), mesh))
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(scanner, assembly)
@@ -113,7 +113,7 @@ def build_parts(
         t_world_rot_mm=deck.t_world_rot,
         parts=tuple(reports),
         findings=(*findings_of(scanner, assembly, bodies), *labels.findings),
-        left_out=(*left_out_of(drive, deck), *labels.left_out),
+        left_out=(*left_out_of(assembly), *labels.left_out),
         files=tuple(sorted(files)),
     )
 
@@ -145,32 +145,6 @@ def config_hash(scanner: Scanner) -> str:
         + others,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]
-
-
-def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
-    """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
-
-    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns.
-    """
-    from cad import mass
-
-    lidar = scanner.lidar
-    own = {name: mass.of_solid(s, _density(name, scanner, assembly)) for name, s in assembly.made.items()}
-    bought_standing, bought_turning = assembly.drive.weights()
-    standing = [*(own[name] for name in assembly.standing_parts()), *bought_standing]
-    turning = [*(own[name] for name in assembly.turning_parts()), *bought_turning]
-    x, y, z = lidar.body_mm
-    base = -lidar.optical_height_mm
-    laser = mass.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
-    return {"servo": mass.together(standing), "rot": mass.together(turning), "laser": laser}
-
-
-def _density(name: str, scanner: Scanner, assembly: Assembly) -> float:
-    from cad.loads import ALUMINIUM_G_CM3
-
-    if name in assembly.drive.turned():
-        return ALUMINIUM_G_CM3
-    return scanner.printer.density_g_cm3
 
 
 def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:

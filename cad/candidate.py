@@ -73,7 +73,7 @@ def _made(scanner: Scanner) -> tuple[Shadow, PartFacts] | Refused:
 
 
 def _facts(scanner: Scanner, assembly: Assembly, checks: Sequence[Check]) -> PartFacts:
-    from cad.build import link_bodies
+    from cad.weights import link_bodies
 
     margins = {
         check.kind: check.limit / check.value

@@ -11,7 +11,8 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from cad.parts.alignment_linkage import AlignmentLinkage, shapes_of
+from cad.parts.alignment_linkage import shapes_of
+from cad.parts.linkage_sizing import AlignmentLinkage
 from design.frames import Array
 
 CHORD_ERROR = 0.2  # mm: not seen on a screen, a third of the triangles of the files

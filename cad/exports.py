@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cad.assembly import Assembly
 from cad.bom import bom_text, items_of
 from cad.build import PartsResult, config_hash, write_files
 from cad.drawings.files import drawing_files
@@ -48,7 +47,7 @@ def export_scanner(
     """
     assembly, digest = made.assembly, config_hash(scanner)
     masses = {report.name: report.mass_g for report in made.parts}
-    turned = {part for part in assembly.made if is_turned(part, assembly)}
+    turned = set(assembly.metal())
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     joints = joints_of(scanner, assembly, rounds)
     progress("drawing the parts")
@@ -70,11 +69,6 @@ def export_scanner(
     return Exports(tuple(sorted(files)), tuple(left_out), tuple(findings))
 
 
-def is_turned(part: str, assembly: Assembly) -> bool:
-    """Whether a part is turned from metal instead of printed."""
-    return part in assembly.drive.turned()
-
-
 def _prints(
     scanner: Scanner, meshes: dict[str, Mesh], turned: set[str], digest: str
 ) -> tuple[dict[str, bytes], list[LeftOut]]:
@@ -83,7 +77,7 @@ def _prints(
     left_out = []
     for part, mesh in meshes.items():
         if part in turned:
-            left_out.append(LeftOut(f"print/{part}.3mf", "turned from metal after its STEP file", 1, "print files"))
+            left_out.append(LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files"))
             continue
         files |= _print_file(scanner, part, mesh, digest)
     return files, left_out

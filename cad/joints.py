@@ -97,8 +97,9 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
                 in_trap = behind.fixing == "trap" or (core and _is_trap(hole, screw, printer))
                 key = (part, behind.onto, behind.fixing, screw.name, in_trap)
                 found.setdefault(key, []).append((hole.length, behind.depth, covered))
-    for part, onto, screw, count, grip, depth in assembly.drive.slotted():
-        found[part, onto, "thread", screw.name, False] = [(grip, depth, False)] * count
+    for part, onto, screw, count, grip, depth in assembly.slotted():
+        traps = any(hole.hole and _is_trap(hole, screw, printer) for hole in rounds.get(onto, []))
+        found[part, onto, "trap" if traps else "thread", screw.name, traps] = [(grip, depth, False)] * count
     if "base_mount" not in assembly.made:
         key = ("deck", "servo_case", "nut", scanner.servo.case_screw, False)
         found[key] = [(DECK, CASE_EAR, False)] * 4
@@ -116,7 +117,7 @@ def without_traps(printer: Printer, assembly: Assembly, joints: list[Joint]) -> 
     found = []
     for joint in joints:
         holder = joint.part if joint.fixing == "grub" else joint.onto
-        if holder in assembly.made and joint.fixing in ("grub", "thread") and not joint.traps:
+        if holder in assembly.made.keys() - assembly.metal() and joint.fixing in ("grub", "thread") and not joint.traps:
             message = f"{holder}: no nut trap fits at its {joint.count} {joint.screw.name}: they hold in plain threads"
             found.append(Finding("no_nut_trap", "note", holder, message))
     return found

@@ -88,12 +88,22 @@ def bearing_of(scanner: Scanner, stack: Stack) -> Bearing | None:
     is safe. A horn that its maker does not rate is trusted with little. None as well where nothing in the catalogue
     fits.
     """
-    rated = rated_moment_nm(scanner)
-    if _heaviest(scanner, stack).moment_nm <= (UNRATED_NM if rated is None else rated):
+    if horn_bears(scanner, stack):
         return None
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * WIRE_DEPTH)
     most = 2 * (stack.hub_radius - HUB_STEP)
     return next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
+
+
+def horn_bears(scanner: Scanner, stack: Stack, bar_g: float = 0.0, bar_z: float = 0.0) -> bool:
+    """Whether the horn alone bears the heaviest linkage, or with it a bar of this mass and height that balances it."""
+    rated, weight = rated_moment_nm(scanner), _heaviest(scanner, stack)
+    moment = weight.moment_nm
+    if bar_g > 0:
+        sine = tilt_sine(scanner)
+        bar = bar_g / 1000 * STANDARD_GRAVITY * sine * (bar_z - stack.horn) / 1000
+        moment = weight.across_n * weight.lever_m + bar
+    return moment <= (UNRATED_NM if rated is None else rated)
 
 
 def supported(weight: Weight, stack: Stack, cage_n_per_m: float) -> Supported:

@@ -72,10 +72,12 @@ def products_of(scanner: Scanner, drive: Drive) -> list[Product]:
     return list({product.name: product for product in found if product is not None}.values())
 
 
-def left_out_of(drive: Drive, deck: Deck) -> tuple[LeftOut, ...]:
+def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     """Parts that this scanner does not need."""
-    out = drive.left_out()
-    if deck.flat:
+    out = assembly.drive.left_out()
+    if isinstance(assembly.counterweight, LeftOut):
+        out.append(assembly.counterweight)
+    if assembly.deck.flat:
         out.append(LeftOut("base_mount", "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)
 

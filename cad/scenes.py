@@ -3,16 +3,19 @@
     y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body hangs under the frame it moves with.
 
 Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate leave
-the linkage along the lidar's z, as they are put in.
+the linkage along the lidar's z, as they are put in, a counterweight along its radius.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from cad.assembly import Assembly, colour_of, turns
+from cad.balance import PART as COUNTERWEIGHT
+from cad.balance import Counterweight
 from cad.glb import Node, glb_bytes
 from cad.mesh import Mesh
 from design.frames import Array
@@ -94,7 +97,7 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
     axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
     lifts: dict[str, Array] = {}
     top = -np.inf
-    for product in sorted(points.keys() - set(ALONG_LIDAR), key=assembly.drive.stacked().index):
+    for product in sorted(points.keys() - {*ALONG_LIDAR, COUNTERWEIGHT}, key=assembly.drive.stacked().index):
         low, high = float(points[product][:, 2].min()), float(points[product][:, 2].max())
         lift = max(0.0, top + GAP_MM - low)
         lifts[product] = lift * axis
@@ -106,4 +109,8 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
             lift = top + GAP_MM - float(heights.min())
             lifts[product] = lifts["alignment_linkage"] + lift * out
             top = float(heights.max()) + lift
+    bar = assembly.counterweight
+    if isinstance(bar, Counterweight):
+        away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
+        lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + (bar.ear.end - bar.start + GAP_MM) * away
     return lifts

@@ -56,6 +56,11 @@ def location(R: ArrayLike, t: ArrayLike = (0.0, 0.0, 0.0)) -> cq.Location:
     return cq.Location(plane)
 
 
+def about_axis(angle: float) -> cq.Location:
+    """Turn by an angle [rad] about z."""
+    return cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(angle))
+
+
 def vector(v: ArrayLike) -> cq.Vector:
     """Kernel vector from three numbers."""
     x, y, z = (float(c) for c in np.asarray(v, dtype=float))

@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cad.assembly import make_parts, turns
-from cad.build import config_hash, link_bodies
+from cad.build import config_hash
 from cad.drives.direct_sizing import stack_of
 from cad.loads import Weight, bearing_of, supported, waist_nm_per_rad
 from cad.mesh import checked_mesh
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 from cad.remarks import findings_of, left_out_of, rotor_weight
+from cad.weights import link_bodies
 from design.angles import Angles, AngleSet
 from design.catalogue import Bearing, Servo, load_catalogue
 from design.errors import BuildError
@@ -75,7 +76,7 @@ def test_the_horn_stays_within_its_rating(made):
     limit = scanner.servo.radial_load_n * 0.010
     assert weight.moment_nm > limit  # so it needs the bearing
     assert not [f for f in findings_of(scanner, assembly, bodies) if f.code == "tilt_moment"]
-    left_out = [entry.what for entry in left_out_of(assembly.drive, assembly.deck)]
+    left_out = [entry.what for entry in left_out_of(assembly)]
     assert left_out == (["slip_ring_adapter"] if name == "no_ring" else [])
     assert "bearing_cage" in assembly.made
     assert ("cage_base" in assembly.made) == (name == "no_ring")

@@ -17,8 +17,9 @@ from cad.draft import draft_linkage
 from cad.drives.direct_sizing import covered_screws, envelope_of, rotor_radius, stack_of
 from cad.kernel import require_kernel
 from cad.mesh import checked_mesh
-from cad.parts.alignment_linkage import alignment_linkage, linkage_of
+from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.base_mount import base_mount, mount_of
+from cad.parts.linkage_sizing import linkage_of
 from cad.parts.sub_plate import ear_screws, sub_plate, sub_plate_of
 from cad.solids import box, building, checked
 from design.angles import Angles, AngleSet
@@ -75,8 +76,8 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     flat = np.abs(body.triangles_center @ normal + seat) < 1e-3
     area = body.area_faces[flat & (body.face_normals @ normal > 0.999)].sum()
     assert area > 0.85 * scanner.lidar.body_mm[0] * scanner.lidar.body_mm[1]  # less holes and marks
-    thin, surface = thin_walls(mesh, scanner.printer.min_wall_mm)
-    assert thin < 0.01 * surface
+    walls = thin_walls(mesh, scanner.printer.min_wall_mm)
+    assert walls.area_mm2 < 0.01 * walls.surface_mm2
     # the draft that a page shows is the same body, off by what its chords leave out
     draft = trimesh.Trimesh(*draft_linkage(linkage_of(scanner, stack)), process=False)
     assert draft.is_watertight and draft.volume == pytest.approx(body.volume, rel=1e-3)

@@ -13,9 +13,10 @@ from cad.drives.direct_sizing import stack_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
 from cad.joints import joints_of, without_traps
-from cad.parts.alignment_linkage import alignment_linkage, linkage_of
+from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.bearing_cage import cage_of, has_room
 from cad.parts.fit_coupon import coupon_of, fit_coupon
+from cad.parts.linkage_sizing import linkage_of
 from cad.screws import SCREWS, trap_of
 from design.angles import Angles
 from design.catalogue import load_catalogue

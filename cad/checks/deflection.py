@@ -18,7 +18,7 @@ from cad.checks.check import Check, Severity, tidy
 from cad.drives.drive import Drive
 from cad.mass import Inertial, together
 from cad.mesh import Mesh
-from cad.parts.alignment_linkage import AlignmentLinkage
+from cad.parts.linkage_sizing import AlignmentLinkage
 from cad.statics.sag import Sag, linkage_sag, with_shaft
 from design.frames import Array
 from design.scanner import Scanner

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from cad.checks.check import Check, at_most, note, tidy
+from cad.balance import FAR_MM, RUBS_NM, play_matters
+from cad.checks.check import Check, Severity, at_most, note, tidy
 from cad.drives.direct_sizing import Stack
 from cad.drives.drive import Drive
 from cad.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
@@ -23,7 +24,6 @@ TORQUE_SHARE = 0.2  # of the stall torque that a servo gives all day
 SPIN_UP_S = 0.2
 SLOWEST_PERIOD_S = 1.0  # where the angle set names no motion
 BALANCE_AT_MM = 50.0  # from the axis, where a counterweight is worked out
-NO_TORQUE_NM = 1e-3  # less than any ring or bearing rubs with
 
 
 def mechanics_checks(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial]) -> list[Check]:
@@ -83,23 +83,23 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight) -> Check:
     The friction of ring and bearing, which would hold one flank, is in no data sheet: taken for none.
     """
     servo, torque = scanner.servo, weight.across_n * weight.off_axis_m
-    if torque <= NO_TORQUE_NM:
-        return Check("flanks", "pass", tidy(torque), NO_TORQUE_NM, "N m", "servo", "servo: gravity does not turn it")
+    if torque <= RUBS_NM:
+        message = f"servo: gravity turns it with {torque:.1g} N m, no more than ring and bearing rub with"
+        return Check("flanks", "pass", tidy(torque), RUBS_NM, "N m", "servo", message)
     grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
     x, y = rotor.centre_m[:2]
     azimuth = round(math.degrees(math.atan2(-y, -x))) % 360
     play = "by a play that its maker does not tell"
-    small = False
     if servo.backlash_deg is not None:
-        off = math.radians(servo.backlash_deg) * 10_000
-        small = off <= scanner.lidar.range_sigma_mm
+        off = math.radians(servo.backlash_deg) * FAR_MM
         play = f"by {servo.backlash_deg:g} deg of play ({off:.0f} mm at 10 m)"
     message = (
         f"servo: gravity turns {servo.name} with {torque:.2g} N m to and fro and changes the flank of its gears twice "
         f"a turn, {play}: an encoder on the output shaft sees that, one on the motor does not; {grams:.0f} g at "
         f"{BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x, would balance it"
     )
-    return Check("flanks", "note" if small else "warning", tidy(torque), NO_TORQUE_NM, "N m", "servo", message)
+    severity: Severity = "warning" if play_matters(scanner) else "note"
+    return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", "servo", message)
 
 
 def _forces(scanner: Scanner, stack: Stack, weight: Weight, shared: Supported) -> list[Check]:

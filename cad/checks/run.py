@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cad.assembly import Assembly, make_parts
-from cad.build import link_bodies
 from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
@@ -17,6 +16,7 @@ from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.remarks import products_of, unverified
 from cad.shadow import shadow_of, triangles_of
+from cad.weights import link_bodies
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
 
@@ -55,7 +55,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     shadow = shadow_of(scanner, triangles)
     progress("checking clearance, loads and walls")
     drive = assembly.drive
-    printed = {name: solid for name, solid in assembly.made.items() if name not in drive.turned()}
+    printed = {name: solid for name, solid in assembly.made.items() if name not in assembly.metal()}
     doubts = [
         Check("unverified", "note", None, None, "", product.name, finding.message)
         for product in products_of(scanner, drive)

@@ -67,6 +67,7 @@ def belt_steps(stack: BeltStack) -> dict[str, tuple[str, str]]:
         ),
         "lidar": DIRECT_STEPS["lidar"],
         "sub_plate": DIRECT_STEPS["sub_plate"],
+        "counterweight": DIRECT_STEPS["counterweight"],
         "alignment_linkage": (
             "Linkage on the shaft, and the belt set",
             "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
@@ -76,3 +77,13 @@ def belt_steps(stack: BeltStack) -> dict[str, tuple[str, str]]:
             "same way, so from now on the servo's angle is that of the axis.",
         ),
     }
+
+
+def teeth_words(stack: BeltStack) -> str:
+    """What a pulley's drawing says of its teeth."""
+    belt = stack.belt
+    return (
+        f"{stack.teeth} teeth for {belt.name}, pitch {belt.pitch_mm:g}: pitch diameter {2 * stack.pitch_radius:.2f}, "
+        f"over the tips {2 * stack.tip_radius:.2f}, grooves {belt.tooth_height_mm:g} deep with "
+        f"a round bottom R{belt.groove_radius_mm:g}."
+    )

@@ -45,6 +45,12 @@ DIRECT_STEPS: dict[str, tuple[str, str]] = {
         "The hub covers one of the lidar's screws, so the lidar came on a plate of its own: put this plate on the "
         "linkage, FRONT over FRONT, and drive the screws of its ears from the lidar's side. {alignment_linkage}",
     ),
+    "counterweight": (
+        "Counterweight on the linkage",
+        "Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in the middle "
+        "of the slots. {alignment_linkage>counterweight} To trim it, push the bare shaft into the hub and lay it on "
+        "two level straight edges: where the bar sinks move it inwards, where the lidar sinks outwards.",
+    ),
     "alignment_linkage": (
         "Linkage on the shaft",
         "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way "
