@@ -11,8 +11,8 @@ from design.scanner import Scanner
 
 NUTS = (
     "Put the nuts into their traps before anything else: those of a hub from within its bore, flat against the wall; "
-    "those of a plate from below; those of a boss from above into the slots. Pull each home with a screw. What has no "
-    "trap is a plain thread."
+    "those of a plate or an arm from below; those of a boss from above into the slots; those of a foot from its "
+    "corners. Pull each home with a screw. What has no trap is a plain thread."
 )
 LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."

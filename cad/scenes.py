@@ -103,14 +103,16 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
         lifts[product] = lift * axis
         top = high + lift
     top = float((points["alignment_linkage"] @ out).max())
+    bar = assembly.counterweight
+    if isinstance(bar, Counterweight):
+        away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
+        shift = (bar.ear.end - bar.start + GAP_MM) * away
+        lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + shift
+        top = max(top, float(((points[COUNTERWEIGHT] + shift) @ out).max()))
     for product in ALONG_LIDAR:
         if product in points:
             heights = points[product] @ out
             lift = top + GAP_MM - float(heights.min())
             lifts[product] = lifts["alignment_linkage"] + lift * out
             top = float(heights.max()) + lift
-    bar = assembly.counterweight
-    if isinstance(bar, Counterweight):
-        away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
-        lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + (bar.ear.end - bar.start + GAP_MM) * away
     return lifts

@@ -17,7 +17,7 @@ from design.objective import Score, score
 from design.oracle import BallScore, ball_score
 from design.poles import PoleChances, pole_chances, pole_of
 from design.problem import Problem, problem_of
-from design.robust import sensitivity
+from design.robust import rise_words, sensitivity
 from design.task import LoadedTask
 
 
@@ -101,8 +101,7 @@ class Evaluation:
                 f"interlaced     {self.interlaced_s:g} s a turn: the next one's lines come halfway between those of "
                 "this one"
             )
-        rises = ", ".join(f"{rise:.4f} ({name})" for name, rise in self.rises.items())
-        return [*lines, f"1 deg off      J rises by {rises}"]
+        return [*lines, f"1 deg off      {rise_words(self.rises, J.J_error)}"]
 
 
 def evaluate(

@@ -23,5 +23,15 @@ def worst_within(problem: Problem, angles_rad: Array, off_rad: float, nodes: int
     return max(quick_J(problem, setting, nodes) for setting in settings)
 
 
+def rise_words(rises: dict[str, float], J_error: float) -> str:
+    """What `sensitivity` found, in words: within the error of J nothing is known to rise."""
+    least = max(J_error, 5e-5)  # four digits are shown
+    rising = ", ".join(f"{rise:.4f} ({name})" for name, rise in rises.items() if rise > least)
+    still = ", ".join(name for name, rise in rises.items() if rise <= least)
+    if not rising:
+        return "J rises by no more than its error, whichever angle it is"
+    return f"J rises by {rising}" + (f", by no more than its error ({still})" if still else "")
+
+
 def _moved(angles_rad: Array, off_rad: float) -> list[tuple[Array, Array]]:
     return [(angles_rad - off_rad * axis, angles_rad + off_rad * axis) for axis in np.eye(4)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
+from cadquery import Vector
 
 from cad.assembly import make_parts, turns
 from cad.bom import items_of
@@ -23,11 +24,12 @@ from cad.drives.direct import DirectDrive
 from cad.drives.drive import drive_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
-from cad.joints import joints_of
+from cad.joints import joints_of, without_traps
 from cad.loads import Weight
 from cad.mesh import mesh_of
 from cad.parts.bearing_tower import bearing_tower, tower_of
 from cad.screws import SCREWS
+from cad.solids import polygon, prism, upright
 from cad.urdf import urdf_text
 from design.angles import Angles, AngleSet
 from design.catalogue import Servo, SlipRing, load_catalogue
@@ -114,6 +116,7 @@ def test_what_it_is_made_of(made):
         "drive_pulley",
         "alignment_linkage",
         "base_mount",
+        "counterweight",
     ]
     assert all(mesh.is_watertight and mesh.body_count == 1 for mesh in made.meshes.values())
     stack = made.stack
@@ -316,13 +319,14 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         ("drive_plate", "bearing_tower"): ("M4", 4, "thread"),
         ("drive_pulley", "servo_output"): ("M2.5", 8, "thread"),
         ("alignment_linkage", "lidar_body"): ("M3", 4, "thread"),
+        ("alignment_linkage", "counterweight"): ("M4", 2, "thread"),
         ("alignment_linkage", "main_shaft"): ("M3", 2, "grub"),
         ("base_mount", "bearing_tower"): ("M3", 4, "thread"),
         ("base_mount", ""): ("M4", 4, "deck"),
     }
     text = instructions_text(scanner, assembly, joints, "0" * 12)
     titles = re.findall(r"^## \d+\. (.*)$", text, re.M)
-    assert len(titles) == 12 and not [title for title in titles if " to " in title]  # no joint was left over
+    assert len(titles) == 13 and not [title for title in titles if " to " in title]  # no joint was left over
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)
     assert "280 mm" in text and "2048 of 4096" in text and "groove of the hub stands over the groove" in text
     masses = dict.fromkeys(assembly.made, 1.0)
@@ -336,14 +340,43 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     solid = made.assembly.made["main_shaft"]
     sheet = drawing_of("main_shaft", made.scanner, made.assembly, rounds_of(solid), [], 80.0, {"main_shaft"}, "0" * 12)
-    said = {mark.text for mark in sheet.marks if hasattr(mark, "text")}
-    assert "Ø24.96  +0.02/0" in said and any(
-        text.endswith("f7 in the bearings, which slide on by hand.") for text in said
+    said = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
+    # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
+    assert [text for text in said if text.startswith("Ø") and ":" not in text] == [
+        "Ø24.96  +0.02/0",
+        "Ø15 x 83.2 DEEP",
+        "Ø27.9",
+        "Ø24.96  +0.02/0",
+        "Ø12  0/-0.1",
+        "Ø8 THRU",
+    ]
+    assert {"Ø24.96 +0.02/0: f7 in the bearings, which slide on by hand.", "1:1   A3"} <= set(said)
+
+
+def test_what_a_print_must_keep_stands_on_its_sheet(made):
+    """Of the pulleys: teeth and bore; of the tower: the seats. What is off the axis is measured from the horn's."""
+    said = {}
+    for name in ("drive_pulley", "bearing_tower"):
+        solid, rest = made.assembly.made[name], ([], 1.0, set(), "0" * 12)
+        sheet = drawing_of(name, made.scanner, made.assembly, rounds_of(solid), *rest)
+        said[name] = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
+    assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
+    assert any(
+        text == "Ø37.1 ±0.1: seat of 61805-2RS, from size for size to a sliding fit." for text in said["bearing_tower"]
     )
+    assert "Ø10.1  0/-0.1 x 5 DEEP" in said["drive_pulley"] and "2:1   A3" in said["drive_pulley"]
+    teeth = next(text for text in said["drive_pulley"] if text.startswith("80 teeth for GT2-6, pitch 2:"))
+    pitch, tips = map(float, re.search(r"pitch diameter ([\d.]+), over the tips ([\d.]+)", teeth).groups())
+    flat = section(made.meshes["drive_pulley"], made.stack.belt_middle)
+    radii = np.linalg.norm(np.asarray(flat.exterior.coords) - made.stack.beside()[:2], axis=1)
+    assert pitch == pytest.approx(160 / np.pi, abs=0.005) and tips == pytest.approx(2 * radii.max(), abs=0.01)
+    horn = made.stack.beside()
+    zero = next(text for text in said["drive_pulley"] if text.startswith("Their zero is"))
+    assert list(map(float, re.findall(r"-?[\d.]+(?=,| in)", zero))) == pytest.approx(horn.tolist(), abs=0.01)
 
 
 def test_the_frame_chain_names_the_servo_beside_the_axis(made):
-    from cad.build import link_bodies
+    from cad.weights import link_bodies
 
     drive, bodies = made.assembly.drive, link_bodies(made.scanner, made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]
@@ -426,3 +459,53 @@ def test_a_ring_with_a_bore_keeps_its_digest():
     ring = load_catalogue().get("UH1256-02-0610-06S", SlipRing)
     assert "flange" not in ring.model_dump() and "rotor" not in ring.model_dump()
     assert SCREWS[load_catalogue().get(CAPSULE, SlipRing).flange.screw].nominal == 5.0
+
+
+def test_nuts_of_the_standard_go_into_the_tower_and_hold():
+    """ISO 4032: M4 is 7.0 across and 3.2 high, M3 5.5 and 2.4; the play is the sliding fit of 0.2."""
+    scanner = replace(scanner_for(), printer=load_catalogue().products["fdm-0.4-nut"])
+    assembly = make_parts(scanner, lambda name: name in ("bearing_tower", "drive_plate", "base_mount"))
+    tower, stack = assembly.made["bearing_tower"], assembly.stack
+
+    def nut(across, height, at, turn_deg):
+        return prism(polygon(across / np.sqrt(3), 6, np.radians(turn_deg)), 0, height).translate(Vector(*at))
+
+    def shared(one):
+        return one.intersect(tower).Volume()
+
+    rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
+    holes = {
+        size: [r for r in rounds["bearing_tower"] if r.hole and abs(r.diameter - size) < 1e-6] for size in (4.2, 3.2)
+    }
+    plate = [np.array(hole.low) for hole in holes[4.2]]
+    foot = [np.array(hole.high) for hole in holes[3.2] if abs(hole.low[2] - stack.tower_bottom) < 1e-6]
+    assert (len(plate), len(foot)) == (4, 4)
+    for at in plate:  # from below, pulled up
+        assert at[2] == pytest.approx(stack.tower_top - 7.5)
+        turn = np.degrees(stack.quarter * np.pi / 2)
+        for down in (3.2, 8.0, 20.0):
+            assert shared(nut(7.0, 3.2, at - [0, 0, down], turn)) < 1e-3
+        assert shared(nut(7.0, 3.2, at - [0, 0, 3.2], turn + 30)) > 1.0  # it cannot turn
+        assert shared(nut(7.0, 3.2, at - [0, 0, 2.7], turn)) > 5.0
+    for at in foot:  # from outside along the diagonal, pulled down
+        out = np.array([*np.sign(at[:2]), 0.0]) / np.sqrt(2)
+        turn = np.degrees(np.arctan2(out[1], out[0]))
+        for way in (0.0, 2.0, 8.0, 20.0):
+            assert shared(nut(5.5, 2.4, at + way * out, turn)) < 1e-3
+        assert shared(nut(5.5, 2.4, at, turn + 30)) > 0.5
+        assert shared(nut(5.5, 2.4, at - [0, 0, 0.5], turn)) > 3.0
+        assert shared(nut(5.5, 2.4, at - out, turn)) > 0.5  # it stands over its hole
+        assert shared(upright(1.5, at[2], at[2] + 2.4 + 5.0, *at[:2])) < 1e-3  # room for the end of any screw
+    joints = {(joint.part, joint.onto): joint for joint in joints_of(scanner, assembly, rounds) if joint.traps}
+    lengths = {key: (joint.fixing, joint.number, joint.count) for key, joint in joints.items()}
+    assert lengths[("drive_plate", "bearing_tower")] == ("trap", "ISO 4762 M4 x 16", 4)
+    assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
+    assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, assembly, list(joints.values()))}
+    sheet = drawing_of("bearing_tower", scanner, assembly, rounds["bearing_tower"], [], 1.0, set(), "0" * 12)
+    said = {mark.text for mark in sheet.marks if hasattr(mark, "text")}
+    assert {
+        "Hexagons under the arms for nuts M4: 7.2 across flats.",
+        "Slots in the foot for nuts M3: 5.7 wide, from its corners.",
+    } <= said
+    wide = replace(stack, flange=stack.flange.model_copy(update={"diameter_mm": 58.0}))
+    assert tower_of(scanner, wide).foot_trap is None and tower_of(scanner, stack).foot_trap is not None

@@ -13,14 +13,15 @@ from hypothesis import strategies as st
 import cad.checks.run as room
 from cad.checks.check import at_least, at_most, checks_text
 from cad.checks.clearance import clearance_checks, distance_over_a_turn
-from cad.checks.islands import islands_of
+from cad.checks.islands import islands_check, islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
 from cad.drives.direct_sizing import stack_of
 from cad.drives.drive import drive_of
 from cad.mass import Inertial
 from cad.mesh import Mesh, mesh_of
-from cad.solids import box, upright
+from cad.print_pose import print_pose
+from cad.solids import box, location, upright
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -102,13 +103,27 @@ def test_shared_room_is_found_by_name():
 def test_a_thin_wall_is_measured_and_a_wedge_is_none():
     slab = box((0, 0, 0), (40, 40, 10))
     fin = slab.fuse(box((0, 0, 9), (0.8, 40, 30))).Solids()[0]
-    thin, area = thin_walls(mesh_of(fin), 1.2)
-    assert area == pytest.approx(trimesh.Trimesh(*[getattr(mesh_of(fin), k) for k in ("vertices", "faces")]).area)
-    assert thin == pytest.approx(2 * 40 * 20, rel=0.05)
-    assert thin_walls(mesh_of(fin), 0.7)[0] == 0
-    assert thin_walls(mesh_of(slab), 1.2)[0] == 0
+    walls = thin_walls(mesh_of(fin), 1.2)
+    area = trimesh.Trimesh(*[getattr(mesh_of(fin), k) for k in ("vertices", "faces")]).area
+    assert walls.surface_mm2 == pytest.approx(area)
+    assert walls.area_mm2 == pytest.approx(2 * 40 * 20, rel=0.05)
+    assert walls.thinnest_mm == pytest.approx(0.8) and walls.at == pytest.approx([0.4, 20, 20], abs=1.0)
+    assert walls.at[0] == pytest.approx(0.4)
+    assert thin_walls(mesh_of(fin), 0.7).area_mm2 == 0
+    assert thin_walls(mesh_of(slab), 1.2).area_mm2 == 0
     wedge = slab.cut(box((0, 0, 0), (80, 80, 80)).rotate((0, 0, 0), (0, 1, 0), 30)).Solids()[0]
-    assert thin_walls(mesh_of(wedge), 1.2)[0] == 0
+    assert thin_walls(mesh_of(wedge), 1.2).area_mm2 == 0
+
+
+def test_the_thinnest_spot_and_the_hole_beside_it_are_told():
+    printer = load_catalogue().products["fdm-0.4"]
+    drilled = box((0, 0, 0), (40, 30, 20)).cut(upright(5.0, -1, 21, 5.6, 12), upright(2.0, -1, 21, 30, 15)).Solids()[0]
+    (wall,) = [c for c in printing_checks(printer, {"part": drilled}, {"part": mesh_of(drilled)}) if c.kind == "wall"]
+    thickness, *place = map(
+        float, re.search(r"([\d.]+) mm, at \(([-\d.]+), ([-\d.]+), ([-\d.]+)\)", wall.message).groups()
+    )
+    assert wall.message.endswith("beside a hole of 10 mm")
+    assert thickness == pytest.approx(0.6, abs=0.02) and place[:2] == pytest.approx([0.3, 12.0], abs=0.4)
 
 
 def test_printing_tells_bed_wall_and_hole():
@@ -128,6 +143,11 @@ def test_a_layer_that_starts_in_the_air_is_found_where_it_starts():
     gallows = table.fuse(box((34, 5, 12), (40, 15, 30))).Solids()[0]
     (island,) = islands_of(mesh_of(gallows))
     assert island.height == pytest.approx(12, abs=0.4) and island.area_mm2 == pytest.approx(60, rel=1e-3)
+    lying = gallows.rotate((0, 0, 0), (1, 0, 0), 90).moved(location(np.eye(3), (100, 0, 0)))  # stands on its y
+    pose = print_pose(mesh_of(lying), (220.0, 220.0, 250.0))
+    pose = replace(pose, T_bed_part=np.array([[1, 0, 0, -100], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]))
+    said = islands_check("part", mesh_of(lying), pose).message
+    assert re.search(r"1 layers .* at \(137, -1[12](\.\d)?, 10\) in the rotation frame, the largest 60 mm2", said)
     two = gallows.fuse(box((20, 5, 20.3), (24, 15, 30))).Solids()[0]
     assert sorted(round(i.area_mm2) for i in islands_of(mesh_of(two))) == [40, 60]
 

@@ -150,6 +150,12 @@ def test_every_screw_hole_of_the_adapter_has_its_place(sheets):
         assert any(abs(value - other) < 0.01 for other in ordinates(sheet))
 
 
+def test_the_bearing_has_a_fit_on_both_of_its_sheets(sheets):
+    # 61806 is 30 x 42: the prints are drawn half of the sliding fit of 0.2 away from it
+    assert "Ø42.1  ±0.1" in sheets["bearing_cage"].said
+    assert "Ø29.9  ±0.1" in sheets["alignment_linkage"].said
+
+
 def test_geometry_in_the_dxf_is_true_to_size(sheets):
     sheet = sheets["servo_shaft"]
     circles = [entity for entity in sheet.dxf.query("CIRCLE") if entity.dxf.layer == "VISIBLE"]

@@ -38,7 +38,7 @@ def test_the_parts_that_hold_the_angles_say_them(made):
 
 def test_a_printed_part_has_a_label_or_is_told_to_have_none(made):
     result, missing = made.result, {out.what for out in made.result.left_out if out.unit == "labels"}
-    for name in set(result.assembly.made) - result.assembly.drive.turned():
+    for name in set(result.assembly.made) - result.assembly.metal():
         plain = result.assembly.mesh(name).volume() - result.meshes[name].volume() < 1.0
         assert plain == (f"label of {name}" in missing)
 
@@ -103,10 +103,10 @@ def test_faces_that_mate_or_are_covered_are_known(made):
     assembly = made.result.assembly
     sight, R, seat = Sight(assembly), assembly.stack.R(), assembly.linkage.seat
     on_seat = flat_at(assembly.made["alignment_linkage"], R @ [0.0, 0.0, seat], R[:, 2])
-    assert sight.touched(on_seat) and not sight.reads(on_seat, np.zeros((1, 2)), True)
+    assert sight.touched(on_seat) and not sight.views(on_seat, np.zeros((1, 2)), True).any()
     deck = -np.array(assembly.deck.normal)
     foot = flat_at(assembly.made["base_mount"], np.array(assembly.deck.centre) + 1e-9 * deck, deck)
-    assert sight.touched(foot) and not sight.reads(foot, np.zeros((1, 2)), False)
+    assert sight.touched(foot) and not sight.views(foot, np.zeros((1, 2)), False).any()
 
 
 def _ground(solid, wall, groove):
@@ -114,8 +114,11 @@ def _ground(solid, wall, groove):
 
 
 def test_a_label_leaves_a_wall_and_goes_round_holes(groove):
-    def found(solid, texts, seen=lambda *_: True):
-        return label_on(_ground(solid, 1.2, groove), texts, seen)
+    def found(solid, texts, seen=lambda _: True):
+        def views(flat, points):
+            return np.full((4, len(points)), seen(flat))
+
+        return label_on(_ground(solid, 1.2, groove), texts, views)
 
     assert found(box((0, 0, 0), (60, 60, 1.5)), ["LABEL"]) is None
     assert len(found(box((0, 0, 0), (34, 20, 20)), ["A LONG LABEL"]).lines.lines) == 2
@@ -123,9 +126,9 @@ def test_a_label_leaves_a_wall_and_goes_round_holes(groove):
     assert found(box((0, 0, 0), (30, 12, 4)), ["MANY", "LINES", "ABCD"]).lines.lines == ("ABCD",)
     top = np.array([0.0, 0.0, 1.0])
     block = box((0, 0, 0), (60, 30, 6))
-    assert found(block, ["LABEL"], lambda flat, _: flat.frame[:, 2] @ top > 0.9).place.flat.frame[2, 2] > 0.9
-    assert not found(block, ["LABEL"], lambda *_: False).seen
-    upright_lines = found(block, ["LABEL"], lambda flat, _: flat.frame[:, 2] @ top > 0.9).place
+    assert found(block, ["LABEL"], lambda flat: flat.frame[:, 2] @ top > 0.9).place.flat.frame[2, 2] > 0.9
+    assert not found(block, ["LABEL"], lambda _: False).seen
+    upright_lines = found(block, ["LABEL"], lambda flat: flat.frame[:, 2] @ top > 0.9).place
     assert (upright_lines.flat.frame[:, :2] @ upright_lines.turn[:, 1]) @ [0.0, 1.0, 0.0] > 0.99
     plate = block.cut(upright(5.0, -1, 7, 30, 15)).Solids()[0]
     label = found(plate, ["LABEL"])
@@ -134,6 +137,27 @@ def test_a_label_leaves_a_wall_and_goes_round_holes(groove):
     lost = plate.Volume() - cut.Volume()
     area = sum(part.area for part in letters("LABEL", label.lines.height, STROKE))
     assert lost == pytest.approx(groove.depth * area, rel=1e-6)
+
+
+def test_a_label_goes_to_what_is_seen_of_a_face(groove):
+    """Half of a face is covered, and of the other half a part that turns leaves one end free, then the other."""
+    block = box((0, 0, 0), (100, 100, 6))
+
+    def views(flat, points):
+        x, y, z = flat.at(points).T
+        return np.stack([(z > 5.9) & (x > 60) & (y > 55), (z > 5.9) & (x > 60) & (y < 30)])
+
+    label = label_on(_ground(block, 1.2, groove), ["LABEL"], views)
+    corners = label.place.flat.at(label.place.put(np.array([[0.0, 0.0], label.lines.size])))
+    assert label.seen and (corners[:, 0] > 60).all() and (corners[:, 1] > 55).all()
+    heads = label.place.flat.frame[:, :2] @ label.place.turn[:, 1]
+    assert heads @ [0.0, 1.0, 0.0] > 0.99  # up, as the block stands
+    lying = replace(_ground(block, 1.2, groove), up=np.array([0.0, 0.0, 1.0]))
+    place = label_on(lying, ["LABEL"], views).place
+    outwards = place.flat.at(place.put(np.array([[10.0, 2.0]])))[0] - [50.0, 50.0, 6.0]
+    assert place.flat.frame[:, :2] @ place.turn[:, 1] @ outwards < 0  # read from the nearer edge
+    narrow = label_on(_ground(block, 1.2, groove), ["LABEL"], lambda flat, points: views(flat, points) & False)
+    assert not narrow.seen
 
 
 def test_engraving_is_what_a_boolean_would_cut():

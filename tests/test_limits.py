@@ -16,7 +16,7 @@ from design.limits import allowed_planes
 from design.objective import quick_J
 from design.oracle import start_phases
 from design.problem import problem_of
-from design.robust import sensitivity, worst_within
+from design.robust import rise_words, sensitivity, worst_within
 from design.search import search
 from design.sphere import weighted_samples
 from design.task import Limits, LoadedTask, Task, load_task
@@ -133,3 +133,12 @@ def test_with_a_tolerance_the_optimum_is_the_one_that_bears_it_best():
     assert "within 4 deg" in robust.word
     at = [worst_within(problem, family.angles_rad, off, 6561) for family in (robust, best)]
     assert at[0] <= at[1] + 1e-4
+
+
+def test_a_rise_within_the_error_of_J_is_none():
+    rises = {"alpha_rot": 0.0002, "beta_rot": 0.0101, "alpha_laser": -0.0001, "beta_laser": 0.0004}
+    assert rise_words(rises, 3e-4) == (
+        "J rises by 0.0101 (beta_rot), 0.0004 (beta_laser), by no more than its error (alpha_rot, alpha_laser)"
+    )
+    assert rise_words(rises, 1e-5).startswith("J rises by 0.0002 (alpha_rot), 0.0101")
+    assert rise_words(rises, 0.02) == "J rises by no more than its error, whichever angle it is"

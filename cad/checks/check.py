@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Literal
 
+from design.frames import Array
+
 Severity = Literal["pass", "note", "warning", "error"]
 
 
@@ -53,6 +55,12 @@ def note(kind: str, value: float | None, unit: str, where: str, what: str) -> Ch
     """A value to know."""
     shown = "not known" if value is None else f"{value:.3g} {unit}"
     return Check(kind, "note", None if value is None else tidy(value), None, unit, where, f"{where}: {what}: {shown}")
+
+
+def spot(point: Array) -> str:
+    """Words for a point [mm], shape (3,), to a tenth."""
+    x, y, z = (f"{round(float(c), 1) + 0.0:g}" for c in point)
+    return f"at ({x}, {y}, {z}) in the rotation frame"
 
 
 def checks_text(checks: Iterable[Check]) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import manifold3d
 import numpy as np
 
-from cad.checks.check import Check, tidy
+from cad.checks.check import Check, spot, tidy
 from cad.mesh import Mesh
 from cad.print_pose import PrintPose, on_bed
 
@@ -21,8 +21,9 @@ SMALL_MM2 = 0.2  # outlines below it are less than a line of a nozzle
 
 @dataclass(frozen=True, slots=True)
 class Island:
-    """Where a layer starts in the air: height above the bed and area of its first layer."""
+    """Where a layer starts in the air: middle of its first layer on the bed, height above the bed, and area of it."""
 
+    middle: tuple[float, float]
     height: float
     area_mm2: float
 
@@ -32,10 +33,11 @@ def islands_check(name: str, mesh: Mesh, pose: PrintPose) -> Check:
     found = islands_of(on_bed(mesh, pose))
     if not found:
         return Check("islands", "pass", 0.0, 0.0, "", name, f"{name}: no layer starts in the air")
-    lowest, largest = min(island.height for island in found), max(island.area_mm2 for island in found)
+    lowest, largest = found[0], max(island.area_mm2 for island in found)
+    at = np.linalg.inv(pose.T_bed_part) @ [*lowest.middle, lowest.height, 1.0]
     message = (
-        f"{name}: {len(found)} layers start in the air, the lowest {lowest:.1f} mm above the bed, the largest "
-        f"{largest:.0f} mm2: the slicer must support them"
+        f"{name}: {len(found)} layers start in the air, the lowest {lowest.height:.1f} mm above the bed, "
+        f"{spot(at[:3])}, the largest {largest:.0f} mm2: the slicer must support them"
     )
     return Check("islands", "warning", tidy(len(found)), 0.0, "", name, message)
 
@@ -49,6 +51,7 @@ def islands_of(mesh: Mesh) -> list[Island]:
         layer = body.slice(float(height))
         for outline in layer.decompose():
             if outline.area() >= SMALL_MM2 and (outline ^ below).is_empty():
-                found.append(Island(float(height) - LAYER / 2, outline.area()))
+                x0, y0, x1, y1 = outline.bounds()
+                found.append(Island(((x0 + x1) / 2, (y0 + y1) / 2), float(height) - LAYER / 2, outline.area()))
         below = layer
     return found

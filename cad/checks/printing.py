@@ -2,21 +2,21 @@
 
 A wall is measured from points all over the surface straight through to the other side, and counts where the other side
 is parallel: a wedge thins to nothing at its edge on every sharp corner, and prints. A thin spot is a flaw; where they
-make up more than THIN_SHARE of the surface, the part is not what was meant.
+make up more than THIN_SHARE of the surface, the part is not what was meant. The message tells the thinnest spot.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cadquery as cq
 import numpy as np
 
-from cad.checks.check import Check, at_least, at_most, note, tidy
+from cad.checks.check import Check, at_least, at_most, note, spot, tidy
 from cad.checks.islands import islands_check
-from cad.holes import rounds_of
+from cad.holes import Round, rounds_of
 from cad.mesh import Mesh
 from cad.print_pose import PrintPose, print_pose
 from design import scene
@@ -26,6 +26,8 @@ from design.frames import Array
 POINTS = 6000  # per part
 THIN_SHARE = 0.01
 PARALLEL = math.cos(math.radians(15.0))
+SAME_MM = 0.02  # between two thicknesses
+BESIDE = 2.0  # from a thin spot to a hole that is named with it
 SMALLEST_HOLE = 1.5  # diameter; smaller ones close
 
 
@@ -37,29 +39,67 @@ def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: M
         checks.append(_bed(name, pose, printer))
         checks.append(note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg"))
         checks.append(islands_check(name, meshes[name], pose))
-        checks.append(_walls(name, meshes[name], printer))
-        holes = [feature.diameter for feature in rounds_of(solid) if feature.hole]
+        holes = [feature for feature in rounds_of(solid) if feature.hole]
+        checks.append(_walls(name, meshes[name], printer, holes))
         if holes:
-            checks.append(at_least("smallest_hole", min(holes), SMALLEST_HOLE, "mm", name, "smallest hole"))
+            smallest = min(hole.diameter for hole in holes)
+            checks.append(at_least("smallest_hole", smallest, SMALLEST_HOLE, "mm", name, "smallest hole"))
     return checks
 
 
-def thin_walls(mesh: Mesh, least_mm: float) -> tuple[float, float]:
-    """Area of parallel walls thinner than a least thickness, and the whole surface [mm2]."""
+@dataclass(frozen=True, slots=True)
+class ThinWalls:
+    """Parallel walls thinner than a least thickness.
+
+    Attributes:
+        area_mm2: of both of their sides.
+        surface_mm2: of the whole part.
+        thinnest_mm: least thickness; inf where no wall is thin.
+        at: middle of the wall there, shape (3,); NaN where no wall is thin.
+    """
+
+    area_mm2: float
+    surface_mm2: float
+    thinnest_mm: float
+    at: Array
+
+
+def thin_walls(mesh: Mesh, least_mm: float) -> ThinWalls:
+    """Measure the walls of a part; of places of one thickness, the one nearest to their middle is told."""
     points, normals, area = _surface(mesh)
     solid = scene.scene_of(mesh.vertices[mesh.faces] / 1000)
     inside = 1e-6  # m, below the surface
     hits = scene.cast(solid, points / 1000 - inside * normals, -normals)
     parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL)
-    thin = parallel & (1000 * (hits.range_m + inside) < least_mm)
-    return area * int(thin.sum()) / POINTS, area
+    thickness = 1000 * (hits.range_m + inside)
+    thin = parallel & (thickness < least_mm)
+    if not thin.any():
+        return ThinWalls(0.0, area, math.inf, np.full(3, np.nan))
+    thinnest = float(thickness[thin].min())
+    alike = thin & (thickness < thinnest + SAME_MM)
+    middles = points[alike] - normals[alike] * thickness[alike, None] / 2
+    away = np.round(np.linalg.norm(middles - middles.mean(axis=0), axis=1), 3)
+    return ThinWalls(area * int(thin.sum()) / POINTS, area, thinnest, middles[int(np.argmin(away))])
 
 
-def _walls(name: str, mesh: Mesh, printer: Printer) -> Check:
-    thin, whole = thin_walls(mesh, printer.min_wall_mm)
+def _walls(name: str, mesh: Mesh, printer: Printer, holes: list[Round]) -> Check:
+    walls = thin_walls(mesh, printer.min_wall_mm)
     what = f"walls thinner than {printer.min_wall_mm:g} mm"
-    check = at_most("wall", thin, THIN_SHARE * whole, "mm2", name, what)
-    return replace(check, severity="warning") if check.severity == "pass" and thin > 0 else check
+    check = at_most("wall", walls.area_mm2, THIN_SHARE * walls.surface_mm2, "mm2", name, what)
+    if walls.area_mm2 == 0:
+        return check
+    hole = min(holes, key=lambda hole: _distance(hole, walls.at), default=None)
+    beside = f", beside a hole of {hole.diameter:.4g} mm" if hole and _distance(hole, walls.at) < BESIDE else ""
+    message = f"{check.message}; the thinnest, {walls.thinnest_mm:.2f} mm, {spot(walls.at)}{beside}"
+    return replace(check, severity="warning" if check.severity == "pass" else check.severity, message=message)
+
+
+def _distance(hole: Round, point: Array) -> float:
+    """From a point to the wall of a hole."""
+    low, along = np.array(hole.low), np.array(hole.direction)
+    height = float((point - low) @ along)
+    aside = float(np.linalg.norm(point - low - height * along)) - hole.diameter / 2
+    return math.hypot(aside, max(0.0, -height, height - hole.length))
 
 
 def _bed(name: str, pose: PrintPose, printer: Printer) -> Check:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 
 from cad.assembly import Assembly
+from cad.balance import PART as COUNTERWEIGHT
+from cad.balance import SCREW as BAR_SCREW
+from cad.balance import Counterweight
 from cad.bom import drawing_number
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.views import views_of
 from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.drives.on_sheet import OnSheet
 from cad.holes import Round
 from cad.joints import Joint
 from design.scanner import Scanner
@@ -51,10 +55,13 @@ def drawing_of(
     """The sheet of one part."""
     lidar_axis = assembly.stack.R()[:, 2] if name in _carriers(joints) else None
     metal = name in turned
-    tolerance = _tolerance(scanner, assembly) if metal else ("", "")
-    part = part_of(assembly.made[name], rounds, lidar_axis, f"  {tolerance[0]}" if metal else "")
+    turns = name in assembly.drive.turned()
+    said = assembly.drive.on_sheets().get(name, OnSheet())
+    part = part_of(assembly.made[name], rounds, lidar_axis, said)
     views = views_of(part)
-    material = "aluminium or steel, turned" if metal else f"{scanner.printer.name}, solid"
+    material = "aluminium or steel, turned" if turns else f"{scanner.printer.name}, solid"
+    if isinstance(assembly.counterweight, Counterweight) and name == COUNTERWEIGHT:
+        material = assembly.counterweight.stock
     cells = (
         ("part", name),
         ("task", scanner.angles.task),
@@ -65,37 +72,44 @@ def drawing_of(
         ("general tolerances", "ISO 2768-m" if metal else "ISO 2768-c"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, tolerance)
+    notes = _notes(scanner, part, said, [] if turns else [_making(scanner, name)])
     return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
 def _carriers(joints: list[Joint]) -> set[str]:
     """The part that the lidar is screwed to, and the one that this is screwed to in turn."""
     seats = {joint.part for joint in joints if joint.onto.startswith("lidar")}
-    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing in HOLDS} - {"lidar_body"}
+    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing in HOLDS} - {
+        "lidar_body",
+        COUNTERWEIGHT,
+    }
 
 
-def _tolerance(scanner: Scanner, assembly: Assembly) -> tuple[str, str]:
-    """Of the outer diameters of turned parts, and what for."""
-    fit = f"0/-{number(scanner.printer.fit_clearance_mm / 2)}", "half of the fit in the printed hub"
-    return assembly.drive.tolerance() or fit
+def _making(scanner: Scanner, name: str) -> str:
+    """What the model says, and does not say, to whoever makes the part."""
+    printer = scanner.printer
+    if name == COUNTERWEIGHT:
+        return f"Holes of {number(BAR_SCREW.core)}: thread {BAR_SCREW.name} all through."
+    return (
+        f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
+        f"fits {number(printer.fit_clearance_mm)} on the diameter."
+    )
 
 
-def _notes(scanner: Scanner, part: Part, tolerance: tuple[str, str]) -> list[str]:
-    printer, angles = scanner.printer, scanner.angles.angles_deg
+def _notes(scanner: Scanner, part: Part, said: OnSheet, making: list[str]) -> list[str]:
+    angles = scanner.angles.angles_deg
     box = part.solid.BoundingBox()
+    axis, zero = "rotation axis", "Z 0 is"
+    if any(said.axis):
+        axis, zero = "axis of the servo's horn", "Their zero is X {}, Y {}, Z".format(*map(number, said.axis))
     notes = [
-        "Millimetres. Ordinates run from the rotation axis (X, Y) and the lowest point (Z), azimuths from +Y.",
-        f"Z 0 is {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
+        f"Millimetres. Ordinates run from the {axis} (X, Y) and the lowest point (Z), azimuths from +Y.",
+        f"{zero} {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
         f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
+        *said.notes,
+        *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}." for fit in part.fits),
+        *making,
     ]
-    if tolerance[0]:
-        notes.append(f"Outer diameters {tolerance[0]}: {tolerance[1]}.")
-    else:
-        notes.append(
-            f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
-            f"fits {number(printer.fit_clearance_mm)} on the diameter."
-        )
     inclined = [p for p in part.patterns if len(p.holes) >= 3 and abs(p.direction[2]) < 1 - 1e-6]
     for pattern in inclined[:1]:
         x, y, z = (number(float(c)) for c in pattern.centre - [0.0, 0.0, part.datum])

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cadquery as cq
 import numpy as np
 
 from cad.drawings.patterns import Pattern, on_axis, patterns_of
 from cad.drawings.slots import Slot, slots_of
+from cad.drives.on_sheet import Fit, OnSheet
 from cad.holes import Round
 from design.frames import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
 PLANE_MM2 = 3.0  # smaller faces get no ordinate
 SIDE_MM2 = 8.0  # nor do smaller upright ones: flanks of a pulley's teeth, ends of blind holes
+SAME_SIZE = 5e-3
 PLANES = 9  # the largest faces of one direction that do
 
 
@@ -24,13 +26,13 @@ class Part:
     """What a drawing knows of a part.
 
     Attributes:
-        solid: rotation frame.
+        solid: rotation frame, moved so that the axis it is measured from is x = y = 0.
         patterns: its holes beside the axis.
         slots: its slots, equal ones together.
-        axial: its cylinders about the rotation axis.
+        axial: its cylinders about the axis that it is measured from.
         datum: height of the lowest point.
         lidar_axis: z of the lidar that it carries; None for other parts.
-        tolerance: appended to outer diameters about the axis.
+        fits: of its cylinders about that axis.
     """
 
     solid: cq.Solid
@@ -39,14 +41,34 @@ class Part:
     axial: list[Round]
     datum: float
     lidar_axis: Array | None
-    tolerance: str
+    fits: tuple[Fit, ...]
+
+    def tolerance(self, item: Round) -> str:
+        """What stands behind the diameter of a cylinder about the axis."""
+        fit = next((fit for fit in self.fits if is_of(fit, item)), None)
+        return "" if fit is None else f"  {fit.tolerance}"
 
 
-def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, tolerance: str) -> Part:
-    """Read a solid, whose cylinders are known."""
+def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, said: OnSheet) -> Part:
+    """Read a solid, whose cylinders are known; its fits are those that one of its cylinders has."""
+    away = (-said.axis[0], -said.axis[1], 0.0)
+    if any(away):
+        solid, rounds = solid.translate(cq.Vector(*away)), [_moved(item, away) for item in rounds]
     axial = [item for item in rounds if on_axis(item)]
+    fits = tuple(fit for fit in said.fits if any(is_of(fit, item) for item in axial))
     datum = float(solid.BoundingBox().zmin)
-    return Part(solid, patterns_of(rounds), slots_of(solid), axial, datum, lidar_axis, tolerance)
+    return Part(solid, patterns_of(rounds), slots_of(solid), axial, datum, lidar_axis, fits)
+
+
+def is_of(fit: Fit, item: Round) -> bool:
+    """Whether a fit is meant for a cylinder."""
+    return fit.hole == item.hole and abs(fit.diameter - item.diameter) < SAME_SIZE
+
+
+def _moved(item: Round, by: tuple[float, float, float]) -> Round:
+    """The cylinder somewhere else, to the digits that cylinders have."""
+    low, high = ((end[0] + by[0], end[1] + by[1], end[2] + by[2]) for end in (item.low, item.high))
+    return replace(item, low=low, high=high)
 
 
 def parallel(a: Array, b: Array) -> bool:

@@ -42,7 +42,8 @@ class Sheet:
 def sheet_of(part: Part, views: list[View], title: Title, name: str) -> Sheet:
     """Lay out a drawing."""
     for scale, size in SCALES:
-        placed = _placed([draw(view, part, scale) for view in views], size, force=(scale, size) == SCALES[-1])
+        blocks = [draw(view, part, scale) for view in views]
+        placed = _placed(blocks, size, 4) or _placed(blocks, size, 3, force=(scale, size) == SCALES[-1])
         if placed is not None:
             break
     ratio = f"{scale:g}:1" if scale >= 1 else f"1:{1 / scale:g}"
@@ -51,11 +52,12 @@ def sheet_of(part: Part, views: list[View], title: Title, name: str) -> Sheet:
     return Sheet(marks, scale, size, name)
 
 
-def _placed(blocks: list[list[Mark]], size: Size, *, force: bool) -> list[Mark] | None:
+def _placed(blocks: list[list[Mark]], size: Size, joined: int, *, force: bool = False) -> list[Mark] | None:
     """Views in their places; None if they do not fit.
 
     First angle: the top view below the front view, the view from the left at its right; they share their origins.
-    The isometric stands below that, the others in columns further right.
+    Where four are joined the isometric stands below that; the others are in columns further right, and it is the first
+    of them where three are joined, as a long part wants it.
     """
     boxes = [box_of(block) for block in blocks]
     room_x, room_y = size[0] - LEFT - EDGE - 2 * PAD, size[1] - 2 * EDGE - STRIP - 2 * PAD
@@ -66,13 +68,12 @@ def _placed(blocks: list[list[Mark]], size: Size, *, force: bool) -> list[Mark] 
     x0, y0 = left, -above
     x1 = x0 + right + PAD - boxes[2][0]
     y1 = y0 - below - PAD - boxes[1][3]
-    column = max(boxes[2][2] - boxes[2][0], boxes[3][2] - boxes[3][0])
     start = x0 + right + PAD
-    iso_at = (start - boxes[3][0], y0 - below - PAD - boxes[3][3])
-    at: list[Point] = [(x0, y0), (x0, y1), (x1, y0), iso_at]
-    bottom = min(y1 + boxes[1][1], iso_at[1] + boxes[3][1])
+    at: list[Point] = [(x0, y0), (x0, y1), (x1, y0), (start - boxes[3][0], y0 - below - PAD - boxes[3][3])][:joined]
+    column = max(box[2] - box[0] for box in boxes[2:joined])
+    bottom = min(y + box[1] for (_, y), box in zip(at[1:], boxes[1:joined], strict=True))
     x, y, wide = start + column + PAD, 0.0, 0.0
-    for box in boxes[4:]:
+    for box in boxes[joined:]:
         height, width = box[3] - box[1], box[2] - box[0]
         if y - height < -room_y and y < 0:
             x, y, wide = x + wide + PAD, 0.0, 0.0
@@ -80,7 +81,7 @@ def _placed(blocks: list[list[Mark]], size: Size, *, force: bool) -> list[Mark] 
         y -= height + PAD
         wide = max(wide, width)
         bottom = min(bottom, y + PAD)
-    total = x + wide if boxes[4:] else start + column
+    total = x + wide if boxes[joined:] else start + column
     if (total > room_x or -bottom > room_y) and not force:
         return None
     dx = LEFT + PAD + max(0.0, (room_x - total) / 2)

@@ -65,7 +65,7 @@ def views_of(part: Part) -> list[View]:
     inclined = [pattern for pattern in part.patterns if _has_view(pattern)]
     upright = [p for p in part.patterns if len(p.holes) >= 2 and parallel(p.direction, Z)]
     tilt = _level(_outwards(inclined[0], part)) if inclined else np.array([1.0, 0.0, 0.0])
-    along = np.array([1.0, 0.0, 0.0]) if upright else tilt
+    along = _along(part, upright) if upright else tilt
     away = np.cross(Z, along)
     base = np.array([0.0, 0.0, part.datum])
     name = "X" if abs(along[0] - 1) < STRAIGHT else f"azimuth {number(azimuth_deg(along))}°"
@@ -108,6 +108,17 @@ def draw(view: View, part: Part, scale: float) -> list[Mark]:
         box = box_of(marks)
         marks.append(Text(((left + right) / 2, box[3] + 2.5), view.title, anchor="middle"))
     return marks
+
+
+def _along(part: Part, upright: list[Pattern]) -> Array:
+    """X, or the line of two holes where the part has faces across that line, but none across X: a bar."""
+    x = np.array([1.0, 0.0, 0.0])
+    if len(upright[0].holes) != 2 or planes_across(part.solid, x):
+        return x
+    first, last = (np.array(hole.low) for hole in upright[0].holes)
+    line = (last - first) / np.linalg.norm(last - first)
+    line = line if float(line @ first) > 0 else -line  # outwards
+    return line if planes_across(part.solid, line) else x
 
 
 def _view(part: Part, title: str, right: Array, up: Array, origin: Array, kind: str) -> View:
@@ -195,9 +206,9 @@ def _hole_marks(view: View, part: Part, scale: float, box: tuple[float, float, f
     if view.kind == "front":
         for item in part.axial:
             z = (item.low[2] + item.high[2]) / 2 - part.datum
-            words = f"Ø{number(item.diameter)}" + (f" x {number(item.length)} DEEP" if item.hole else part.tolerance)
-            if item.hole and item.through:
-                words = f"Ø{number(item.diameter)}"
+            words = f"Ø{number(item.diameter)}{part.tolerance(item)}"
+            if item.hole and not item.through:
+                words += f" x {number(item.length)} DEEP"
             callouts.append(((item.diameter / 2 * scale, z * scale), words))
         ends = [end[2] for item in part.axial for end in (item.low, item.high)]
         optical = [] if part.lidar_axis is None else [0.0]

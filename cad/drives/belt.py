@@ -14,16 +14,18 @@ from cad.drives.belt_sizing import (
     FOOT_HOLE,
     FOOT_SCREW,
     PLATE,
+    PLATE_GRIP,
     PLATE_SCREW,
     SHELF,
     BeltStack,
     case_corners,
     drive_corners,
 )
-from cad.drives.belt_words import belt_steps
+from cad.drives.belt_words import belt_steps, teeth_words
 from cad.drives.carried import Carried
+from cad.drives.on_sheet import Fit, OnSheet, no_wider, printed_seat, turned_spigot
 from cad.findings import Finding
-from cad.screws import Screw
+from cad.screws import Screw, trap_of
 from design.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -74,6 +76,7 @@ SHAPING = {
     "groove_radius_mm": "the teeth of the pulleys",
     "teeth": "where the servo stands",
 }
+OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
 SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
 
 
@@ -99,9 +102,22 @@ class BeltDrive:
         """The shaft: bearings want its seats."""
         return frozenset({SHAFT})
 
-    def tolerance(self) -> tuple[str, str] | None:
-        """That of the bearings' seats: the shaft is drawn at the lower end of f7."""
-        return "+0.02/0", "f7 in the bearings, which slide on by hand"
+    def on_sheets(self) -> dict[str, OnSheet]:
+        """Fits of bearings, hub and pulleys, the pulleys' teeth, and the horn's axis where a part stands on it."""
+        from cad.parts.bearing_tower import nuts_words, tower_of
+
+        stack, fit = self.stack, self.scanner.printer.fit_clearance_mm
+        seat = Fit(stack.seat_diameter, False, "+0.02/0", "f7 in the bearings, which slide on by hand")
+        beside = (float(stack.beside()[0]), float(stack.beside()[1]))
+        bore, pocket = stack.tube_diameter, stack.servo.horn_boss_diameter_mm
+        centred = (no_wider(pocket, fit, OFF_AXIS),) if pocket > 0 else ()
+        return {
+            SHAFT: OnSheet((seat, turned_spigot(stack.shaft_diameter, fit))),
+            "bearing_tower": OnSheet((printed_seat(stack.carrier, fit),), nuts_words(tower_of(self.scanner, stack))),
+            "shaft_pulley": OnSheet((no_wider(bore, fit, OFF_AXIS),), (teeth_words(stack),)),
+            "drive_pulley": OnSheet(centred, (teeth_words(stack),), beside),
+            "drive_plate": OnSheet(axis=beside),
+        }
 
     def carried(self) -> Carried:
         """The tower."""
@@ -219,7 +235,8 @@ class BeltDrive:
 
     def slotted(self) -> list[tuple[str, str, Screw, int, float, float]]:
         """Of the plate that tightens the belt."""
-        return [("drive_plate", "bearing_tower", PLATE_SCREW, 4, PLATE, SHELF)]
+        depth = SHELF if trap_of(PLATE_SCREW, self.scanner.printer) is None else PLATE_GRIP
+        return [("drive_plate", "bearing_tower", PLATE_SCREW, 4, PLATE, depth)]
 
     def shaping(self) -> dict[str, str]:
         """What the tower and its neighbours do in place of shaft and adapter."""

@@ -40,6 +40,7 @@ FOOT_SCREW = SCREWS["M3"]  # between tower and mount
 SPIGOT_DIAMETER = 12.0  # as in direct drive: a wider hub would hide more
 LEADS_GAP = 14.0  # between hub and pulley
 SHAFT_WALL = 4.0  # least, around the bore
+SLIDES = 0.04  # of the shaft in its bearings: the lower end of f7, which slides in by hand
 TUBE_WALL = 2.5  # of the soft tube between rotor and bore
 SPAN = 30.0  # between the middles of the two bearings
 BOSS = 9.0  # height of the pulley's boss, and of the ring under the lower bearing
@@ -58,6 +59,7 @@ CAPSULE_GAP = 1.5  # between shaft and capsule
 DISC = 10.0  # thickness, of the capsule's holder
 LEADS = 6.0  # between capsule and mount
 SHELF = 12.0  # thickness of the tower's arms
+PLATE_GRIP = 7.5  # of an arm above the nut of a screw of the plate
 SHELF_WALL = 4.0  # of an arm beside the heads of the plate's screws
 TRAVEL = 3.0  # of the plate to either side
 CASE_ROOM = 2.0  # around the servo's case, beyond the travel
@@ -89,6 +91,11 @@ class BeltStack(Head):
     def tube_diameter(self) -> float:
         """Of the shaft below the hub: that of its bearings."""
         return self.carrier.bore_mm
+
+    @property
+    def seat_diameter(self) -> float:
+        """Of the shaft in its bearings."""
+        return self.tube_diameter - SLIDES
 
     @property
     def pulley_top(self) -> float:

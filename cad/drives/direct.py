@@ -12,6 +12,7 @@ import numpy as np
 from cad.drives.carried import Carried
 from cad.drives.direct_sizing import Stack
 from cad.drives.direct_words import DIRECT_STEPS
+from cad.drives.on_sheet import OnSheet, printed_journal, printed_seat, turned_spigot
 from cad.findings import Finding
 from cad.loads import ALUMINIUM_PA
 from cad.screws import SCREWS, Screw
@@ -60,9 +61,16 @@ class DirectDrive:
         """The shaft, where it is too thin to be printed."""
         return frozenset({SHAFT}) if self.stack.shaft_diameter < SHAFT_PRINTABLE else frozenset()
 
-    def tolerance(self) -> tuple[str, str] | None:
-        """Only the hub asks for one."""
-        return None
+    def on_sheets(self) -> dict[str, OnSheet]:
+        """Fits of a turned shaft in the hub, and of the bearing."""
+        stack, fit = self.stack, self.scanner.printer.fit_clearance_mm
+        found = {}
+        if SHAFT in self.turned():
+            found[SHAFT] = OnSheet((turned_spigot(stack.shaft_diameter, fit),))
+        if stack.bearing is not None:
+            found["bearing_cage"] = OnSheet((printed_seat(stack.bearing, fit),))
+            found["alignment_linkage"] = OnSheet((printed_journal(stack.bearing, fit),))
+        return found
 
     def carried(self) -> Carried:
         """The servo's case."""

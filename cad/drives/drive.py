@@ -15,6 +15,7 @@ from cad.drives.carried import Carried
 from cad.drives.direct import DirectDrive
 from cad.drives.direct_sizing import stack_of
 from cad.drives.head import Head
+from cad.drives.on_sheet import OnSheet
 from cad.findings import Finding
 from cad.screws import Screw
 from design.catalogue import Bearing, Belt, Product
@@ -49,8 +50,8 @@ class Drive(Protocol):
         """Made parts that are turned from metal."""
         ...
 
-    def tolerance(self) -> tuple[str, str] | None:
-        """Of the outer diameters of turned parts, and what for; None where the printed hub sets it."""
+    def on_sheets(self) -> Mapping[str, OnSheet]:
+        """What the sheets of some made parts say beyond their shape, by part."""
         ...
 
     def carried(self) -> Carried:

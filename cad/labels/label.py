@@ -16,8 +16,9 @@ from itertools import product
 
 import cadquery as cq
 import numpy as np
-import shapely  # type: ignore[import-untyped]
-import shapely.affinity  # type: ignore[import-untyped]
+import shapely
+import shapely.affinity
+from numpy.typing import NDArray
 
 from cad import solids
 from cad.assembly import Assembly, turns
@@ -39,7 +40,8 @@ MARGIN = 1.5  # of a face around its label
 HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
 FACES = 12  # that are tried, the largest first
 LEAST_MM2 = 200.0  # of a face: the configuration alone takes more
-STEP = 2.0  # between the places that are tried on a face
+STEP = 2.0  # between the places that are tried on a face, and the points that an eye looks for
+OVERLAP = 0.01  # of the squares around these points
 PLACES = 5  # of these, the nearest to its middle, that are looked at closely
 LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
@@ -114,6 +116,8 @@ class Label:
     seen: bool
 
 
+Views = Callable[[Flat, Array], NDArray[np.bool_]]
+Room = tuple[Flat, shapely.Polygon]
 FRONT = Lines(("FRONT",), HEIGHTS[0])
 
 
@@ -151,7 +155,22 @@ class Ground:
 
     def turns(self, flat: Flat) -> list[Array]:
         """Ways to turn lettering on a face: the more upright first, of equal ones lengthwise."""
-        return sorted(TURNS, key=lambda turn: -round(float(flat.frame[:, :2] @ turn[:, 1] @ self.up), 1))
+        return sorted(TURNS, key=lambda turn: -self.upright(flat, turn))
+
+    def upright(self, flat: Flat, turn: Array) -> float:
+        """How far the heads of lettering on a face point up: 1 upright, 0 sideways or lying."""
+        return round(float(flat.frame[:, :2] @ turn[:, 1] @ self.up), 1)
+
+    def faced(self, place: Place, size: tuple[float, float]) -> Place:
+        """The same place for lettering of a size; where it is not upright, its heads to the middle of the face.
+
+        So it is read from the edge that it is near to, by somebody who looks at the scanner.
+        """
+        centre = place.put(np.array([size]) / 2)[0]
+        if self.upright(place.flat, place.turn) != 0 or float(place.turn[:, 1] @ centre) <= 0:
+            return place
+        x, y = place.put(np.array([size]))[0]
+        return Place(place.flat, float(x), float(y), -place.turn)
 
     def is_thick(self, flat: Flat, points: Array) -> bool:
         """Whether a wall stays behind grooves, at points of a face."""
@@ -165,7 +184,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
     sight, done = Sight(assembly), Labelled()
     groove, up = groove_of(scanner.printer), scanner.angles.T_world_rot(0.0)[2, :3]
     for name, solid in assembly.made.items():
-        if name in assembly.drive.turned():
+        if name in assembly.metal():
             continue
         front = None
         if name in CARRIERS:
@@ -175,8 +194,8 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not sight.touched(flat)]
         ground = Ground(flats, Piercing(solid), groove, scanner.printer.min_wall_mm, up, front)
-        reads = partial(sight.reads, turning=turns(name))
-        label = label_on(ground, label_texts(scanner, name, config_hash), reads)
+        views = partial(sight.views, turning=turns(name))
+        label = label_on(ground, label_texts(scanner, name, config_hash), views)
         if label is None:
             why = "none of its flat faces that mate with nothing has room for one"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
@@ -203,19 +222,22 @@ def label_texts(scanner: Scanner, name: str, config_hash: str) -> list[str]:
     return [text for text in texts if text is not None]
 
 
-def label_on(ground: Ground, texts: list[str], reads: Callable[[Flat, Array], bool]) -> Label | None:
+def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
     """Where a label goes, and how its texts are broken into lines; None where nothing has room.
 
     Args:
         ground: the part.
         texts: of the label; where they do not fit, the last one alone.
-        reads: whether an eye before a face sees all of these points of it.
+        views: which points of a face an eye before it sees, a row for each position of what turns.
     """
+    rooms = [(flat, ground.room(flat)) for flat in ground.flats]
+    in_sight = [(flat, part) for flat, room in rooms for part in _in_sight(flat, room, views)]
     for seen, some, longest, height in product((True, False), (texts, texts[-1:]), LONGEST, HEIGHTS):
         lines = Lines(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
-        for place in _places(ground, lines.size):
+        for place in _places(ground, in_sight if seen else rooms, lines.size):
             points = place.put(_grid(lines.size))
-            if (not seen or reads(place.flat, points)) and ground.is_thick(place.flat, points):
+            reads = not seen or bool(views(place.flat, points).all(axis=1).any())
+            if reads and ground.is_thick(place.flat, points):
                 return Label(place, lines, seen)
     return None
 
@@ -249,13 +271,25 @@ def _front(assembly: Assembly, name: str, groove: Groove) -> Place | None:
     return place if flat.outline.contains(word) else None
 
 
-def _places(ground: Ground, size: tuple[float, float]) -> Iterator[Place]:
-    """Of lettering of a size: on the largest face first, the more upright way first, there nearest to its middle."""
-    for flat in ground.flats:
-        room = ground.room(flat)
+def _in_sight(flat: Flat, room: shapely.Polygon, views: Views) -> list[shapely.Polygon]:
+    """What of a room an eye sees, to squares of STEP, for each position of what turns: the largest first."""
+    x0, y0, x1, y1 = flat.outline.bounds
+    xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
+    points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
+    points = points[shapely.contains_xy(flat.outline, points[:, 0], points[:, 1])]
+    found = []
+    for seen in np.unique(views(flat, points), axis=0):
+        low, high = points[seen] - STEP / 2 - OVERLAP, points[seen] + STEP / 2 + OVERLAP
+        found.append(room if seen.all() else room.intersection(shapely.union_all(shapely.box(*low.T, *high.T))))
+    return sorted(found, key=lambda part: -round(part.area, 1))
+
+
+def _places(ground: Ground, rooms: Sequence[Room], size: tuple[float, float]) -> Iterator[Place]:
+    """Of lettering of a size: in the first room first, the more upright way first, there nearest to its middle."""
+    for flat, room in rooms:
         for turn in ground.turns(flat):
             for x, y in _corners(room, size, turn):
-                yield Place(flat, x, y, turn)
+                yield ground.faced(Place(flat, x, y, turn), size)
 
 
 def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:

@@ -7,7 +7,8 @@ four positions of the servo: a person turns it by hand.
 from __future__ import annotations
 
 import numpy as np
-import shapely  # type: ignore[import-untyped]
+import shapely
+from numpy.typing import NDArray
 
 from cad.assembly import Assembly, turns
 from cad.labels.flats import Flat
@@ -37,22 +38,21 @@ class Sight:
         xs, ys = np.arange(x0 + GRID / 2, x1, GRID), np.arange(y0 + GRID / 2, y1, GRID)
         points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
         inside = points[shapely.contains_xy(flat.outline.buffer(-0.2), points[:, 0], points[:, 1])]
-        return any(self._nearest(flat, inside, other, 0) < TOUCH for other in self._scenes)
+        return any(bool((self._distance(flat, inside, other, 0) < TOUCH).any()) for other in self._scenes)
 
-    def reads(self, flat: Flat, points: Array, turning: bool) -> bool:
-        """Whether an eye straight before each point of a face, shape (n, 2), sees it, the servo turned as it may be.
+    def views(self, flat: Flat, points: Array, turning: bool) -> NDArray[np.bool_]:
+        """Which points of a face an eye straight before them sees, a row for each position of the servo, shape (4, n).
 
         Args:
             flat: a face of some part.
-            points: in its axes.
+            points: in its axes, shape (n, 2).
             turning: whether that part turns with the horn.
         """
-        if self._nearest(flat, points, turning, 0) <= READING:
-            return False
-        return any(self._nearest(flat, points, not turning, quarter) > READING for quarter in range(4))
+        own = self._distance(flat, points, turning, 0) > READING
+        return np.stack([own & (self._distance(flat, points, not turning, q) > READING) for q in range(4)])
 
-    def _nearest(self, flat: Flat, points: Array, turning: bool, quarter: int) -> float:
-        """Least distance from points of a face straight to a body of one kind, turned by quarters; 0 where it touches.
+    def _distance(self, flat: Flat, points: Array, turning: bool, quarter: int) -> Array:
+        """From points of a face straight to a body of one kind, turned by quarters, shape (n,); 0 where it touches.
 
         A body that lies on the face holds the start of the ray, which then meets its surface from within.
         """
@@ -62,7 +62,7 @@ class Sight:
         bodies = self._scenes[turning]
         hits = scene.cast(bodies, starts, np.broadcast_to(turn @ normal, starts.shape))
         within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ (turn @ normal) > 0)
-        return 1000 * float(np.where(within, 0.0, hits.range_m).min(initial=np.inf))
+        return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
 
 
 def _deck(assembly: Assembly) -> Array:

@@ -3,8 +3,9 @@
 Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`.
 A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
 screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
-arms. A round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints
-upside down. An index groove in the edge of its top at +y meets the groove of the linkage's hub.
+arms. Nuts, where the printer's profile asks for them, go into the arms from below and into the foot from its corners.
+A round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints upside
+down. An index groove in the edge of its top at +y meets the groove of the linkage's hub.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 import cadquery as cq
+import numpy as np
 
 from cad import solids
 from cad.drives.belt_sizing import (
@@ -24,12 +26,13 @@ from cad.drives.belt_sizing import (
     FOOT_HOLE,
     FOOT_SCREW,
     LIP,
+    PLATE_GRIP,
     PLATE_SCREW,
     SHELF,
     TRAVEL,
     BeltStack,
 )
-from cad.screws import SCREWS, thread_hole
+from cad.screws import SCREWS, Trap, thread_hole, trap_of
 from cad.solids import building, checked
 from design.scanner import Scanner
 
@@ -38,6 +41,8 @@ DISC_SCREW = SCREWS["M3"]
 DISC_SCREWS = 3
 SCREW_DEPTH = 10.0  # of a radial screw in the disc
 UNDER_HEAD = 3.5  # of the wall
+UNDER_FOOT_NUT = 4.0  # of the foot
+BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
 WINDOW = 10.0  # diameter
 FOOT_CHAMFER = 8.0
 GROOVE = 1.0  # half width of the index groove
@@ -51,20 +56,37 @@ class BearingTower:
     stack: BeltStack
     fit: float  # diametral clearance of a sliding fit
     plate_thread: float  # diameter
+    plate_trap: Trap | None  # below the arms, if these screws hold in nuts
     foot_thread: float  # diameter
+    foot_trap: Trap | None  # open to the corners of the foot, if these screws do
     disc_hole: float  # diameter
 
 
 def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
     """Parameters of the tower of one scanner."""
     printer = scanner.printer
+    plate, foot = trap_of(PLATE_SCREW, printer), trap_of(FOOT_SCREW, printer)
+    if foot is not None and math.sqrt(2) * FOOT_HOLE - foot.corner - printer.min_wall_mm < stack.chamber_radius:
+        foot = None
     return BearingTower(
         stack=stack,
         fit=printer.fit_clearance_mm,
-        plate_thread=thread_hole(PLATE_SCREW, printer),
-        foot_thread=thread_hole(FOOT_SCREW, printer),
+        plate_thread=thread_hole(PLATE_SCREW, printer) if plate is None else plate.hole,
+        plate_trap=plate,
+        foot_thread=thread_hole(FOOT_SCREW, printer) if foot is None else foot.hole,
+        foot_trap=foot,
         disc_hole=DISC_SCREW.nominal + printer.screw_clearance_mm,
     )
+
+
+def nuts_words(p: BearingTower) -> tuple[str, ...]:
+    """What the drawing says of the room for nuts."""
+    words = []
+    if p.plate_trap is not None:
+        words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {p.plate_trap.across:g} across flats.")
+    if p.foot_trap is not None:
+        words.append(f"Slots in the foot for nuts {FOOT_SCREW.name}: {p.foot_trap.across:g} wide, from its corners.")
+    return tuple(words)
 
 
 def disc_azimuths(stack: BeltStack) -> list[float]:
@@ -159,16 +181,29 @@ def _shelf(p: BearingTower) -> list[cq.Shape]:
     return [whole.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))]
 
 
+def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:
+    """Slot in a corner of the foot that a nut is pushed into from outside, before the mount comes."""
+    start, half = math.sqrt(2) * FOOT_HOLE - trap.corner, trap.across / 2
+    slot = solids.box((start, -half, floor), (math.sqrt(2) * FOOT_HALF, half, floor + trap.depth))
+    return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
+
+
 def _holes(p: BearingTower) -> list[cq.Solid]:
     stack = p.stack
     cuts = []
     for x in (stack.centre - stack.slot_x, stack.centre + stack.slot_x):
         for _, y in stack.arms_y:
             cuts.append(solids.upright(p.plate_thread / 2, stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0, x, y))
+            if p.plate_trap is not None:
+                nut = np.array([x, y]) + solids.polygon(p.plate_trap.corner, 6, 0.0)
+                cuts.append(solids.prism(nut, stack.tower_top - SHELF - 1.0, stack.tower_top - PLATE_GRIP))
     low = stack.tower_bottom
+    deep = FOOT - 1.0 if p.foot_trap is None else UNDER_FOOT_NUT + p.foot_trap.depth + BEYOND_NUT
     for x in (FOOT_HOLE, -FOOT_HOLE):
         for y in (FOOT_HOLE, -FOOT_HOLE):
-            cuts.append(solids.upright(p.foot_thread / 2, low - 1.0, low + FOOT - 1.0, x, y))
+            cuts.append(solids.upright(p.foot_thread / 2, low - 1.0, low + deep, x, y))
+            if p.foot_trap is not None:
+                cuts.append(_corner_slot(p.foot_trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
     for azimuth in disc_azimuths(stack):
         out = (math.cos(azimuth), math.sin(azimuth), 0.0)
         height = stack.disc_top - DISC / 2

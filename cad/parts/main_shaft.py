@@ -16,7 +16,6 @@ from cad.drives.belt_sizing import BeltStack
 from cad.solids import building, checked
 
 PART = "main_shaft"
-SLIDES = 0.02  # radius less than that of a bearing's bore: f7, which slides in by hand
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
@@ -39,7 +38,7 @@ def main_shaft(p: MainShaft) -> cq.Solid:
     size, top = f"{stack.tube_diameter:g} mm", stack.hub_bottom - UNDER_HUB
     with building(PART, "body", "shaft diameter", size):
         radius = stack.shaft_diameter / 2
-        body: cq.Shape = solids.upright(stack.tube_diameter / 2 - SLIDES, stack.shaft_bottom, top)
+        body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
         body = body.fuse(
             solids.upright(stack.collar_radius, stack.tower_top, stack.teeth_low),
             solids.upright(radius, top - 0.5, stack.spigot_top),

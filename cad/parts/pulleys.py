@@ -27,7 +27,7 @@ SHAFT_PULLEY = "shaft_pulley"
 DRIVE_PULLEY = "drive_pulley"
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
-UNDER_HEAD = 4.0  # of the drive pulley, above the horn
+UNDER_HEAD = 4.0  # of the drive pulley, above the horn: at least
 GRUBS_DEG = (45.0, 135.0)  # azimuths from +x: on both sides of the flat
 
 
@@ -114,10 +114,11 @@ def drive_pulley(p: Pulley) -> cq.Solid:
         body = checked(_toothed(stack, foot, None), DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth)
     with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle):
         centres = solids.polygon(p.circle / 2, p.holes, math.radians(90.0 + p.first_hole_deg))
+        seat = max(horn + UNDER_HEAD, stack.teeth_low)  # lower, and a pocket would leave the foot a thin wall
         cuts = []
         for x, y in centres.tolist():
             cuts.append(solids.upright(p.hole / 2, horn - 1.0, stack.teeth_top + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, horn + UNDER_HEAD, stack.teeth_top + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.head_room, seat, stack.teeth_top + 1.0, x, y))
         if p.boss_radius > 0:
             cuts.append(solids.upright(p.boss_radius + p.fit / 4, horn - 1.0, horn + p.boss_height + 0.5))
         cut = body.cut(*cuts).clean()
