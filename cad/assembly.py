@@ -13,9 +13,9 @@ from functools import partial
 import cadquery as cq
 
 from cad import bought, solids
-from cad.balance import PART as COUNTERWEIGHT
-from cad.balance import SCREW as BAR_SCREW
-from cad.balance import Counterweight, counterweight_of
+from cad.balance.counterweight import PART as COUNTERWEIGHT
+from cad.balance.counterweight import SCREW as BAR_SCREW
+from cad.balance.counterweight import Counterweight, counterweight_of
 from cad.deck import Deck, deck_of
 from cad.drives.drive import Drive, drive_of
 from cad.drives.head import Head
@@ -23,7 +23,9 @@ from cad.mesh import Mesh, mesh_of
 from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.base_mount import base_mount, mount_of
 from cad.parts.counterweight import counterweight
+from cad.parts.linkage_sizing import PART as LINKAGE
 from cad.parts.linkage_sizing import AlignmentLinkage, linkage_of
+from cad.parts.sub_plate import PART as SUB_PLATE
 from cad.parts.sub_plate import sub_plate, sub_plate_of
 from cad.screws import Screw
 from design.left_out import LeftOut
@@ -85,9 +87,9 @@ class Assembly:
     def slotted(self) -> list[tuple[str, str, Screw, int, float, float]]:
         """Screws in slots: part, what they end in, size, number, grip and depth of thread."""
         slots, bar = self.drive.slotted(), self.counterweight
-        if isinstance(bar, Counterweight):
+        if COUNTERWEIGHT in self.made and isinstance(bar, Counterweight):
             grip = bar.ear.high - bar.ear.low
-            slots = [*slots, ("alignment_linkage", COUNTERWEIGHT, BAR_SCREW, len(bar.screws), grip, bar.section[1])]
+            slots = [*slots, (LINKAGE, COUNTERWEIGHT, BAR_SCREW, len(bar.screws), grip, bar.section[1])]
         return slots
 
     def mesh(self, name: str) -> Mesh:
@@ -131,10 +133,10 @@ def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True)
     if isinstance(bar, Counterweight):
         linkage = replace(linkage, ear=bar.ear)
     made: dict[str, Callable[[], cq.Solid]] = {**drive.made()}
-    made["alignment_linkage"] = lambda: alignment_linkage(linkage)
+    made[LINKAGE] = lambda: alignment_linkage(linkage)
     between = sub_plate_of(scanner, stack)
     if between is not None:
-        made["sub_plate"] = partial(sub_plate, between)
+        made[SUB_PLATE] = partial(sub_plate, between)
     if not deck.flat:
         made["base_mount"] = lambda: base_mount(mount_of(scanner, deck))
     others = {**drive.bought()}
@@ -154,13 +156,14 @@ def make_parts(scanner: Scanner, wanted: Callable[[str], bool] = lambda _: True)
 
 
 def _balanced(scanner: Scanner, assembly: Assembly) -> Assembly:
-    """With the counterweight, if there is one, cut to the solids; without the linkage, to its estimate."""
+    """With the counterweight, if there is one, cut to the solids; without linkage and sub-plate, to their estimate."""
     from cad.weights import rotor_moment
 
     bar = assembly.counterweight
     if isinstance(bar, LeftOut):
         return assembly
-    if "alignment_linkage" in assembly.made:
+    held = {LINKAGE} if assembly.stack.sub_plate is None else {LINKAGE, SUB_PLATE}
+    if held <= assembly.made.keys():
         bar = bar.balancing(rotor_moment(scanner, assembly))
     return replace(assembly, counterweight=bar, made=assembly.made | {COUNTERWEIGHT: counterweight(bar)})
 

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from cad.assembly import Assembly
-from cad.balance import PART as COUNTERWEIGHT
-from cad.balance import SCREW, Counterweight
+from cad.balance.counterweight import PART as COUNTERWEIGHT
+from cad.balance.counterweight import SCREW, Counterweight
 from cad.drives.drive import Drive
 from cad.joints import Joint
 from cad.remarks import products_of
@@ -87,7 +87,7 @@ def items_of(
     assembly: Assembly,
     joints: list[Joint],
     masses_g: dict[str, float],
-    turned: set[str],
+    metal: set[str],
     config_hash: str,
 ) -> list[Item]:
     """All rows; the total last.
@@ -97,17 +97,18 @@ def items_of(
         assembly: the solids.
         joints: of `joints_of`.
         masses_g: of the made parts.
-        turned: made parts that are turned from metal.
+        metal: made parts that no printer makes.
         config_hash: of what shapes the parts.
     """
     items = []
     for part in assembly.made:
         number = drawing_number(config_hash, part, assembly)
-        made = "turned" if part in turned else "printed"
-        file = f"parts/{part}.step" if part in turned else f"print/{part}.3mf"
-        how = "aluminium or steel, after" if part in turned else f"{scanner.printer.name}, solid, from"
-        if isinstance(assembly.counterweight, Counterweight) and part == COUNTERWEIGHT:
-            made, how = "sawn", f"{assembly.counterweight.stock}, two threads {SCREW.name}, after"
+        made = "turned" if part in metal else "printed"
+        file = f"parts/{part}.step" if part in metal else f"print/{part}.3mf"
+        how = "aluminium or steel, after" if part in metal else f"{scanner.printer.name}, solid, from"
+        bar = assembly.counterweight
+        if isinstance(bar, Counterweight) and part == COUNTERWEIGHT:
+            made, how = "sawn", f"{bar.stock}, {len(bar.screws)} threads {SCREW.name}, after"
         note = f"{how} {file}; drawing drawings/{part}.pdf"
         items.append(Item(made, part, number, 1, mass_g=round(masses_g[part], 1), note=note))
     items += _products(scanner, assembly.drive)

@@ -91,7 +91,7 @@ def _facts(scanner: Scanner, assembly: Assembly, checks: Sequence[Check]) -> Par
 
 
 def _cost(scanner: Scanner, assembly: Assembly) -> float | None:
-    """Of what is bought; None where a price is not known."""
+    """Of lidar, servo, ring, bearings and belt, no more; None where a price is not known."""
     bought = (scanner.lidar, scanner.servo, scanner.slip_ring, *assembly.drive.products())
     prices = [product.price_usd for product in bought if product is not None]
     known = [price for price in prices if price is not None]

@@ -47,20 +47,20 @@ def export_scanner(
     """
     assembly, digest = made.assembly, config_hash(scanner)
     masses = {report.name: report.mass_g for report in made.parts}
-    turned = set(assembly.metal())
+    metal = set(assembly.metal())
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     joints = joints_of(scanner, assembly, rounds)
     progress("drawing the parts")
-    drawn = begin(drawing_files, scanner, assembly, rounds, joints, masses, turned, digest)
+    drawn = begin(drawing_files, scanner, assembly, rounds, joints, masses, metal, digest)
     progress("writing print files")
-    files, left_out = _prints(scanner, made.meshes, turned, digest)
+    files, left_out = _prints(scanner, made.meshes, metal, digest)
     progress("making the fit coupon")
     coupon = fit_coupon(coupon_of(scanner, assembly.stack))
     files |= _print_file(scanner, FIT_COUPON, checked_mesh(coupon, FIT_COUPON), digest)
     progress("writing assembly.glb and exploded.glb")
-    files |= scene_files(scanner, assembly, made.meshes, digest, turned)
+    files |= scene_files(scanner, assembly, made.meshes, digest, metal)
     progress("writing bom.csv and assembly.md")
-    items = items_of(scanner, assembly, joints, masses, turned, digest)
+    items = items_of(scanner, assembly, joints, masses, metal, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
     files |= drawn()
@@ -70,13 +70,13 @@ def export_scanner(
 
 
 def _prints(
-    scanner: Scanner, meshes: dict[str, Mesh], turned: set[str], digest: str
+    scanner: Scanner, meshes: dict[str, Mesh], metal: set[str], digest: str
 ) -> tuple[dict[str, bytes], list[LeftOut]]:
     """`print/<part>.3mf` of every printed part."""
     files: dict[str, bytes] = {}
     left_out = []
     for part, mesh in meshes.items():
-        if part in turned:
+        if part in metal:
             left_out.append(LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files"))
             continue
         files |= _print_file(scanner, part, mesh, digest)

@@ -85,7 +85,7 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
         assembly: the solids.
         rounds: of `holes.rounds_of`, for every solid, made or bought.
     """
-    printer = scanner.printer
+    printer, printed = scanner.printer, assembly.made.keys() - assembly.metal()
     found: dict[tuple[str, str, Fixing, str, bool], list[tuple[float, float, bool]]] = {}
     for part, solid in assembly.made.items():
         piercing = Piercing(solid)
@@ -104,7 +104,7 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
         key = ("deck", "servo_case", "nut", scanner.servo.case_screw, False)
         found[key] = [(DECK, CASE_EAR, False)] * 4
     return [
-        _joint(*key, holes, inserts=_has_insert(printer, SCREWS[key[3]], key[2] == "grub" or key[1] in assembly.made))
+        _joint(*key, holes, inserts=_has_insert(printer, SCREWS[key[3]], key[2] == "grub" or key[1] in printed))
         for key, holes in found.items()
         if not all(covered for _, _, covered in holes)
     ]

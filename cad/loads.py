@@ -95,15 +95,21 @@ def bearing_of(scanner: Scanner, stack: Stack) -> Bearing | None:
     return next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
 
 
-def horn_bears(scanner: Scanner, stack: Stack, bar_g: float = 0.0, bar_z: float = 0.0) -> bool:
-    """Whether the horn alone bears the heaviest linkage, or with it a bar of this mass and height that balances it."""
-    rated, weight = rated_moment_nm(scanner), _heaviest(scanner, stack)
-    moment = weight.moment_nm
-    if bar_g > 0:
-        sine = tilt_sine(scanner)
-        bar = bar_g / 1000 * STANDARD_GRAVITY * sine * (bar_z - stack.horn) / 1000
-        moment = weight.across_n * weight.lever_m + bar
-    return moment <= (UNRATED_NM if rated is None else rated)
+def horn_bears(scanner: Scanner, stack: Stack) -> bool:
+    """Whether the horn alone bears the heaviest linkage."""
+    return _is_rated(scanner, _heaviest(scanner, stack).moment_nm)
+
+
+def horn_bears_balanced(scanner: Scanner, stack: Stack, bar_g: float, bar_z: float) -> bool:
+    """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
+    weight = _heaviest(scanner, stack)
+    bar = bar_g / 1000 * STANDARD_GRAVITY * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
+    return _is_rated(scanner, weight.across_n * weight.lever_m + bar)
+
+
+def _is_rated(scanner: Scanner, moment_nm: float) -> bool:
+    rated = rated_moment_nm(scanner)
+    return moment_nm <= (UNRATED_NM if rated is None else rated)
 
 
 def supported(weight: Weight, stack: Stack, cage_n_per_m: float) -> Supported:

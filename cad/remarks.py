@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from cad.balance.counterweight import Counterweight
 from cad.deck import Deck
 from cad.drives.direct_sizing import Stack
 from cad.drives.drive import Drive
@@ -55,6 +56,9 @@ SHAPING = {
 }
 
 
+BALANCE = {"lidar": {"mass_g": "counterweight"}, "servo": {"backlash_deg": "whether there is a counterweight"}}
+
+
 def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial]) -> tuple[Finding, ...]:
     """Everything worth a line, in the order of the parts."""
     drive = assembly.drive
@@ -62,7 +66,7 @@ def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial
     if assembly.deck.flat:
         found.append(_held_by_screws(scanner, assembly.deck))
     for product in products_of(scanner, drive):
-        found += unverified(product, drive)
+        found += unverified(product, assembly)
     return tuple(found)
 
 
@@ -141,9 +145,11 @@ def _held_by_screws(scanner: Scanner, deck: Deck) -> Finding:
     )
 
 
-def unverified(product: Product, drive: Drive) -> list[Finding]:
+def unverified(product: Product, assembly: Assembly) -> list[Finding]:
     """Values of a product that nobody has verified and that shape a part."""
-    provenance, shaping = product.provenance(), {**SHAPING, **drive.shaping()}
+    provenance, shaping = product.provenance(), {**SHAPING, **assembly.drive.shaping()}
+    if isinstance(assembly.counterweight, Counterweight):
+        shaping |= BALANCE.get(product.kind, {})
     return [
         Finding(
             "unverified",

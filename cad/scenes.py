@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from cad.assembly import Assembly, colour_of, turns
-from cad.balance import PART as COUNTERWEIGHT
-from cad.balance import Counterweight
+from cad.balance.counterweight import PART as COUNTERWEIGHT
+from cad.balance.counterweight import Counterweight
 from cad.glb import Node, glb_bytes
 from cad.mesh import Mesh
 from design.frames import Array
@@ -38,7 +38,7 @@ def product_of(body: str, assembly: Assembly) -> str:
 
 
 def scene_files(
-    scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str, turned: set[str]
+    scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str, metal: set[str]
 ) -> dict[str, bytes]:
     """Both files.
 
@@ -47,7 +47,7 @@ def scene_files(
         assembly: the solids.
         meshes: of the made parts, rotation frame; the bought ones are meshed here.
         config_hash: of what shapes the parts.
-        turned: parts of bare metal.
+        metal: parts of bare metal.
     """
     T = scanner.angles.T_rot_laser()
     nodes = [
@@ -61,7 +61,7 @@ def scene_files(
         mesh = meshes[name] if name in meshes else assembly.mesh(name)
         if frame == "laser":
             mesh = Mesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
-        nodes.append(Node(name, frame, np.eye(4), mesh, colour_of(name), name in turned))
+        nodes.append(Node(name, frame, np.eye(4), mesh, colour_of(name), name in metal))
     motion = scanner.angles.motion
     spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None
     extras = {"task": scanner.angles.task, "config": config_hash, "unit": "m"}
@@ -104,7 +104,7 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
         top = high + lift
     top = float((points["alignment_linkage"] @ out).max())
     bar = assembly.counterweight
-    if isinstance(bar, Counterweight):
+    if COUNTERWEIGHT in points and isinstance(bar, Counterweight):
         away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
         shift = (bar.ear.end - bar.start + GAP_MM) * away
         lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + shift

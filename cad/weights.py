@@ -6,8 +6,8 @@ import numpy as np
 
 from cad import mass
 from cad.assembly import Assembly
-from cad.balance import PART as COUNTERWEIGHT
-from cad.balance import STEEL_G_CM3
+from cad.balance.counterweight import PART as COUNTERWEIGHT
+from cad.balance.counterweight import STEEL_G_CM3
 from cad.loads import ALUMINIUM_G_CM3
 from cad.mass import Inertial
 from design.frames import Array

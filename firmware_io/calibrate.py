@@ -62,6 +62,7 @@ def calibrate_recordings(
     try:
         found = estimate(beams, mount, start)
     except RecordingError as refusal:
+        say("asking how late the angles are")
         raise RecordingError(f"{refusal}{_late(opened)}") from refusal
     say("asking the entropy")
     seen = witness(mount, beams, fan_side(beams, mount), start, found.x, found.noise_m)

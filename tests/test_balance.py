@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cad.assembly import make_parts
-from cad.balance import RUBS_NM, SAW, SECTIONS, Counterweight, _estimated_moment, counterweight_of, torque_nm
+from cad.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight, counterweight_of
+from cad.balance.imbalance import estimated_moment, keeps_flank, torque_nm
+from cad.bodies import bodies_of
 from cad.drives.drive import drive_of
 from cad.holes import rounds_of
 from cad.instructions import instructions_text
@@ -21,6 +23,7 @@ from cad.shadow import shadow_of, triangles_of
 from design.angles import Angles, AngleSet
 from design.catalogue import load_catalogue
 from design.left_out import LeftOut
+from design.motion import Sweep
 from design.scanner import scanner_of
 
 SHIPPED = [(-180, 55, 80, -75), (0, 90, 0, -90)]  # ground_ahead, rolling
@@ -70,33 +73,34 @@ def test_the_rotor_is_balanced_by_its_meshes(made):
     assert torque_nm(scanner, np.linalg.norm(moment)) < RUBS_NM
 
 
-def test_the_estimate_that_chooses_the_bar_is_that_of_the_solids(made):
-    scanner, _ = made
+@pytest.mark.parametrize(
+    "scanner", [scanner_for(*SHIPPED[0]), scanner_for(135, -15, -25, -25, sensor="URG-04LX", servo="AX-12A")]
+)
+def test_the_estimate_that_chooses_the_bar_is_that_of_the_solids(scanner):
     linkage = linkage_of(scanner, drive_of(scanner).stack)
-    estimate = _estimated_moment(scanner, linkage)
-    bare = make_parts(
-        replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.0})),
-        lambda name: name in ("alignment_linkage", "sub_plate"),
-    )
-    assert isinstance(bare.counterweight, LeftOut)
+    estimate = estimated_moment(scanner, linkage)
+    exact = scanner.servo.model_copy(update={"backlash_deg": 0.0})  # so that no ear is made
+    bare = make_parts(replace(scanner, servo=exact), lambda name: name in ("alignment_linkage", "sub_plate"))
+    assert isinstance(bare.counterweight, LeftOut) and ("sub_plate" in bare.made) == (linkage.ears is not None)
     lidar = scanner.lidar
     true = lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * linkage.stack.R()[:2, 2]
     for mesh in meshes(bare, bare.made).values():
         true = true + scanner.printer.density_g_cm3 / 1000 * mesh.volume * mesh.center_mass[:2]
-    off = np.linalg.norm(estimate - true) / np.linalg.norm(true)
-    assert off < 0.03
+    assert np.linalg.norm(estimate - true) < 0.03 * np.linalg.norm(true)
 
 
-def test_the_bar_touches_nothing_but_its_ear_and_no_beam(made):
+def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made):
     scanner, assembly = made
     bodies = {}
     for name, mesh in assembly.meshes().items():
         bodies[name] = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
-    bar = bodies.pop("counterweight")
-    for name, body in bodies.items():
-        assert (bar ^ body).volume() < 0.05, name
-        if name != "alignment_linkage":
-            assert bar.min_gap(body, 2.0) > 0.9, name
+    bar, azimuth = bodies.pop("counterweight"), assembly.counterweight.ear.azimuth
+    for slid in (-TRIM, 0.0, TRIM):
+        there = bar.translate((slid * math.cos(azimuth), slid * math.sin(azimuth), 0.0))
+        for name, body in bodies.items():
+            assert (there ^ body).volume() < 0.05, (name, slid)
+            if name != "alignment_linkage":
+                assert there.min_gap(body, 2.0) > 0.9, (name, slid)
     seen = triangles_of({name: assembly.mesh(name) for name in ("counterweight", "servo_case")})
     assert not shadow_of(scanner, seen).beams.any()
 
@@ -129,17 +133,63 @@ def test_a_bar_is_cut_to_the_moment_that_it_balances(moment, azimuth, section, s
     assert abs(own - moment) <= finest
 
 
+UST = {"sensor": "UST-10LX"}
+SMALL = {"sensor": "URG-04LX", "servo": "AX-12A"}
+
+
 @pytest.mark.parametrize(
     ("scanner", "why"),
     [
         (scanner_for(0, 0, 30, -60), "upright"),
-        (scanner_for(0, 55, -35, 30), "in the fan"),
-        (scanner_for(9, -85, 46, 7, sensor="URG-04LX", servo="AX-12A"), "in the fan"),
+        (scanner_for(-175, 10, 0, 20, **UST), "no more than bearing and ring"),
+        (scanner_for(65, 65, -50, 70, **SMALL), "in the fan"),
+        (scanner_for(135, -85, 35, -90, **UST), "the horn of MX-64R bears"),
+        (scanner_for(75, 65, -20, 10), "the lidar or its cables"),
+        (scanner_for(105, -20, -10, -70, **UST), "near to the deck"),
+        (scanner_for(-45, 35, -10, 0, **UST), "shorter than its screws"),
     ],
 )
 def test_where_there_is_none_the_reason_is_told(scanner, why):
     found = found_for(scanner)
     assert isinstance(found, LeftOut) and why in found.why
+
+
+def test_a_sweep_that_gravity_holds_on_one_flank_needs_none():
+    scanner = scanner_for(*SHIPPED[1])
+    moment = estimated_moment(scanner, linkage_of(scanner, drive_of(scanner).stack))
+    # the axis is level: the imbalance hangs straight down somewhere, and 90 deg from there gravity pulls hardest
+    up = scanner.angles.T_world_rot(0.0)[2, :2]
+    lowest = math.degrees(math.atan2(-up[1], -up[0]) - math.atan2(moment[1], moment[0])) % 360
+    sideways = (lowest + 90) % 360 - 180
+
+    def swept(low, high):
+        motion = Sweep(limits_deg=(low, high), period_s=10.0)
+        return replace(scanner, angles=scanner.angles.model_copy(update={"motion": motion}))
+
+    held = swept(max(-180.0, sideways - 60), min(180.0, sideways + 60))
+    assert keeps_flank(held, moment) and "one flank" in found_for(held).why
+    assert not keeps_flank(swept(-180.0, 180.0), moment)
+    assert not keeps_flank(scanner, moment)
+
+
+def test_an_ear_over_the_index_mark_carries_it():
+    scanner = scanner_for(0, 90, -80, 0)  # wires and ear at +y
+    assembly = make_parts(scanner, lambda name: name == "alignment_linkage")
+    ear = assembly.counterweight.ear
+    assert math.degrees(ear.azimuth) == pytest.approx(90)
+    part = meshes(assembly, ["alignment_linkage"])["alignment_linkage"]
+    middle = (ear.low + ear.high) / 2
+    at_mark, beside = ([[x, 200.0, middle]] for x in (0.0, 2.0))
+    deep, flush = (
+        part.ray.intersects_location(start, [[0.0, -1.0, 0.0]])[0][:, 1].max() for start in (at_mark, beside)
+    )
+    assert flush == pytest.approx(ear.end, abs=0.01) and flush - deep == pytest.approx(1.0, abs=0.05)
+
+
+def test_both_halves_of_the_studio_together_name_it_once():
+    scanner = scanner_for(*SHIPPED[1])
+    names = [body.name for turning in (True, False) for body in bodies_of(scanner, turning)]
+    assert names.count("counterweight") == 1 and len(names) == len(set(names))
 
 
 def test_a_servo_without_play_needs_none():

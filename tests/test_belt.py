@@ -330,9 +330,10 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)
     assert "280 mm" in text and "2048 of 4096" in text and "groove of the hub stands over the groove" in text
     masses = dict.fromkeys(assembly.made, 1.0)
-    rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, {"main_shaft"}, "0" * 12)}
+    rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, set(assembly.metal()), "0" * 12)}
     assert (rows["bearing"].quantity, rows["bearing"].total_usd) == (2, 16.0)
     assert rows["belt"].supplier_number == "GT2-6, 140 teeth, 280 mm"
+    assert rows["counterweight"].kind == "sawn" and "2 threads M4" in rows["counterweight"].note
     assert rows["main_shaft"].kind == "turned" and "main_shaft.step" in rows["main_shaft"].note
     assert not any("cable tie" in part for part in rows) and any("soft tube" in part for part in rows)
 

@@ -51,7 +51,7 @@ def deflection_checks(
         scanner: angles and products.
         drive: its layout.
         linkage: parameters of the linkage.
-        bodies: of `build.link_bodies`.
+        bodies: of `weights.link_bodies`.
         meshes: of all parts.
     """
     down = -scanner.angles.T_world_rot(0.0)[2, :3]

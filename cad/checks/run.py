@@ -59,7 +59,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     doubts = [
         Check("unverified", "note", None, None, "", product.name, finding.message)
         for product in products_of(scanner, drive)
-        for finding in unverified(product, drive)
+        for finding in unverified(product, assembly)
     ]
     bodies = link_bodies(scanner, assembly)
     checks = [

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from cad.assembly import Assembly
-from cad.balance import PART as COUNTERWEIGHT
-from cad.balance import SCREW as BAR_SCREW
-from cad.balance import Counterweight
+from cad.balance.counterweight import PART as COUNTERWEIGHT
+from cad.balance.counterweight import SCREW as BAR_SCREW
+from cad.balance.counterweight import Counterweight
 from cad.bom import drawing_number
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
@@ -29,13 +29,13 @@ def drawing_files(
     rounds: dict[str, list[Round]],
     joints: list[Joint],
     masses_g: dict[str, float],
-    turned: set[str],
+    metal: set[str],
     config_hash: str,
 ) -> dict[str, bytes]:
     """Draw every made part; `rounds` are its cylinders, the other arguments those of `bom.items_of`."""
     files: dict[str, bytes] = {}
     for name in assembly.made:
-        sheet = drawing_of(name, scanner, assembly, rounds[name], joints, masses_g[name], turned, config_hash)
+        sheet = drawing_of(name, scanner, assembly, rounds[name], joints, masses_g[name], metal, config_hash)
         files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
         files[f"drawings/{name}.svg"] = svg_bytes(sheet)
         files[f"drawings/{name}.dxf"] = dxf_text(sheet).encode("utf-8")
@@ -49,17 +49,16 @@ def drawing_of(
     rounds: list[Round],
     joints: list[Joint],
     mass_g: float,
-    turned: set[str],
+    metal: set[str],
     config_hash: str,
 ) -> Sheet:
     """The sheet of one part."""
     lidar_axis = assembly.stack.R()[:, 2] if name in _carriers(joints) else None
-    metal = name in turned
-    turns = name in assembly.drive.turned()
+    lathed = name in assembly.drive.turned()
     said = assembly.drive.on_sheets().get(name, OnSheet())
     part = part_of(assembly.made[name], rounds, lidar_axis, said)
     views = views_of(part)
-    material = "aluminium or steel, turned" if turns else f"{scanner.printer.name}, solid"
+    material = "aluminium or steel, turned" if lathed else f"{scanner.printer.name}, solid"
     if isinstance(assembly.counterweight, Counterweight) and name == COUNTERWEIGHT:
         material = assembly.counterweight.stock
     cells = (
@@ -69,10 +68,10 @@ def drawing_of(
         ("material", material),
         ("mass", f"{mass_g:.1f} g"),
         ("configuration", config_hash),
-        ("general tolerances", "ISO 2768-m" if metal else "ISO 2768-c"),
+        ("general tolerances", "ISO 2768-m" if name in metal else "ISO 2768-c"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, said, [] if turns else [_making(scanner, name)])
+    notes = _notes(scanner, part, said, [] if lathed else [_making(scanner, name)])
     return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 

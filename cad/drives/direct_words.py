@@ -48,8 +48,9 @@ DIRECT_STEPS: dict[str, tuple[str, str]] = {
     "counterweight": (
         "Counterweight on the linkage",
         "Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in the middle "
-        "of the slots. {alignment_linkage>counterweight} To trim it, push the bare shaft into the hub and lay it on "
-        "two level straight edges: where the bar sinks move it inwards, where the lidar sinks outwards.",
+        "of the slots. {alignment_linkage>counterweight} The leads of the ring pass below their heads. Nobody tells "
+        "where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots to where `scanwright "
+        "scan` prints the least ripple.",
     ),
     "alignment_linkage": (
         "Linkage on the shaft",

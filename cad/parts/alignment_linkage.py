@@ -22,16 +22,16 @@ from cad.drives.direct_sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS
 from cad.loads import JOURNAL_WALL
 from cad.mesh import checked_mesh
 from cad.parts.fins import FAR, fins_beside
-from cad.parts.linkage_sizing import PART, AlignmentLinkage, Ear, neck_corners
+from cad.parts.linkage_sizing import CLAMP_DRIVER, PART, AlignmentLinkage, Ear, neck_corners
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
 from cad.solids import building, checked
 from design.errors import BuildError
 
-CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
 INNER_RING = 1.2  # how far the hub's face may touch the bearing's inner ring, on the radius
 WIRES_HALF_WIDTH = 5.0
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
+EAR_CORNER = 0.3  # of its half width
 RETRIES = 5
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
 TRAP_WALL = 1.2  # between wires and a nut
@@ -182,7 +182,7 @@ def _hub(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _ear(ear: Ear, start: float) -> cq.Shape:
-    corner = 0.3 * ear.half_width
+    corner = EAR_CORNER * ear.half_width
     middle = np.array([(ear.end + start) / 2, 0.0])
     outline = solids.octagon(ear.end - middle[0], ear.half_width, corner) + middle
     return solids.prism(outline, ear.low, ear.high).moved(solids.about_axis(ear.azimuth))
@@ -257,12 +257,23 @@ def _bore(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _index_groove(p: AlignmentLinkage) -> cq.Solid:
-    """At the hub's lower end, or above the wires where they leave at +y."""
-    stack = p.stack
+    """At the hub's lower end, or above the wires where they leave at +y; there an ear carries it outwards."""
+    stack, ear, y = p.stack, p.ear, p.stack.hub_radius
     low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
     if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:
         low, high = -stack.h - 5.0, -stack.h + 1.0
-    return solids.prism(solids.diamond(1.0, stack.hub_radius), low, high)
+        if ear is not None and _reach_along_y(ear) > y:
+            y, low, high = _reach_along_y(ear), ear.low - 1.0, ear.high + 1.0
+    return solids.prism(solids.diamond(1.0, y), low, high)
+
+
+def _reach_along_y(ear: Ear) -> float:
+    """Where +y leaves an ear; 0 where it is on another side."""
+    along, across = math.cos(ear.azimuth - math.pi / 2), abs(math.sin(ear.azimuth - math.pi / 2))
+    if along <= 0:
+        return 0.0
+    corner = (ear.end + (1 - EAR_CORNER) * ear.half_width) / (along + across)
+    return min(ear.end / along, ear.half_width / max(across, 1e-9), corner)
 
 
 def _plate_marks(p: AlignmentLinkage) -> list[cq.Solid]:

@@ -1,4 +1,4 @@
-"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/balance.py`).
+"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/balance/`).
 
 Frame: rotation frame at gamma = 0, mm. It lies along a radius; its screws come from below, through slots of the ear.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from cad import solids
-from cad.balance import PART, SCREW, Counterweight
+from cad.balance.counterweight import PART, SCREW, Counterweight
 from cad.solids import building, checked
 
 

@@ -18,6 +18,7 @@ from design.scanner import Scanner
 
 PART = "alignment_linkage"
 CLAMP_SCREW = SCREWS["M3"]
+CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
 
 
