@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from cad.balance.counterweight import Counterweight
 from cad.deck import Deck
 from cad.drives.direct_sizing import Stack
 from cad.drives.drive import Drive
@@ -148,7 +147,7 @@ def _held_by_screws(scanner: Scanner, deck: Deck) -> Finding:
 def unverified(product: Product, assembly: Assembly) -> list[Finding]:
     """Values of a product that nobody has verified and that shape a part."""
     provenance, shaping = product.provenance(), {**SHAPING, **assembly.drive.shaping()}
-    if isinstance(assembly.counterweight, Counterweight):
+    if not isinstance(assembly.counterweight, LeftOut):
         shaping |= BALANCE.get(product.kind, {})
     return [
         Finding(

@@ -27,7 +27,7 @@ SETTINGS = {
     "small": (20, -50, 33, 12, "URG-04LX", "AX-12A"),
 }
 BEARING = {"rolling", "pitching", "tilted", "small"}  # a UST-10LX is light
-BALANCED = {"rolling", "pitching", "tilted", "small"}  # elsewhere gravity does not turn it, or its horn bears no more
+BALANCED = {"rolling", "pitching", "tilted"}  # elsewhere gravity does not turn it, the horn bears no more, or no room
 SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0), "UST-10LX": (47.4, 20.0)}  # optical height, hole offset
 SCREW_HOLE = 3.4  # M3 on fdm-0.4
 
