@@ -149,3 +149,19 @@ def test_the_past_is_forgotten_and_never_invented():
     with pytest.raises(ValueError, match="before what is kept is gone"):
         axis.angle_rad(np.array(SECOND))
     assert axis.angle_rad(times(58, 59)).shape == (200,)
+
+
+@pytest.mark.parametrize(
+    ("begin_ns", "stall_ns", "rate_deg_s"),
+    [(39742314, 163489261, 200), (362466, 100311909, 120), (47020837, 111850730, 120), (8651027, 78702149, 200)],
+)
+def test_a_stalled_loop_at_its_limit_is_no_work_for_the_solver(begin_ns, stall_ns, rate_deg_s):
+    axis = Axis(plant_of("MX-64R"), Load(), 0)
+    drive = Drive("velocity", np.radians(rate_deg_s))
+    axis.drive(begin_ns, drive)
+    axis.drive(stall_ns, replace(drive, blocked=True))
+    end_ns = stall_ns + 500_000_000
+    while axis._integrator.t < end_ns / 1e9:
+        axis.angle_rad(np.array([int(1e9 * axis._integrator.t) + 1000]))
+        assert len(axis._steps) < 5000  # it crawled along its limit in steps of 10 ns, for ever
+    assert axis.motion(end_ns).duty == pytest.approx(1.0)

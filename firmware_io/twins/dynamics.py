@@ -283,16 +283,20 @@ def _effort(
     del m, h_rate
     if drive.mode == "off":
         return 0.0, 0.0
-    if drive.mode == "share":
-        duty = drive.goal
-    elif drive.mode == "velocity":
-        duty = plant.velocity_p * (drive.goal - (h - seen) / plant.sensor_lag_s) + i
-    else:
-        error = setpoint - seen
-        beyond = abs(error) - plant.margin_rad
-        duty = math.copysign(plant.punch + plant.position_p * beyond, error) if beyond > 0 else 0.0
-    duty = max(-drive.torque_limit, min(drive.torque_limit, duty))
+    asked = _asked(plant, drive, setpoint, h, i, seen)
+    duty = max(-drive.torque_limit, min(drive.torque_limit, asked))
     return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
+
+
+def _asked(plant: Plant, drive: Drive, setpoint: float, h: float, i: float, seen: float) -> float:
+    """Duty that the loop asks for, whatever the limit."""
+    if drive.mode == "share":
+        return drive.goal
+    if drive.mode == "velocity":
+        return plant.velocity_p * (drive.goal - (h - seen) / plant.sensor_lag_s) + i
+    error = setpoint - seen
+    beyond = abs(error) - plant.margin_rad
+    return math.copysign(plant.punch + plant.position_p * beyond, error) if beyond > 0 else 0.0
 
 
 def _equations(
@@ -316,15 +320,19 @@ def _equations(
         )
         if drive.blocked:
             on_horn -= 50 * plant.stall_torque_nm * (h - held) + 0.5 * plant.stall_torque_nm * h_rate
-        windup = abs(duty) >= drive.torque_limit
         seen_rate = (h - seen) / plant.sensor_lag_s
-        error = drive.goal - seen_rate if drive.mode == "velocity" else 0.0
+        integral_rate = 0.0
+        if drive.mode == "velocity":
+            # What the limit cuts off flows back. An integral that just stops there would switch at every step, and the
+            # solver would crawl along the switch for ever.
+            cut = duty - _asked(plant, drive, setpoint, h, i, seen)
+            integral_rate = plant.velocity_i * (drive.goal - seen_rate + cut / plant.velocity_p)
         return [
             m_rate,
             (plant.stall_torque_nm * torque - friction - gear) / plant.inertia_kg_m2,
             h_rate,
             (gear + on_horn) / load.inertia_kg_m2,
-            0.0 if windup and error * duty > 0 else plant.velocity_i * error,
+            integral_rate,
             seen_rate,
         ]
 
