@@ -66,8 +66,13 @@ def cluster(scheduler: str | None, processes: int | None = None, memory: str = "
 @contextmanager
 def _local(processes: int | None, memory: str) -> Iterator[str]:
     import dask
-    from distributed import LocalCluster
+    from distributed import LocalCluster, scheduler, worker
 
+    # spans keep an entry for every task there ever was: a study of a million would fill this process
+    of_scheduler, of_workers = (
+        {name: kind for name, kind in module.DEFAULT_EXTENSIONS.items() if name != "spans"}
+        for module in (scheduler, worker)
+    )
     with (
         dask.config.set(NOT_OURS),
         LocalCluster(
@@ -77,6 +82,8 @@ def _local(processes: int | None, memory: str) -> Iterator[str]:
             memory_limit=memory,
             dashboard_address=LOCAL,
             silence_logs=50,
+            scheduler_kwargs={"extensions": of_scheduler},
+            extensions=of_workers,
         ) as local,
     ):
         number = len(local.workers)
