@@ -30,6 +30,11 @@ STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
 
 
+def standard_settings() -> dict[str, Array]:
+    """The standard alignments in radians: what an optimum is compared with."""
+    return {name: np.radians(angles) for name, angles in STANDARD_DEG.items()}
+
+
 class Angles(Record):
     """The six angles of the paper in degrees; the two gammas are 0 by design."""
 

@@ -1,7 +1,7 @@
 """What the scanner's own parts hide of its fan: the record, its file, and the one Protocol that crosses the rooms.
 
-The optimiser must know what the parts of a setting hide, and `design` never imports `cad`: `cad/shadow.py` implements
-the Protocol, the front door passes it in.
+The optimiser must know what the parts of a setting hide, and `design` never imports `cad`: `cad/assembly/shadow.py`
+implements the Protocol, the front door passes it in.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from design import files
+from design import atomic_file
 from design.errors import RecordingError
 
 P = ParamSpec("P")
@@ -20,7 +20,7 @@ def whole_file(path: Path) -> AbstractContextManager[Path]:
     Raises:
         RecordingError: the file cannot be written there.
     """
-    return files.whole_file(path, RecordingError)
+    return atomic_file.whole_file(path, RecordingError)
 
 
 def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import settings
 
-import scanwright
+from scanwright.cli.app import run as scanwright_command
 
 # CI judges the change, not the dice, and shares its cores; at a developer's desk every run draws new examples
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -86,7 +86,7 @@ def command(monkeypatch, capsys):
     def run(*words):
         monkeypatch.setattr(sys, "argv", ["scanwright", *map(str, words)])
         try:
-            scanwright.run()
+            scanwright_command()
             code = 0
         except SystemExit as stop:
             code = stop.code or 0
@@ -163,11 +163,11 @@ def browser(chromium):
 @pytest.fixture(scope="session")
 def made(tmp_path_factory):
     """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
-    from cad.build import build_parts
-    from cad.deck import mount_offset_mm
-    from cad.exports import export_scanner
+    from cad.files.parts import build_parts
+    from cad.files.write_all import export_scanner
+    from cad.layout.deck import mount_offset_mm
     from design.angles import Angles, AngleSet
-    from design.catalogue import load_catalogue
+    from design.catalogue.catalogue import load_catalogue
     from design.scanner import scanner_of
 
     angles = AngleSet(

@@ -30,10 +30,10 @@ def test_the_house_as_it_stands(house):
 @pytest.mark.parametrize(
     ("room", "line"),
     [
-        ("design", "import cad.drives.direct_sizing"),
+        ("design", "import cad.layout.direct_stack"),
         ("design", "import firmware_io.samples"),
         ("cad", "import firmware_io.samples"),
-        ("firmware_io", "import cad.drives.direct_sizing"),
+        ("firmware_io", "import cad.layout.direct_stack"),
         ("design", "import cadquery"),
         ("firmware_io", "import OCP"),
         ("cad", "import serial"),

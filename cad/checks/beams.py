@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cad.assembly.shadow import bundles
 from cad.checks.check import Check, at_most, note
-from cad.shadow import bundles
-from design import scene
 from design.frames import Array
 from design.scanner import Scanner
+from design.scene import ray_caster
 from design.shadow import Mask, Shadow
 
 LINKAGE = ("alignment_linkage", "sub_plate")
@@ -47,7 +47,7 @@ def beam_checks(scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Arra
 def _middle_hidden(scanner: Scanner, triangles_m: Array) -> Mask:
     """Beams whose middle ray meets these parts at gamma = 0."""
     origins, directions = bundles(scanner)
-    hits = scene.cast(scene.scene_of(triangles_m), origins[:, 0], directions[:, 0])
+    hits = ray_caster.cast(ray_caster.scene_of(triangles_m), origins[:, 0], directions[:, 0])
     return np.asarray(np.isfinite(hits.range_m))
 
 

@@ -6,11 +6,11 @@ import math
 
 from cad.checks.check import Check, at_most, note, tidy
 from cad.checks.mechanics import spin_up_nm
+from cad.checks.remarks import rotor_weight
 from cad.drives.belt_loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
-from cad.drives.belt_sizing import BeltStack
-from cad.loads import RATED_AT_MM, rated_moment_nm
-from cad.mass import Inertial, together
-from cad.remarks import rotor_weight
+from cad.geometry.inertia import Inertial, together
+from cad.layout.belt_stack import BeltStack
+from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from design.scanner import Scanner
 
 FAR_MM = 10_000.0

@@ -15,9 +15,9 @@ import manifold3d
 import numpy as np
 import shapely
 
-from cad.assembly import turns
+from cad.assembly.assembly import turns
 from cad.checks.check import Check, at_least, at_most
-from cad.mesh import Mesh
+from cad.geometry.mesh import Mesh
 from design.frames import Array
 
 CHORD = 0.01  # error of an image's edges

@@ -16,9 +16,9 @@ import numpy as np
 
 from cad.checks.check import Check, Severity, tidy
 from cad.drives.drive import Drive
-from cad.mass import Inertial, together
-from cad.mesh import Mesh
-from cad.parts.linkage_sizing import AlignmentLinkage
+from cad.geometry.inertia import Inertial, together
+from cad.geometry.mesh import Mesh
+from cad.layout.linkage import AlignmentLinkage
 from cad.statics.sag import Sag, linkage_sag, with_shaft
 from design.frames import Array
 from design.scanner import Scanner

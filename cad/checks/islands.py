@@ -12,8 +12,8 @@ import manifold3d
 import numpy as np
 
 from cad.checks.check import Check, spot, tidy
-from cad.mesh import Mesh
-from cad.print_pose import PrintPose, on_bed
+from cad.geometry.mesh import Mesh
+from cad.geometry.print_pose import PrintPose, on_bed
 
 LAYER = 0.4  # what starts in the air and is gone after one layer of this is a burr
 SMALL_MM2 = 0.2  # outlines below it are less than a line of a nozzle

@@ -10,15 +10,15 @@ import math
 
 import numpy as np
 
-from cad.balance.counterweight import RUBS_NM
-from cad.balance.imbalance import FAR_MM, keeps_flank, play_matters
 from cad.checks.check import Check, Severity, at_most, note, tidy
-from cad.drives.direct_sizing import Stack
+from cad.checks.remarks import rotor_weight
 from cad.drives.drive import Drive
-from cad.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
-from cad.mass import Inertial, together
+from cad.geometry.inertia import Inertial, together
+from cad.layout.balance import RUBS_NM
+from cad.layout.direct_stack import Stack
+from cad.layout.imbalance import FAR_MM, keeps_flank, play_matters
+from cad.layout.loads import RATED_AT_MM, Supported, Weight, hanging, rated_moment_nm, supported
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
-from cad.remarks import rotor_weight
 from design.scanner import Scanner
 
 TORQUE_SHARE = 0.2  # of the stall torque that a servo gives all day

@@ -16,12 +16,12 @@ import numpy as np
 
 from cad.checks.check import Check, at_least, at_most, note, spot, tidy
 from cad.checks.islands import islands_check
-from cad.holes import Round, rounds_of
-from cad.mesh import Mesh
-from cad.print_pose import PrintPose, print_pose
-from design import scene
-from design.catalogue import Printer
+from cad.geometry.holes import Round, rounds_of
+from cad.geometry.mesh import Mesh
+from cad.geometry.print_pose import PrintPose, print_pose
+from design.catalogue.catalogue import Printer
 from design.frames import Array
+from design.scene import ray_caster
 
 POINTS = 6000  # per part
 THIN_SHARE = 0.01
@@ -67,9 +67,9 @@ class ThinWalls:
 def thin_walls(mesh: Mesh, least_mm: float) -> ThinWalls:
     """Measure the walls of a part; of places of one thickness, the one nearest to their middle is told."""
     points, normals, area = _surface(mesh)
-    solid = scene.scene_of(mesh.vertices[mesh.faces] / 1000)
+    solid = ray_caster.scene_of(mesh.vertices[mesh.faces] / 1000)
     inside = 1e-6  # m, below the surface
-    hits = scene.cast(solid, points / 1000 - inside * normals, -normals)
+    hits = ray_caster.cast(solid, points / 1000 - inside * normals, -normals)
     parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL)
     thickness = 1000 * (hits.range_m + inside)
     thin = parallel & (thickness < least_mm)

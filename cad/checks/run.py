@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cad.assembly import Assembly, make_parts
+from cad.assembly.assembly import Assembly, make_parts
+from cad.assembly.masses import link_bodies
+from cad.assembly.shadow import shadow_of, triangles_of
 from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
 from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
-from cad.remarks import products_of, unverified
-from cad.shadow import shadow_of, triangles_of
-from cad.weights import link_bodies
+from cad.checks.remarks import products_of, unverified
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from cad.assembly import Assembly
-from cad.balance.counterweight import PART as COUNTERWEIGHT
-from cad.balance.counterweight import SCREW as BAR_SCREW
-from cad.balance.counterweight import Counterweight
-from cad.bom import drawing_number
+from cad.assembly.assembly import Assembly
+from cad.assembly.joints import Joint
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.views import views_of
 from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
-from cad.drives.on_sheet import OnSheet
-from cad.holes import Round
-from cad.joints import Joint
+from cad.files.bom import drawing_number
+from cad.geometry.holes import Round
+from cad.layout.balance import PART as COUNTERWEIGHT
+from cad.layout.balance import SCREW as BAR_SCREW
+from cad.layout.balance import Counterweight
+from cad.layout.fits import OnSheet
 from design.scanner import Scanner
 
 HOLDS = ("thread", "trap")  # what of a joint a part holds itself

@@ -10,8 +10,8 @@ import numpy as np
 
 from cad.drawings.patterns import Pattern, on_axis, patterns_of
 from cad.drawings.slots import Slot, slots_of
-from cad.drives.on_sheet import Fit, OnSheet
-from cad.holes import Round
+from cad.geometry.holes import Round
+from cad.layout.fits import Fit, OnSheet
 from design.frames import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.holes import Round
+from cad.geometry.holes import Round
 from design.frames import Array
 
 

@@ -12,7 +12,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.TopAbs import TopAbs_REVERSED
 
 from cad.drawings.patterns import number
-from cad.holes import Piercing
+from cad.geometry.holes import Piercing
 from design.frames import Array
 
 HALF_TURN = 0.02  # rad, from half a turn

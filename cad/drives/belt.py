@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.drives.belt_sizing import (
+from cad.drives.belt_words import belt_steps, teeth_words
+from cad.findings import Finding
+from cad.layout.belt_stack import (
     FOOT_HALF,
     FOOT_HOLE,
     FOOT_SCREW,
@@ -21,12 +23,10 @@ from cad.drives.belt_sizing import (
     case_corners,
     drive_corners,
 )
-from cad.drives.belt_words import belt_steps, teeth_words
-from cad.drives.carried import Carried
-from cad.drives.on_sheet import Fit, OnSheet, no_wider, printed_seat, turned_spigot
-from cad.findings import Finding
+from cad.layout.fits import Fit, OnSheet, no_wider, printed_seat, turned_spigot
+from cad.layout.mounted import Carried
 from cad.screws import Screw, trap_of
-from design.catalogue import Bearing, Belt, Product
+from design.catalogue.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import cadquery as cq
 
     from cad.checks.check import Check
-    from cad.mass import Inertial
+    from cad.geometry.inertia import Inertial
     from cad.statics.shaft import ShaftBend
 
 SHAFT = "main_shaft"
@@ -169,24 +169,24 @@ class BeltDrive:
 
     def weights(self) -> tuple[list[Inertial], list[Inertial]]:
         """Servo, belt, and half of ring and bearings each."""
-        from cad import mass
+        from cad.geometry import inertia
 
         stack, servo, ring = self.stack, self.scanner.servo, self.scanner.slip_ring
         assert ring is not None
         halves = []
         r = stack.ring_radius
-        halves.append(mass.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top)))
+        halves.append(inertia.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top)))
         r, half = stack.carrier.outer_mm / 2, stack.carrier.width_mm / 2
         for middle in (stack.upper_middle, stack.lower_middle):
-            halves.append(mass.of_box(stack.carrier.mass_g / 2, (-r, -r, middle - half), (r, r, middle + half)))
+            halves.append(inertia.of_box(stack.carrier.mass_g / 2, (-r, -r, middle - half), (r, r, middle + half)))
         case = case_corners(stack)
         corner = stack.turn() @ [stack.centre + stack.belt_radius, stack.belt_radius, 0.0]
         start = stack.turn() @ [-stack.belt_radius, -stack.belt_radius, 0.0]
         low, high = np.minimum(corner, start), np.maximum(corner, start)
         width = np.array([0.0, 0.0, stack.belt.width_mm / 2])
         middle_z = np.array([0.0, 0.0, stack.belt_middle])
-        belt = mass.of_box(stack.belt.mass_g, low + middle_z - width, high + middle_z + width)
-        return [mass.of_box(servo.mass_g, case.min(axis=0), case.max(axis=0)), belt, *halves], halves
+        belt = inertia.of_box(stack.belt.mass_g, low + middle_z - width, high + middle_z + width)
+        return [inertia.of_box(servo.mass_g, case.min(axis=0), case.max(axis=0)), belt, *halves], halves
 
     def shapes(self) -> list[tuple[tuple[float, float, float], tuple[float, ...]]]:
         """Servo and capsule."""
@@ -211,7 +211,7 @@ class BeltDrive:
     def findings(self, bodies: dict[str, Inertial]) -> list[Finding]:
         """A shaft to have turned, and pulleys to look at."""
         from cad.checks.belt import belt_checks
-        from cad.remarks import turn_from_metal
+        from cad.checks.remarks import turn_from_metal
 
         why = f"two bearings of {self.stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)"
         off = [

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import cadquery as cq
 
-from cad import bought, solids
-from cad.drives.belt_sizing import BeltStack
+from cad import solids
+from cad.assembly import bought
+from cad.layout.belt_stack import BeltStack
 from cad.parts.capsule_holder import flange_centres
 from cad.solids import building, checked
 

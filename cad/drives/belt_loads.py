@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.drives.belt_sizing import BeltStack
-from cad.loads import ALUMINIUM_PA, Weight
+from cad.layout.belt_stack import BeltStack
+from cad.layout.loads import ALUMINIUM_PA, Weight
 from cad.statics.shaft import ShaftBend
 
 PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cad.drives.belt_loads import PRELOAD_N, press_newton
-from cad.drives.belt_sizing import TRAVEL, BeltStack
 from cad.drives.direct_words import DIRECT_STEPS
+from cad.layout.belt_stack import TRAVEL, BeltStack
 
 GIVE_MM = 2.0  # of a strand, when the pre-load is felt
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.drives.carried import Carried
-from cad.drives.direct_sizing import Stack
 from cad.drives.direct_words import DIRECT_STEPS
-from cad.drives.on_sheet import OnSheet, printed_journal, printed_seat, turned_spigot
 from cad.findings import Finding
-from cad.loads import ALUMINIUM_PA
+from cad.layout.direct_stack import Stack
+from cad.layout.fits import OnSheet, printed_journal, printed_seat, turned_spigot
+from cad.layout.loads import ALUMINIUM_PA
+from cad.layout.mounted import Carried
 from cad.screws import SCREWS, Screw
-from design.catalogue import Bearing, Belt, Product
+from design.catalogue.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import cadquery as cq
 
     from cad.checks.check import Check
-    from cad.mass import Inertial
+    from cad.geometry.inertia import Inertial
     from cad.statics.shaft import ShaftBend
 
 SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
@@ -109,7 +109,7 @@ class DirectDrive:
 
     def bought(self) -> dict[str, cq.Solid]:
         """Servo, ring and bearing."""
-        from cad import bought
+        from cad.assembly import bought
 
         scanner, stack = self.scanner, self.stack
         bodies = {
@@ -128,19 +128,19 @@ class DirectDrive:
 
     def weights(self) -> tuple[list[Inertial], list[Inertial]]:
         """Servo, and half of ring and bearing each."""
-        from cad import mass
+        from cad.geometry import inertia
 
         stack, servo, ring = self.stack, self.scanner.servo, self.scanner.slip_ring
         case = ((*servo.case_min_mm[:2], servo.case_min_mm[2] + stack.horn), (*servo.case_max_mm[:2], stack.horn))
         halves = []
         if ring is not None:
             r = stack.ring_radius
-            halves.append(mass.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top)))
+            halves.append(inertia.of_box(ring.mass_g / 2, (-r, -r, stack.ring_bottom), (r, r, stack.ring_top)))
         if stack.bearing is not None:
             r, top = stack.bearing.outer_mm / 2, stack.bearing_top
             low, high = (-r, -r, top - stack.bearing.width_mm), (r, r, top)
-            halves.append(mass.of_box(stack.bearing.mass_g / 2, low, high))
-        return [mass.of_box(servo.mass_g, *case), *halves], halves
+            halves.append(inertia.of_box(stack.bearing.mass_g / 2, low, high))
+        return [inertia.of_box(servo.mass_g, *case), *halves], halves
 
     def shapes(self) -> list[tuple[tuple[float, float, float], tuple[float, ...]]]:
         """Servo and ring."""
@@ -170,7 +170,7 @@ class DirectDrive:
 
     def findings(self, bodies: dict[str, Inertial]) -> list[Finding]:
         """A shaft to have turned, and a horn that carries too much."""
-        from cad.remarks import tilt_moment, turn_from_metal
+        from cad.checks.remarks import tilt_moment, turn_from_metal
 
         shaft = self.stack.shaft_diameter
         why = f"{shaft:g} mm is too thin to print (0.9 deg of bending with the axis horizontal)"

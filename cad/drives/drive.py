@@ -10,15 +10,15 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from cad.drives.belt import BeltDrive
-from cad.drives.belt_sizing import belt_stack_of
-from cad.drives.carried import Carried
 from cad.drives.direct import DirectDrive
-from cad.drives.direct_sizing import stack_of
-from cad.drives.head import Head
-from cad.drives.on_sheet import OnSheet
 from cad.findings import Finding
+from cad.layout.belt_stack import belt_stack_of
+from cad.layout.direct_stack import stack_of
+from cad.layout.fits import OnSheet
+from cad.layout.head import Head
+from cad.layout.mounted import Carried
 from cad.screws import Screw
-from design.catalogue import Bearing, Belt, Product
+from design.catalogue.catalogue import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import cadquery as cq
 
     from cad.checks.check import Check
-    from cad.mass import Inertial
+    from cad.geometry.inertia import Inertial
     from cad.statics.shaft import ShaftBend
 
 

@@ -21,14 +21,14 @@ import shapely.affinity
 from numpy.typing import NDArray
 
 from cad import solids
-from cad.assembly import Assembly, turns
+from cad.assembly.assembly import Assembly, turns
 from cad.findings import Finding
-from cad.holes import Piercing
+from cad.geometry.holes import Piercing
+from cad.geometry.mesh import Mesh, checked_mesh
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at, flats_of
 from cad.labels.glyphs import letters, text_width
 from cad.labels.sight import Sight
-from cad.mesh import Mesh, checked_mesh
 from design.errors import BuildError
 from design.frames import Array
 from design.left_out import LeftOut

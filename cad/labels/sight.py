@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from cad.assembly import Assembly, turns
+from cad.assembly.assembly import Assembly, turns
 from cad.labels.flats import Flat
-from design import scene
 from design.frames import Array
+from design.scene import ray_caster
 
 READING = 200.0  # from a face to the eye: what stands farther off leaves room for a head
 TOUCH = 1.0  # a body nearer to a face than this lies on it
@@ -30,7 +30,7 @@ class Sight:
         corners: dict[bool, list[Array]] = {True: [], False: [_deck(assembly)]}
         for name, mesh in assembly.meshes().items():
             corners[turns(name)].append(mesh.vertices[mesh.faces])
-        self._scenes = {turning: scene.scene_of(np.concatenate(all_) / 1000) for turning, all_ in corners.items()}
+        self._scenes = {turning: ray_caster.scene_of(np.concatenate(all_) / 1000) for turning, all_ in corners.items()}
 
     def touched(self, flat: Flat) -> bool:
         """Whether anything lies on a face."""
@@ -60,7 +60,7 @@ class Sight:
         normal = flat.frame[:, 2]
         starts = (flat.at(points) + OFF * normal) / 1000 @ turn.T
         bodies = self._scenes[turning]
-        hits = scene.cast(bodies, starts, np.broadcast_to(turn @ normal, starts.shape))
+        hits = ray_caster.cast(bodies, starts, np.broadcast_to(turn @ normal, starts.shape))
         within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ (turn @ normal) > 0)
         return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
 

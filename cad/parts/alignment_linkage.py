@@ -1,6 +1,6 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. A hub clamps the shaft's spigot (blind bore
+Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. A hub clamps the shaft's spigot (blind bore
 with a flat at +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must
 stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x
 (FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub,
@@ -18,11 +18,11 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.drives.direct_sizing import BODY_GAP, EAR_REACH, PLATE_THICKNESS
-from cad.loads import JOURNAL_WALL
-from cad.mesh import checked_mesh
+from cad.geometry.mesh import checked_mesh
+from cad.layout.direct_stack import BODY_GAP, EAR_REACH, PLATE_THICKNESS
+from cad.layout.linkage import CLAMP_DRIVER, PART, AlignmentLinkage, Ear, neck_corners
+from cad.layout.loads import JOURNAL_WALL
 from cad.parts.fins import FAR, fins_beside
-from cad.parts.linkage_sizing import CLAMP_DRIVER, PART, AlignmentLinkage, Ear, neck_corners
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
 from cad.solids import building, checked
@@ -57,7 +57,7 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """What the linkage is made of, each shape in its place: `alignment_linkage` and `cad/draft.py` put it together.
+    """What the linkage is made of, each in its place: `alignment_linkage` and the preview put it together.
 
     Both do it in this order: plate and neck, less room and beside, of which the body of the plate stays; with the hub,
     less the room; less the holes.

@@ -1,8 +1,8 @@
 """Base mount: holds the servo case, or the tower of a belt, on a deck with the rotation axis where the angles want it.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm; the deck is that of `cad/deck.py`. Two rails
-with feet take the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut that
-stays wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's
+Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm; the deck is that of `cad/layout/deck.py`. Two
+rails with feet take the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut
+that stays wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's
 holes: four M4 on 80 x 80 mm unless the task names others. Screws: first the case from behind through the strut, then
 the foot on the deck.
 """
@@ -15,8 +15,8 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, Deck
 from cad.drives.drive import drive_of
+from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, Deck
 from cad.screws import Screw
 from cad.solids import building, checked
 from design.frames import Array

@@ -1,6 +1,6 @@
 """Bearing cage: holds a thin-section bearing around the hub's journal where the axis is tilted too far for the horn.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Two parts, since the cage must come down over
+Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. Two parts, since the cage must come down over
 the ring:
 
     cage_base     thick plate on the ears of the servo's front, with a boss that centres the cage; with a ring it is
@@ -20,10 +20,10 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.drives.direct_sizing import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
+from cad.layout.direct_stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
 from cad.solids import building, checked
-from design.catalogue import Bearing, Servo
+from design.catalogue.catalogue import Bearing, Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 

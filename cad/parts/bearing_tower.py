@@ -1,6 +1,6 @@
 """Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's side is that of `BeltStack.quarter`.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm; the servo's side is that of `BeltStack.quarter`.
 A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
 screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
 arms. Nuts, where the printer's profile asks for them, go into the arms from below and into the foot from its corners.
@@ -17,7 +17,7 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.drives.belt_sizing import (
+from cad.layout.belt_stack import (
     BOSS,
     CASE_ROOM,
     DISC,

@@ -1,6 +1,6 @@
 """Slip-ring adapter of the belt layout: a disc in the tower that the capsule's flange is screwed to.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; turned with the servo's side. The capsule hangs
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm; turned with the servo's side. The capsule hangs
 through its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower
 from below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is
 not in line.
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.belt_sizing import DISC, BeltStack
+from cad.layout.belt_stack import DISC, BeltStack
 from cad.parts.bearing_tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths
 from cad.screws import SCREWS, Screw, thread_hole
 from cad.solids import building, checked

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from cad import solids
-from cad.balance.counterweight import PART, SCREW, Counterweight
+from cad.layout.balance import PART, SCREW, Counterweight
 from cad.solids import building, checked
 
 

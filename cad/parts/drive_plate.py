@@ -1,6 +1,6 @@
 """Drive plate of the belt layout: holds the servo by its front ears and slides on the tower's arms to tighten the belt.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm; the servo's place and turn are those of the
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm; the servo's place and turn are those of the
 stack. A flat plate with an opening for horn and pulley, feet down to the ears, and four slots along the line of
 centres.
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.belt_sizing import PLATE, PLATE_SCREW, TRAVEL, BeltStack
+from cad.layout.belt_stack import PLATE, PLATE_SCREW, TRAVEL, BeltStack
 from cad.screws import SCREWS, Screw
 from cad.solids import building, checked
 from design.errors import BuildError

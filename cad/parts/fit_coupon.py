@@ -16,10 +16,10 @@ import numpy as np
 import shapely
 
 from cad import solids
-from cad.drives.head import Head
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at
 from cad.labels.glyphs import letters, text_width
+from cad.layout.head import Head
 from cad.screws import SCREWS, Trap, trap_of
 from cad.solids import building, checked
 from design.frames import Array

@@ -1,6 +1,6 @@
 """Main shaft of the belt layout: a tube in two bearings, with the spigot that the linkage sits on. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. The spigot is the one of `servo_shaft`, its flat
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. The spigot is the one of `servo_shaft`, its flat
 at +y. A collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave
 through two windows below the web under the spigot.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.belt_sizing import BeltStack
+from cad.layout.belt_stack import BeltStack
 from cad.solids import building, checked
 
 PART = "main_shaft"

@@ -1,6 +1,6 @@
 """The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. Teeth between two rims; a groove is a half circle
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. Teeth between two rims; a groove is a half circle
 with flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press,
 half of the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
 
@@ -17,7 +17,7 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.drives.belt_sizing import BOSS, GRUB, RIM, BeltStack
+from cad.layout.belt_stack import BOSS, GRUB, RIM, BeltStack
 from cad.screws import SCREWS, Screw, thread_hole
 from cad.solids import building, checked
 from design.errors import BuildError

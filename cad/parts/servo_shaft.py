@@ -1,6 +1,6 @@
 """Servo shaft: from the servo's horn through the slip ring to the linkage's hub. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. Horn flange with the horn's holes and a pocket
+Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. Horn flange with the horn's holes and a pocket
 for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends
 could not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and
 bearing are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.direct_sizing import Stack, horn_screw
-from cad.loads import WAIST, waist_radius_mm
+from cad.layout.direct_stack import Stack, horn_screw
+from cad.layout.loads import WAIST, waist_radius_mm
 from cad.solids import building, checked
 from design.scanner import Scanner
 

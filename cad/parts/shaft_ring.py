@@ -1,6 +1,6 @@
 """Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/belt_sizing.py`), mm. A step that only the inner ring touches, and two
+Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. A step that only the inner ring touches, and two
 grub screws 90 deg apart; a driver reaches them through the window of the tower.
 """
 
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.belt_sizing import BOSS, GRUB, BeltStack
-from cad.drives.head import BEARING_STEP
+from cad.layout.belt_stack import BOSS, GRUB, BeltStack
+from cad.layout.head import BEARING_STEP
 from cad.screws import thread_hole
 from cad.solids import building, checked
 from design.scanner import Scanner

@@ -1,6 +1,6 @@
 """Slip-ring adapter: keeps the ring's stator from turning, from the servo's front holes.
 
-Frame: rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. The rotor of the ring is clamped to the shaft
+Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. The rotor of the ring is clamped to the shaft
 and carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in
 their groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides round the horn flange
 from -y after the shaft is on, then the ring comes down over the spigot between the arms.
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from cad import solids
-from cad.drives.direct_sizing import Stack
+from cad.layout.direct_stack import Stack
 from cad.parts.bearing_cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_base, cage_of, plate_half_x
 from cad.screws import SCREWS, Screw
 from cad.solids import building, checked

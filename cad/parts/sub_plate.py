@@ -1,6 +1,6 @@
 """Sub-plate: between lidar and linkage where the hub would cover one of the lidar's screws.
 
-Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/drives/direct_sizing.py`), mm. On the
+Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. On the
 bench it is screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where
 nothing is in the way. The heads of the lidar's screws stand in pockets of the linkage.
 """
@@ -13,11 +13,11 @@ import cadquery as cq
 import numpy as np
 
 from cad import solids
-from cad.drives.direct_sizing import BODY_GAP, EAR_REACH, SUB_PLATE, ear_corner
-from cad.drives.head import Axis, Head
+from cad.layout.direct_stack import BODY_GAP, EAR_REACH, SUB_PLATE, ear_corner
+from cad.layout.head import Axis, Head
 from cad.screws import SCREWS
 from cad.solids import building, checked
-from design.catalogue import Lidar
+from design.catalogue.catalogue import Lidar
 from design.frames import Array
 from design.scanner import Scanner
 

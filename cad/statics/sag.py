@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.drives.head import Head
-from cad.loads import STANDARD_GRAVITY
-from cad.mass import Inertial
-from cad.mesh import Mesh
+from cad.geometry.inertia import Inertial
+from cad.geometry.mesh import Mesh
+from cad.layout.head import Head
+from cad.layout.loads import STANDARD_GRAVITY
 from cad.statics import elastic
 from cad.statics.shaft import ShaftBend
 from cad.statics.voxels import Grid, filled

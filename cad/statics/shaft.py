@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.drives.direct_sizing import Stack
-from cad.loads import ALUMINIUM_PA, WAIST, waist_radius_mm
+from cad.layout.direct_stack import Stack
+from cad.layout.loads import ALUMINIUM_PA, WAIST, waist_radius_mm
 from design.frames import Array
 
 SLICES = 400  # of the shaft's length: bend within 1e-4

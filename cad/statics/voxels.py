@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design import scene
 from design.frames import Array
+from design.scene import ray_caster
 
 RAYS = 2  # through a cube, along x and along y: a wall as thin as a cube keeps its thickness
 SURFACES = 64  # that one column may pass
@@ -45,13 +45,13 @@ def filled(triangles: Array, grid: Grid) -> Array:
     Returns:
         Shape (nx, ny, nz) * parts, 0 to 1.
     """
-    solid = scene.scene_of(triangles / 1000)
+    solid = ray_caster.scene_of(triangles / 1000)
     below = min(float(grid.low[2]), float(triangles[:, :, 2].min())) - 1.0
     offsets = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * grid.edge / grid.parts
     return np.mean([_along_lines(solid, grid, below, dx, dy) for dx in offsets for dy in offsets], axis=0)
 
 
-def _along_lines(solid: scene.Scene, grid: Grid, below: float, dx: float, dy: float) -> Array:
+def _along_lines(solid: ray_caster.Scene, grid: Grid, below: float, dx: float, dy: float) -> Array:
     """Share of one line through each cube that is inside, its shift from the middle given."""
     x, y = grid.middles(0) + dx, grid.middles(1) + dy
     columns = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
@@ -61,7 +61,7 @@ def _along_lines(solid: scene.Scene, grid: Grid, below: float, dx: float, dy: fl
     left = np.arange(len(columns))
     for _ in range(SURFACES):
         origins = np.column_stack([columns[left], height[left]]) / 1000
-        hits = scene.cast(solid, origins, np.broadcast_to([0.0, 0.0, 1.0], origins.shape))
+        hits = ray_caster.cast(solid, origins, np.broadcast_to([0.0, 0.0, 1.0], origins.shape))
         met = hits.triangle >= 0
         left = left[met]
         if len(left) == 0:

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from design import frames
 from design.angles import AngleSet
 from design.errors import RecordingError
-from firmware_io.encoder import axis_curve
-from firmware_io.own_body import OwnBody
-from firmware_io.recording import Recording
+from firmware_io.assembly.axis_curve import axis_curve
+from firmware_io.assembly.beam_outcome import Verdict, judge
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.recording.recording import Recording
 from firmware_io.samples import AxisCurve, Floats, Times
-from firmware_io.verdict import Verdict, judge
 
 Ints = NDArray[np.int64]
 _SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from design import frames
-from firmware_io.formats.record import Cloud
+from firmware_io.clouds.record import Cloud
 from firmware_io.registration.thin import joined_means, voxel_means
 from firmware_io.samples import Floats
 

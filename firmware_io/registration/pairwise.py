@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from design import frames
 from firmware_io.registration.cube_map import cells_of
-from firmware_io.registration.view import THREADS, Level, View, level_of
+from firmware_io.registration.sensor_view import THREADS, Level, View, level_of
 from firmware_io.samples import Floats
 
 _COARSE_REACH_M = 1.0

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from design import frames
 from firmware_io.files import whole_file
 from firmware_io.registration.register import Registration
-from firmware_io.registration.view import View
+from firmware_io.registration.sensor_view import View
 
 _SHOWN = 20_000  # points of one cloud: more only blacken the page
 _KEPT_PERCENT = (0.5, 99.5)

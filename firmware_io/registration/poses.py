@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from design.errors import RecordingError
+from firmware_io.clouds.record import Cloud, pose_matrix, pose_numbers
 from firmware_io.files import foreign, whole_file
-from firmware_io.formats.record import Cloud, pose_matrix, pose_numbers
 from firmware_io.samples import Floats
 
 _AXES = ("rx", "ry", "rz", "x", "y", "z")

@@ -10,8 +10,8 @@ import numpy as np
 
 from firmware_io.registration.graph import Edge, Graph, solve
 from firmware_io.registration.pairwise import Pair, align, near_share, refused
+from firmware_io.registration.sensor_view import View
 from firmware_io.registration.start import find
-from firmware_io.registration.view import View
 from firmware_io.samples import Floats
 
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from design.atomic_file import check_place
 from design.errors import RecordingError
-from design.files import check_place
-from firmware_io.cloud_files import check_target, read_clouds, write_clouds
+from firmware_io.clouds.files import check_target, read_clouds, write_clouds
 from firmware_io.registration.merge import merge
 from firmware_io.registration.pairwise import Pair
 from firmware_io.registration.picture import overlap_picture
 from firmware_io.registration.poses import read_poses, write_covariances, write_poses
 from firmware_io.registration.register import Registration, register
-from firmware_io.registration.view import view_of
+from firmware_io.registration.sensor_view import view_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

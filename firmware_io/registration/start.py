@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from design import frames
 from firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
-from firmware_io.registration.view import View
+from firmware_io.registration.sensor_view import View
 from firmware_io.samples import Floats
 
 _CELL_M = 0.25

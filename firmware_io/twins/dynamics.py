@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import BDF, LSODA, Radau
 
-from firmware_io.registers import motor_of
 from firmware_io.samples import Floats
+from firmware_io.servo.dynamixel.registers import motor_of
 
 Mode = Literal["off", "share", "velocity", "position"]
 

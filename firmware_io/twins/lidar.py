@@ -19,7 +19,7 @@ from types import TracebackType
 import numpy as np
 
 from design.errors import DeviceError, suggest
-from firmware_io import scip
+from firmware_io.lidar.scip import protocol
 from firmware_io.twins.lidar_machine import IDENTITIES, LidarMachine, Look, Quartz
 
 _AHEAD_NS = 8_000_000  # measuring takes a computer a while: begun before the turn ends, it makes no scan late
@@ -84,7 +84,7 @@ class LidarTwin:
         self.machine = LidarMachine(IDENTITIES[model], look, quartz, motor_error=motor_error, scip_1=scip_1)
         self.smallest_delay_ns = self.machine.arc_ns
         if scanning:
-            self.machine.answer(scip.continuous(self.machine.identity.parameters.window), time.monotonic_ns())
+            self.machine.answer(protocol.continuous(self.machine.identity.parameters.window), time.monotonic_ns())
         self._lock = threading.RLock()
         self._faults: deque[Callable[[bytes], bytes]] = deque()
         self._sent: deque[tuple[int, bytes]] = deque()  # scans under way: when they arrive

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from firmware_io import scip
-from firmware_io.hokuyo import Parameters, StampAt
+from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip.parameters import Parameters, StampAt
 from firmware_io.samples import Floats, Times
 
 Look = Callable[[Times], tuple[Floats, Floats]]
@@ -127,14 +127,14 @@ class Quartz:
     def ms(self, time_ns: int) -> int:
         """What it shows, 24 bit."""
         shown_ms = self.clock_ms + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e6)
-        return shown_ms % scip.STAMP_WRAP_MS
+        return shown_ms % protocol.STAMP_WRAP_MS
 
 
 @dataclass(slots=True)
 class Scanning:
     """Scans that somebody asked for: the echo without its last two digits and text, and what is left to do."""
 
-    window: scip.Window
+    window: protocol.Window
     echo: bytes
     text: bytes
     skip: int
@@ -220,7 +220,7 @@ class LidarMachine:
             if not scanning.remaining:
                 self.scanning, self.laser = None, False
         echo = scanning.echo + b"%02d" % scanning.remaining + scanning.text
-        return scip.reply(echo, "99", self._lines(scanning.window, turn))
+        return protocol.reply(echo, "99", self._lines(scanning.window, turn))
 
     def answer(self, request: bytes, now_ns: int) -> bytes:
         """The reply to one request, without its LF; empty while it boots."""
@@ -228,25 +228,25 @@ class LidarMachine:
             return b""
         body, _, text = request.partition(b";")
         if self.scip_1:
-            self.scip_1 = body != scip.SCIP_2
+            self.scip_1 = body != protocol.SCIP_2
             return request + (b"\nE\n\n" if self.scip_1 else b"\n0\n\n")
         if len(text) > 16:
-            return scip.reply(request, "0G")
+            return protocol.reply(request, "0G")
         if body == b"TM1" and self._adjusting:
-            return scip.reply(request, "00", [scip.summed(scip.encode([self.quartz.ms(now_ns)], 4))])
+            return protocol.reply(request, "00", [protocol.summed(protocol.encode([self.quartz.ms(now_ns)], 4))])
         if body[:2] == b"TM":
-            return scip.reply(request, self._adjust(body))
+            return protocol.reply(request, self._adjust(body))
         if self._adjusting:
-            return scip.reply(request, "0E")
+            return protocol.reply(request, "0E")
         if match := _SCAN.fullmatch(body):
             return self._scan_request(request, match, now_ns)
         information = {b"VV": self._version, b"PP": self._parameters, b"II": self._state}.get(body)
         if information is not None:
-            return scip.reply(request, "00", scip.text_lines(information(now_ns)))
+            return protocol.reply(request, "00", protocol.text_lines(information(now_ns)))
         if body == b"%ST":
             state = b"004" if self.scanning else b"003" if self.laser else b"000"
-            return scip.reply(request, "00", [scip.summed(state)])
-        return scip.reply(request, self._command(body, now_ns))
+            return protocol.reply(request, "00", [protocol.summed(state)])
+        return protocol.reply(request, self._command(body, now_ns))
 
     def _command(self, body: bytes, now_ns: int) -> str:
         """Status of the requests that have no other answer."""
@@ -283,16 +283,16 @@ class LidarMachine:
     def _scan_request(self, request: bytes, match: re.Match[bytes], now_ns: int) -> bytes:
         kind, letter, first, last, cluster, skip, count = match.groups()
         if (kind == b"M") != (count is not None):
-            return scip.reply(request, "0C" if kind == b"M" else "0D")
+            return protocol.reply(request, "0C" if kind == b"M" else "0D")
         if letter == b"E" and not self.identity.intensity:
-            return scip.reply(request, "0E")
+            return protocol.reply(request, "0E")
         if int(last) > self.identity.parameters.last_step:
-            return scip.reply(request, "04")
+            return protocol.reply(request, "04")
         if int(last) < int(first) or int(first) < self.identity.parameters.first_step:
-            return scip.reply(request, "05")
+            return protocol.reply(request, "05")
         if kind == b"G" and not self.laser:
-            return scip.reply(request, "10")
-        window = scip.Window(
+            return protocol.reply(request, "10")
+        window = protocol.Window(
             first_step=int(first),
             last_step=int(last),
             cluster=max(int(cluster), 1),
@@ -301,16 +301,16 @@ class LidarMachine:
         )
         began = (now_ns - self._zero_ns) / self.period_ns
         if kind == b"G":
-            return scip.reply(request, "00", self._lines(window, math.floor(began - self.arc_ns / self.period_ns)))
+            return protocol.reply(request, "00", self._lines(window, math.floor(began - self.arc_ns / self.period_ns)))
         self.laser = True
         body, semicolon, text = request.partition(b";")
         remaining = int(count)
         self.scanning = Scanning(
             window, body[:-2], semicolon + text, int(skip), remaining, remaining == 0, math.ceil(began)
         )
-        return scip.reply(request, "00")
+        return protocol.reply(request, "00")
 
-    def _lines(self, window: scip.Window, turn: int) -> list[bytes]:
+    def _lines(self, window: protocol.Window, turn: int) -> list[bytes]:
         """Measure a turn and write it down."""
         parameters = self.identity.parameters
         steps = np.arange(parameters.first_step, parameters.last_step + 1)
@@ -324,7 +324,7 @@ class LidarMachine:
             shown = np.clip(np.nan_to_num(intensity[begin : end : window.cluster]), 0, (1 << 18) - 1)
             value = np.stack([value, np.rint(shown).astype(np.int64)], axis=1).ravel()
         stamp_ns = self.turn_ns(turn) - round(parameters.since_stamp_s(0, self.stamp_at) * (1 + self.motor_error) * 1e9)
-        return scip.data_lines(self.quartz.ms(stamp_ns), scip.encode(value.tolist(), window.characters))
+        return protocol.data_lines(self.quartz.ms(stamp_ns), protocol.encode(value.tolist(), window.characters))
 
     def _numbers(self, range_m: Floats) -> Times:
         """Whole millimetres, and the model's numbers for what is none."""

@@ -12,9 +12,9 @@ import numpy as np
 
 from design import frames
 from design.angles import AngleSet
-from design.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import Lidar, load_catalogue
 from design.errors import SceneError
-from design.scene import Scene, cast, load_scene, scene_of
+from design.scene.ray_caster import Scene, cast, load_scene, scene_of
 from firmware_io.ports import Ports
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.lidar import LidarTwin

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from design.errors import DeviceError
-from firmware_io.registers import TABLES, ControlTable
+from firmware_io.servo.dynamixel.registers import TABLES, ControlTable
 from firmware_io.twins.dynamics import Axis, Drive, Load, plant_of
 from firmware_io.twins.servo_memory import ACCESS, ITEMS, RANGE, Memory
 from firmware_io.twins.servo_packets import BROADCAST, Request

@@ -13,9 +13,9 @@ import numpy as np
 import trimesh
 
 from design.angles import AngleSet
-from design.catalogue import Lidar
+from design.catalogue.catalogue import Lidar
 from design.frames import Array
-from design.scene import Hits, Scene, cast
+from design.scene.ray_caster import Hits, Scene, cast
 from firmware_io.samples import Floats, Times
 
 

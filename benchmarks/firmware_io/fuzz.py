@@ -1,0 +1,174 @@
+"""Damaged replies through both codecs: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED]`.
+
+STREAMS (default 1,000,000) dialogues of a lidar, and a third as many answers of a servo in both protocols, each with a
+few flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed errors, whatever
+is accepted must have right sums, told by loops of this file, and nothing may hang. Anything else ends the run.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from unittest.mock import patch
+
+from design.errors import DeviceError, ProtocolError
+from firmware_io.lidar.scip import parameters, protocol
+from firmware_io.servo.dynamixel import bus, port
+from firmware_io.servo.dynamixel.bus import ServoBus
+from firmware_io.servo.dynamixel.registers import Register
+from firmware_io.twins.servo_packets import status
+
+_SCIP_SCRAPS = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
+_SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
+_BLOCK = Register(36, 8)
+
+
+def damaged(rng: random.Random, stream: bytes, scraps: list[bytes], accidents: int, longest: int) -> bytes:
+    """The stream after some accidents, each to so many bytes at the most."""
+    data = bytearray(stream)
+    for _ in range(rng.randint(1, accidents)):
+        at, run = rng.randrange(len(data) + 1), rng.randint(1, longest)
+        match rng.randrange(7):
+            case 0 if at < len(data):
+                data[at] ^= 1 << rng.randrange(8)
+            case 1:
+                del data[at : at + run]
+            case 2:
+                data[at:at] = data[at : at + run]
+            case 3:
+                data[at:at] = rng.randbytes(run)
+            case 4:
+                data[at : at + run] = rng.choice(scraps)
+            case 5:
+                del data[at:]
+            case _:
+                other = rng.randrange(len(data) + 1)
+                data[at : at + run], data[other : other + run] = data[other : other + run], data[at : at + run]
+    return bytes(data)
+
+
+def dialogue(rng: random.Random) -> bytes:
+    """What a sensor says: who it is, its time, and scans of several kinds with values of their own."""
+    pp = [("MODL", "URG-04LX(H)"), ("DMIN", "20"), ("DMAX", "5600"), ("ARES", "1024"), ("AMIN", "44")]
+    pp += [("AMAX", "725"), ("AFRT", "384"), ("SCAN", "600")]
+    said = protocol.reply(b"VV", "00", protocol.text_lines([("VEND", "Hokuyo"), ("SERI", "H07")]))
+    said += protocol.reply(b"PP", "00", protocol.text_lines(pp))
+    said += protocol.reply(b"TM1", "00", [protocol.summed(protocol.encode([rng.randrange(1 << 24)], 4))])
+    for intensity in (False, True, False):
+        window = protocol.Window(first_step=3, last_step=3 + rng.randrange(40), intensity=intensity)
+        values = [rng.randrange(1 << 18) for _ in range(window.size * (1 + intensity))]
+        lines = protocol.data_lines(rng.randrange(1 << 24), protocol.encode(values, 3))
+        said += protocol.reply(protocol.continuous(window, count=1), "99", lines)
+    return said
+
+
+def survive(stream: bytes) -> tuple[int, int]:
+    """Feed a stream in two pieces; scans accepted, and replies refused. Fails where one has no right to be there."""
+    splitter, middle, accepted, refused = protocol.Splitter(), len(stream) // 2, 0, 0
+    for told in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
+        for line in told.lines:
+            total = 0
+            for byte in line:
+                total += byte
+            assert line + bytes([total % 64 + 48]) in stream or line + b";" in stream, "accepted with a wrong sum"
+        for read in (protocol.information, protocol.measurement, protocol.stamp):
+            try:
+                taken = read(told)
+                if isinstance(taken, dict):
+                    parameters.parameters(taken)
+                elif isinstance(taken, protocol.Measurement):
+                    accepted += 1
+                    assert taken.value.size == taken.window.size, "a scan of another size than its echo says"
+            except ProtocolError:
+                refused += 1
+    return accepted, refused + splitter.bad
+
+
+class Wire:
+    """What a serial port is to the bus; `answer` is what comes back for any request."""
+
+    def __init__(self) -> None:
+        self.answer, self._pending = b"", b""
+        self.baudrate, self.is_open, self.timeout = 4_000_000, True, None
+
+    def write(self, data: bytes) -> int:
+        """Keep the answer ready; the byte that looks for an echo gets none."""
+        self._pending += b"" if data == b"\0" else self.answer
+        return len(data)
+
+    def read(self, length: int) -> bytes:
+        """Some of it."""
+        taken, self._pending = self._pending[:length], self._pending[length:]
+        return taken
+
+    def reset_input_buffer(self) -> None:
+        """Drop what was not read."""
+        self._pending = b""
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+def lidar(streams: int, seed: int) -> None:
+    """Damage dialogues, and print what became of them."""
+    rng, accepted, refused, slowest_s = random.Random(seed), 0, 0, 0.0
+    began_s = time.perf_counter()
+    for k in range(streams):
+        stream = damaged(rng, dialogue(rng), _SCIP_SCRAPS, 4, 70)
+        fed_s = time.perf_counter()
+        try:
+            good, bad = survive(stream)
+        except BaseException:
+            print(f"lidar stream {k} of seed {seed}: {stream!r}")
+            raise
+        slowest_s = max(slowest_s, time.perf_counter() - fed_s)
+        accepted, refused = accepted + good, refused + bad
+    print(
+        f"{streams:,} damaged dialogues of a lidar: {accepted:,} scans accepted, all with right sums; {refused:,} "
+        f"replies refused with a typed error; slowest {1e3 * slowest_s:.0f} ms; {time.perf_counter() - began_s:.0f} s"
+    )
+
+
+def servo(answers: int, seed: int) -> None:
+    """Damage answers to one read of a block, and print what became of them."""
+    rng, wire = random.Random(seed), Wire()
+    with (
+        patch("firmware_io.servo.dynamixel.port.serial.Serial", lambda *_, **__: wire),
+        patch.object(port.Line, "wait_s", 0.0002),
+        patch.object(bus, "_TRIES", 1),
+    ):
+        buses = {protocol: ServoBus("wire", protocol=protocol) for protocol in (1.0, 2.0)}
+        accepted, slowest_s, began_s = 0, 0.0, time.perf_counter()
+        for k in range(answers):
+            protocol = rng.choice((1.0, 2.0))
+            data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(_BLOCK.size))
+            wire.answer = damaged(rng, status(protocol, 1, 0, data), _SERVO_SCRAPS, 2, 4)
+            asked_s = time.perf_counter()
+            try:
+                answer = buses[protocol].read(1, _BLOCK)
+                accepted += 1
+                whole = (status(protocol, 1, error, answer.data) for error in range(256))
+                assert any(packet in wire.answer for packet in whole), "accepted with a wrong sum"
+            except DeviceError:
+                pass
+            except BaseException:
+                print(f"servo answer {k} of seed {seed}: {wire.answer!r}")
+                raise
+            slowest_s = max(slowest_s, time.perf_counter() - asked_s)
+    print(
+        f"{answers:,} damaged answers of a servo: {accepted:,} accepted, all with right sums; {answers - accepted:,} "
+        f"refused with a typed error; slowest {1e3 * slowest_s:.0f} ms; {time.perf_counter() - began_s:.0f} s"
+    )
+
+
+def main() -> None:
+    """Both."""
+    streams = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    lidar(streams, seed)
+    servo(streams // 3, seed)
+
+
+if __name__ == "__main__":
+    main()

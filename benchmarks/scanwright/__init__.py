@@ -1,0 +1,1 @@
+"""Benchmarks of the pages and the studies, and the pictures of the documentation."""

@@ -1,0 +1,90 @@
+"""Invented work: a study of candidates that take a fixed time, or none, and whose numbers come from their records."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from design.task.task import Limits, LoadedTask, load_task
+from scanwright.study.answer.columns import tidy
+from scanwright.study.answer.write import write_answer
+from scanwright.study.candidate import digest
+from scanwright.study.crossing import Crossing
+from scanwright.study.runner.cluster import cluster
+from scanwright.study.runner.store import Result, open_store
+from scanwright.study.session import Session
+from scanwright.study.study import LoadedStudy, Mounting, Study
+
+LOOPS_PER_S = 28_000_000  # of the loop below, roughly: work of a fixed size, not of a fixed time
+
+
+def spin(seconds: float) -> int:
+    """A fixed amount of work on one core."""
+    total = 0
+    for i in range(int(seconds * LOOPS_PER_S)):
+        total ^= i
+    return total
+
+
+def die(after_s: float) -> None:
+    """End the process as a crash does, once it has been at work for a while."""
+    time.sleep(after_s)
+    os._exit(1)
+
+
+def invented_search(loaded: LoadedTask) -> Result:
+    """A search that costs nothing; its bound comes from the record."""
+    period_s = loaded.task.motion.duration_s
+    motion = loaded.task.motion.model_dump(mode="json")
+    bounds = {"J": -math.log(period_s) - _dice(loaded, 0), "period_s": period_s}
+    return {"status": "found", "motion": motion, "standard_J": 0.0, "families": [], "bounds": bounds}
+
+
+def invented_judge(loaded: LoadedTask, found: Result, seconds: float = 0.0, ledger: str = "") -> Result:
+    """A candidate of so much work, a little worse than its bound; a line in the ledger when it is done."""
+    spin(seconds)
+    if ledger:
+        with Path(ledger).open("a") as file:
+            file.write(f"{digest(loaded)}\n")
+    values: dict[str, Any] = {"J": found["bounds"]["J"] + _dice(loaded, 1), "period_s": loaded.task.motion.duration_s}
+    values = {name: tidy(value) for name, value in values.items()}
+    return {"status": "built", "angles_deg": [0.0] * 4, "J_error": 0.0, "values": values, "weakest": ""}
+
+
+def _dice(loaded: LoadedTask, throw: int) -> float:
+    """A number between 0 and 0.1 that the record decides."""
+    return int(digest(loaded)[6 * throw : 6 * throw + 6], 16) / 2**24 / 10
+
+
+def invented_study(units: int, mountings: int = 1, front: tuple[str, ...] = ("J", "period_s")) -> LoadedStudy:
+    """One task at so many periods, in so many mountings that share their searches."""
+    limits = [Limits(max_blocked=(i + 1) / mountings) for i in range(mountings)]
+    study = Study(
+        name="invented",
+        tasks=("pitching",),
+        periods_s=tuple(round(2.0 + 500.0 * i * mountings / units, 6) for i in range(units // mountings)),
+        mounting=tuple(Mounting(name=f"m{i}", limits=limit) for i, limit in enumerate(limits)),
+        front=front,
+        winners=0,
+        time_limit_s=60,
+    )
+    task = load_task(Path("pitching"))
+    return LoadedStudy(study, Path("invented.toml"), (task,), task.products)
+
+
+def run_invented(
+    folder: Path, scheduler: str | None, units: int, seconds: float, processes: int | None = None
+) -> float:
+    """Run an invented study into a folder; the time of its work."""
+    judge = partial(invented_judge, seconds=seconds, ledger=str(folder / "ledger"))
+    session = Session(Crossing(invented_study(units)), open_store(folder / "results"), judge, invented_search)
+    with cluster(scheduler, processes) as client:
+        start = time.monotonic()
+        session.run(client, lambda _: None)
+        took = time.monotonic() - start
+    write_answer(session, folder)
+    return took

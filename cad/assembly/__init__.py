@@ -1,0 +1,1 @@
+"""All parts of one scanner together: bodies, joints, masses, what they hide."""

@@ -1,0 +1,151 @@
+"""What the parts hide of the fan: rays against their meshes, and the closed form that bounds it from below.
+
+A beam is a bundle: its middle and BEAM_RAYS around it, on the rim of what the laser sends out, which widens with the
+distance. A beam counts as hidden if any of the bundle is: what is cut partly answers partly from the own body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cad.drives.drive import drive_of
+from cad.layout.head import Head
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+from design.scene import ray_caster
+from design.shadow import AXIS_STEPS, Mask, Refused, Shadow
+
+if TYPE_CHECKING:
+    from cad.assembly.assembly import Assembly
+    from cad.geometry.mesh import Mesh
+
+APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
+SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
+BEAM_RAYS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class PartsWorkshop:
+    """The `Workshop` of `design/shadow.py` for one set of products: `scanner.angles` are replaced by each setting."""
+
+    scanner: Scanner
+    _made: dict[str, Assembly] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def bound(self, setting_rad: Array) -> Shadow | Refused:
+        """The cone that ring, bearing and cage fill in any case."""
+        try:
+            stack = drive_of(at_setting(self.scanner, setting_rad)).stack
+        except BuildError as error:
+            return Refused(str(error))
+        bearings = self.scanner.lidar.bearings_rad()
+        return Shadow(beams_in_cone(stack, bearings), None)
+
+    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+        """From the solids of that setting."""
+        scanner = at_setting(self.scanner, setting_rad)
+        try:
+            assembly = self.assembly(scanner)
+        except BuildError as error:
+            return Refused(str(error))
+        return shadow_of(scanner, triangles_of(assembly.outlines()))
+
+    def assembly(self, scanner: Scanner) -> Assembly:
+        """Parts of these products at the angles of `scanner`; those that were made for a shadow are kept.
+
+        Raises:
+            BuildError: a part cannot be made.
+        """
+        from cad.assembly.assembly import make_parts
+        from cad.files.parts import config_hash
+
+        key = f"{config_hash(scanner)} {scanner.angles.t_rot_laser_mm}"
+        if key not in self._made:
+            self._made[key] = make_parts(scanner)
+        return self._made[key]
+
+
+def triangles_of(meshes: Mapping[str, Mesh]) -> dict[str, Array]:
+    """Corners [m] of every part that stops a beam, shape (t, 3, 3): all but the lidar's window."""
+    return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in meshes.items() if name != "lidar_window"}
+
+
+def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array]) -> Shadow:
+    """What the parts of one scanner hide.
+
+    Args:
+        scanner: angles and lidar.
+        triangles_m: of `triangles_of` every part, made and bought, rotation frame at gamma = 0.
+    """
+    from cad.assembly.assembly import turns
+
+    by_motion: dict[bool, list[Array]] = {True: [], False: []}
+    for name, triangles in triangles_m.items():
+        by_motion[turns(name)].append(triangles)
+    origins, directions = bundles(scanner)
+    rotor = _hidden(ray_caster.scene_of(np.concatenate(by_motion[True])), origins, directions)
+    return Shadow(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
+
+
+def bundles(scanner: Scanner) -> tuple[Array, Array]:
+    """Starts [m] and directions of the rays of every beam in the rotation frame at gamma = 0, shape (B, rays, 3)."""
+    bearings = scanner.lidar.bearings_rad()
+    R = scanner.angles.R_rot_laser()
+    along = np.stack([np.cos(bearings), np.sin(bearings), np.zeros_like(bearings)], axis=1) @ R.T
+    across = np.stack([-np.sin(bearings), np.cos(bearings), np.zeros_like(bearings)], axis=1) @ R.T
+    turn = 2 * np.pi * np.arange(BEAM_RAYS) / BEAM_RAYS
+    rim = np.cos(turn)[None, :, None] * across[:, None, :] + np.sin(turn)[None, :, None] * R[:, 2]
+    off = np.concatenate([np.zeros((len(bearings), 1, 3)), rim], axis=1)
+    directions = along[:, None, :] + math.tan(SPREAD_RAD) * off
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    return APERTURE_M * off + scanner.angles.T_rot_laser()[:3, 3], directions
+
+
+def beams_in_cone(stack: Head, bearings_rad: Array) -> Mask:
+    """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
+    q = stack.R()[2]
+    down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))
+    return np.asarray(down > math.cos(stack.sure_half_angle))
+
+
+def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:
+    """Rays that keep farther from -z than all that stands still can never meet it: only the others are cast."""
+    corners = triangles_m.reshape(-1, 3)
+    reach = np.hypot(corners[:, 0], corners[:, 1])
+    widest = float(np.arctan2(reach, -corners[:, 2]).max())
+    nearest = float(np.linalg.norm(corners, axis=1).min())
+    margin = math.asin(min(1.0, float(np.linalg.norm(origins, axis=2).max()) / nearest))
+    polar = np.arccos(np.clip(-directions[:, :, 2], -1.0, 1.0)).min(axis=1)
+    near = np.flatnonzero(polar < widest + margin)
+    hidden = np.zeros((len(directions), AXIS_STEPS), bool)
+    solid = ray_caster.scene_of(triangles_m)
+    for k in range(AXIS_STEPS):
+        gamma = 2 * math.pi * k / AXIS_STEPS
+        c, s = math.cos(gamma), math.sin(gamma)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T
+        hidden[near, k] = _hidden(solid, origins[near] @ turn, directions[near] @ turn)
+    return hidden
+
+
+def _hidden(solid: ray_caster.Scene, origins: Array, directions: Array) -> Mask:
+    """Whether any ray of each bundle meets the solid, shape (B,)."""
+    hits = ray_caster.cast(solid, origins.reshape(-1, 3), directions.reshape(-1, 3))
+    return np.asarray(np.isfinite(hits.range_m).reshape(directions.shape[:2]).any(axis=1))
+
+
+def at_setting(scanner: Scanner, setting_rad: Array) -> Scanner:
+    """The scanner at another setting, its angles rounded as those that parts are built from."""
+    names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    given = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}
+    angles = scanner.angles.model_copy(
+        update={
+            "angles_deg": scanner.angles.angles_deg.model_copy(update=given),
+            "t_world_rot_mm": (0.0, 0.0, 0.0),
+        }
+    )
+    return replace(scanner, angles=angles)

@@ -1,0 +1,194 @@
+"""Binary glTF 2.0 from canonical meshes: metres, a tree of named nodes, the same bytes for the same scene.
+
+glTF is y-up and the project z-up: the tree hangs under one node that turns z to y, so every pose below it is the
+project's own. Normals are those of the surface: round where it is round, sharp at its edges.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cad.geometry.mesh import Mesh
+from design.frames import Array
+
+FLOAT, UINT16, UINT32 = 5126, 5123, 5125
+VERTICES, INDICES = 34962, 34963
+Z_TO_Y = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]  # quaternion of a quarter turn about -x
+CREASE_RAD = np.radians(25.0)  # faces that meet at more have an edge between them; facets of a round meet at 0.1 rad
+NORMAL_DECIMALS = 4
+QUARTERS = 4  # of a turn: linear interpolation of quaternions is exact between them at constant speed
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One frame or body of the scene.
+
+    Attributes:
+        name: unique.
+        parent: name of the node that it hangs under; empty for the root.
+        T_parent_node: its pose [m], shape (4, 4).
+        mesh: in the frame of the node [mm]; None for a bare frame.
+        colour: sRGB, 0 to 1.
+        metal: whether the surface is bare metal.
+    """
+
+    name: str
+    parent: str
+    T_parent_node: Array
+    mesh: Mesh | None = None
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    metal: bool = False
+
+
+def glb_bytes(nodes: list[Node], extras: dict[str, Any], spin: tuple[str, float] | None = None) -> bytes:
+    """The file of a scene.
+
+    Args:
+        nodes: parents before children; the first one is the root.
+        extras: facts for programs, kept under `asset.extras`.
+        spin: name of a node that turns about its z, counter-clockwise, and the seconds of one turn.
+    """
+    index = {node.name: i + 1 for i, node in enumerate(nodes)}
+    children: dict[str, list[int]] = {}
+    for node in nodes[1:]:
+        children.setdefault(node.parent, []).append(index[node.name])
+    buffer = _Buffer()
+    materials: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = [{"name": "y_up", "rotation": Z_TO_Y, "children": [1]}]
+    for node in nodes:
+        entry: dict[str, Any] = {"name": node.name}
+        if not np.array_equal(node.T_parent_node, np.eye(4)):
+            entry["matrix"] = (np.round(node.T_parent_node, 12).T + 0.0).ravel().tolist()
+        if node.mesh is not None:
+            material = _material(node)
+            if material not in materials:
+                materials.append(material)
+            meshes.append({"name": node.name, "primitives": [_primitive(buffer, node.mesh, materials.index(material))]})
+            entry["mesh"] = len(meshes) - 1
+        if node.name in children:
+            entry["children"] = children[node.name]
+        entries.append(entry)
+    scene = {
+        "asset": {"version": "2.0", "generator": "scanwright", "extras": extras},
+        "scene": 0,
+        "scenes": [{"name": nodes[0].name, "nodes": [0]}],
+        "nodes": entries,
+        "meshes": meshes,
+        "materials": materials,
+    }
+    if spin is not None:
+        scene["animations"] = [_turning(buffer, index[spin[0]], spin[1])]
+    scene |= {
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
+    }
+    text = json.dumps(scene, separators=(",", ":")).encode("ascii")
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(buffer.data), b"BIN\0") + bytes(buffer.data)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+class _Buffer:
+    """The binary chunk while it grows: everything in it starts at a multiple of four bytes."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: Array, kind: str, component: int, target: int | None = None, **facts: Any) -> int:
+        content = values.tobytes()
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
+        if target is not None:
+            view["target"] = target
+        self.data += content + b"\0" * (-len(content) % 4)
+        self.views.append(view)
+        count = len(values)
+        self.accessors.append(
+            {"bufferView": len(self.views) - 1, "componentType": component, "count": count, "type": kind, **facts}
+        )
+        return len(self.accessors) - 1
+
+
+def _primitive(buffer: _Buffer, mesh: Mesh, material: int) -> dict[str, Any]:
+    vertices, normals, corners = shaded(mesh)
+    points = (vertices / 1000).astype("<f4")
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    position = buffer.add(points, "VEC3", FLOAT, VERTICES, min=low, max=high)
+    normal = buffer.add(normals.astype("<f4"), "VEC3", FLOAT, VERTICES)
+    short = len(points) < 2**16 - 1
+    indices = buffer.add(corners.astype("<u2" if short else "<u4"), "SCALAR", UINT16 if short else UINT32, INDICES)
+    return {"attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material}
+
+
+def shaded(mesh: Mesh) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
+
+    A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of
+    the faces about it that have no edge towards this one, each as wide as its corner.
+    """
+    corners = mesh.vertices[mesh.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(cross, axis=1)
+    normal = cross / np.maximum(length, 1e-300)[:, None]
+    vertex = mesh.faces.ravel()
+    one, other = _about_one_vertex(vertex)
+    alike = np.einsum("ij,ij->i", normal[one // 3], normal[other // 3]) > np.cos(CREASE_RAD)
+    alike |= length[one // 3] == 0  # a sliver has no normal of its own
+    weight = np.where(alike, _widths(corners).ravel()[other], 0.0)
+    mean = np.stack([np.bincount(one, weight * normal[other // 3, k], len(vertex)) for k in range(3)], axis=1)
+    unit = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    keys = np.column_stack([vertex, np.round(unit, NORMAL_DECIMALS) + 0.0])
+    distinct, number = np.unique(keys, axis=0, return_inverse=True)
+    return mesh.vertices[distinct[:, 0].astype(int)], distinct[:, 1:], number.ravel()
+
+
+def _about_one_vertex(vertex: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs of corners, a corner with itself included, that are at the same vertex."""
+    order = np.argsort(vertex, kind="stable")
+    counts = np.bincount(vertex)
+    first = np.cumsum(counts) - counts
+    partners = counts[vertex]
+    one = np.repeat(np.arange(len(vertex)), partners)
+    turn = np.arange(len(one)) - np.repeat(np.cumsum(partners) - partners, partners)
+    return one, order[first[vertex[one]] + turn]
+
+
+def _widths(corners: Array) -> Array:
+    """Angles of triangles (m, 3, 3) at their corners [rad], shape (m, 3)."""
+    forth = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(corners, 1, axis=1) - corners
+    across = np.linalg.norm(np.cross(forth, back), axis=2)
+    return np.arctan2(across, np.einsum("mij,mij->mi", forth, back))
+
+
+def _material(node: Node) -> dict[str, Any]:
+    """Colours of the format are linear, ours are sRGB."""
+    linear = [round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 4) for c in node.colour]
+    metal, rough = (0.9, 0.35) if node.metal else (0.0, 0.7)
+    return {
+        "pbrMetallicRoughness": {"baseColorFactor": [*linear, 1.0], "metallicFactor": metal, "roughnessFactor": rough}
+    }
+
+
+def _turning(buffer: _Buffer, node: int, period_s: float) -> dict[str, Any]:
+    quarter = np.arange(QUARTERS + 1)
+    times = (quarter * period_s / QUARTERS).astype("<f4")
+    half_turn = quarter * np.pi / QUARTERS
+    zero = np.zeros(QUARTERS + 1)
+    turns = np.round(np.stack([zero, zero, np.sin(half_turn), np.cos(half_turn)], axis=1), 9).astype(
+        "<f4"
+    ) + np.float32(0)
+    when = buffer.add(times, "SCALAR", FLOAT, min=[float(times[0])], max=[float(times[-1])])
+    sampler = {"input": when, "output": buffer.add(turns, "VEC4", FLOAT), "interpolation": "LINEAR"}
+    channel = {"sampler": 0, "target": {"node": node, "path": "rotation"}}
+    return {"name": "spin", "samplers": [sampler], "channels": [channel]}

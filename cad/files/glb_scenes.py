@@ -1,0 +1,118 @@
+"""The scanner to look at: `assembly.glb` in the tree of its frames, and `exploded.glb` pulled apart in build order.
+
+    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body hangs under the frame it moves with.
+
+Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate leave
+the linkage along the lidar's z, as they are put in, a counterweight along its radius.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from cad.assembly.assembly import Assembly, colour_of, turns
+from cad.files.glb import Node, glb_bytes
+from cad.geometry.mesh import Mesh
+from cad.layout.balance import PART as COUNTERWEIGHT
+from cad.layout.balance import Counterweight
+from design.frames import Array
+from design.scanner import Scanner
+
+GAP_MM = 15.0  # between the products of the exploded view
+ALONG_LIDAR = ("sub_plate", "lidar")  # what leaves the linkage along the lidar's z, in this order
+
+
+def frame_of(body: str, assembly: Assembly) -> str:
+    """Which frame a body moves with: servo, rot or laser."""
+    if body in assembly.bought and body.startswith("lidar_"):
+        return "laser"
+    return "rot" if turns(body) else "servo"
+
+
+def product_of(body: str, assembly: Assembly) -> str:
+    """The thing that one holds in the hand: a made part, or the bought product that several bodies draw."""
+    return body if body in assembly.made else body.split("_")[0]
+
+
+def scene_files(
+    scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str, metal: set[str]
+) -> dict[str, bytes]:
+    """Both files.
+
+    Args:
+        scanner: angles and products.
+        assembly: the solids.
+        meshes: of the made parts, rotation frame; the bought ones are meshed here.
+        config_hash: of what shapes the parts.
+        metal: parts of bare metal.
+    """
+    T = scanner.angles.T_rot_laser()
+    nodes = [
+        Node("world", "", np.eye(4)),
+        Node("servo", "world", scanner.angles.T_world_rot(0.0)),
+        Node("rot", "servo", np.eye(4)),
+        Node("laser", "rot", T),
+    ]
+    for name in (*assembly.made, *assembly.bought):
+        frame = frame_of(name, assembly)
+        mesh = meshes[name] if name in meshes else assembly.mesh(name)
+        if frame == "laser":
+            mesh = Mesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
+        nodes.append(Node(name, frame, np.eye(4), mesh, colour_of(name), name in metal))
+    motion = scanner.angles.motion
+    spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None
+    extras = {"task": scanner.angles.task, "config": config_hash, "unit": "m"}
+    return {
+        "assembly.glb": glb_bytes(nodes, extras, spin),
+        "exploded.glb": glb_bytes(_exploded(nodes, assembly, T), extras),
+    }
+
+
+def _exploded(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> list[Node]:
+    lifts = _lifts(nodes, assembly, T_rot_laser)
+    to_rot = {"servo": np.eye(3), "rot": np.eye(3), "laser": T_rot_laser[:3, :3]}
+    moved = []
+    for node in nodes:
+        if node.mesh is not None:
+            shifted = np.eye(4)
+            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[product_of(node.name, assembly)] / 1000, 9) + 0.0
+            node = replace(node, T_parent_node=shifted)
+        moved.append(node)
+    return moved
+
+
+def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[str, Array]:
+    """How far each product is moved in the exploded view, in the rotation frame [mm]."""
+    clouds: dict[str, list[Array]] = {}
+    for node in nodes:
+        if node.mesh is not None:
+            cloud = node.mesh.vertices
+            if node.parent == "laser":
+                cloud = cloud @ T_rot_laser[:3, :3].T + T_rot_laser[:3, 3] * 1000
+            clouds.setdefault(product_of(node.name, assembly), []).append(cloud)
+    points = {product: np.concatenate(parts) for product, parts in clouds.items()}
+    axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
+    lifts: dict[str, Array] = {}
+    top = -np.inf
+    for product in sorted(points.keys() - {*ALONG_LIDAR, COUNTERWEIGHT}, key=assembly.drive.stacked().index):
+        low, high = float(points[product][:, 2].min()), float(points[product][:, 2].max())
+        lift = max(0.0, top + GAP_MM - low)
+        lifts[product] = lift * axis
+        top = high + lift
+    top = float((points["alignment_linkage"] @ out).max())
+    bar = assembly.counterweight
+    if COUNTERWEIGHT in points and isinstance(bar, Counterweight):
+        away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
+        shift = (bar.ear.end - bar.start + GAP_MM) * away
+        lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + shift
+        top = max(top, float(((points[COUNTERWEIGHT] + shift) @ out).max()))
+    for product in ALONG_LIDAR:
+        if product in points:
+            heights = points[product] @ out
+            lift = top + GAP_MM - float(heights.min())
+            lifts[product] = lifts["alignment_linkage"] + lift * out
+            top = float(heights.max()) + lift
+    return lifts

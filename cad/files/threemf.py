@@ -1,0 +1,68 @@
+"""3MF of one part as it lies on the bed: core specification, millimetres, the same bytes for the same mesh.
+
+The entries are stored, not deflated, with the zip format's first date: what a compressor makes of them depends on its
+version.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from xml.sax.saxutils import escape, quoteattr
+
+from cad.geometry.mesh import Mesh
+
+FIRST_DATE = (1980, 1, 1, 0, 0, 0)
+
+CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>
+"""
+RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="rel0" Target="/3D/3dmodel.model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>
+"""
+
+
+def threemf_bytes(mesh: Mesh, part: str, description: str) -> bytes:
+    """The file of one part; `mesh` is in the frame of the bed, `description` says what it was made from."""
+    model = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',
+        f'<metadata name="Title">{escape(part)}</metadata>',
+        '<metadata name="Application">scanwright</metadata>',
+        f'<metadata name="Description">{escape(description)}</metadata>',
+        "<resources>",
+        f'<object id="1" type="model" name={quoteattr(part)}>',
+        "<mesh>",
+        "<vertices>",
+        *(f'<vertex x="{x:.5f}" y="{y:.5f}" z="{z:.5f}"/>' for x, y, z in mesh.vertices.tolist()),
+        "</vertices>",
+        "<triangles>",
+        *(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist()),
+        "</triangles>",
+        "</mesh>",
+        "</object>",
+        "</resources>",
+        "<build>",
+        '<item objectid="1"/>',
+        "</build>",
+        "</model>",
+        "",
+    ]
+    entries = {
+        "[Content_Types].xml": CONTENT_TYPES,
+        "_rels/.rels": RELATIONSHIPS,
+        "3D/3dmodel.model": "\n".join(model),
+    }
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as package:
+        for name, text in entries.items():
+            entry = zipfile.ZipInfo(name, date_time=FIRST_DATE)
+            entry.create_system = 3  # else it names the platform that wrote it
+            entry.external_attr = 0o644 << 16
+            package.writestr(entry, text.encode("utf-8"))
+    return file.getvalue()

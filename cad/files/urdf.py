@@ -1,0 +1,132 @@
+"""`scanner.urdf`: the frame chain world - servo - spin_joint - rot - laser with meshes, masses and inertias.
+
+    world --fixed--> servo --spin_joint, about z--> rot --fixed--> laser
+
+The origins of `servo` and `rot` are the optical centre and they coincide at joint position 0, so every mesh, made in
+the rotation frame, has the identity for its pose. Transforms are the angle set's own. SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from cad.drives.drive import Drive
+from cad.geometry.inertia import Inertial
+from design.frames import Array
+from design.scanner import Scanner
+
+
+def urdf_text(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
+    """The text of `scanner.urdf`.
+
+    Args:
+        scanner: angles and products.
+        drive: the layout that the parts were made with.
+        bodies: mass properties of the links servo, rot (rotation frame) and laser (laser frame).
+        meshes: names of the parts whose STL files belong to the links servo and rot.
+    """
+    angles, servo = scanner.angles, scanner.servo
+    lines = [
+        '<?xml version="1.0"?>',
+        f"<robot name={quoteattr(angles.task)}>",
+        '  <link name="world"/>',
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *_standing_shapes(drive)]),
+        *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
+        *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
+        *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
+        *_joint("spin_joint", "continuous", "servo", "rot", np.eye(4))[:-1],
+        '    <axis xyz="0 0 1"/>',
+        f'    <limit effort="{servo.stall_torque_nm:g}" velocity="{servo.no_load_rpm * math.pi / 30:.6g}"/>',
+        "  </joint>",
+        *_joint("laser_mount", "fixed", "rot", "laser", angles.T_rot_laser()),
+        "</robot>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
+    """URDF's fixed-axis angles: R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 where the pitch is +-90 deg."""
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], level)
+    if level < 1e-9:
+        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+
+
+def _joint(name: str, kind: str, parent: str, child: str, T: Array) -> list[str]:
+    return [
+        f'  <joint name="{name}" type="{kind}">',
+        f'    <parent link="{parent}"/>',
+        f'    <child link="{child}"/>',
+        f'    <origin xyz="{_row(T[:3, 3])}" rpy="{_row(roll_pitch_yaw(T[:3, :3]))}"/>',
+        "  </joint>",
+    ]
+
+
+def _link(name: str, body: Inertial, shapes: list[tuple[str, str]]) -> list[str]:
+    J = body.inertia_kg_m2
+    terms = {"ixx": J[0, 0], "ixy": J[0, 1], "ixz": J[0, 2], "iyy": J[1, 1], "iyz": J[1, 2], "izz": J[2, 2]}
+    lines = [
+        f'  <link name="{name}">',
+        "    <inertial>",
+        f'      <origin xyz="{_row(body.centre_m, 9)}" rpy="0 0 0"/>',
+        f'      <mass value="{body.mass_kg:.6f}"/>',
+        "      <inertia " + " ".join(f'{key}="{value + 0.0:.6e}"' for key, value in terms.items()) + "/>",
+        "    </inertial>",
+    ]
+    for kind in ("visual", "collision"):
+        for origin, geometry in shapes:
+            lines += [f"    <{kind}>", f"      {origin}", f"      <geometry>{geometry}</geometry>", f"    </{kind}>"]
+    return [*lines, "  </link>"]
+
+
+def _meshes(parts: list[str]) -> list[tuple[str, str]]:
+    return [
+        (_origin((0.0, 0.0, 0.0)), f'<mesh filename="parts/{part}.stl" scale="0.001 0.001 0.001"/>') for part in parts
+    ]
+
+
+def _standing_shapes(drive: Drive) -> list[tuple[str, str]]:
+    shapes = []
+    for centre, size in drive.shapes():
+        shape = _box(size) if len(size) == 3 else _cylinder(*size)
+        shapes.append((_origin(np.array(centre) / 1000), shape))
+    return shapes
+
+
+def _lidar_shapes(scanner: Scanner) -> list[tuple[str, str]]:
+    """Base and head of the lidar in the laser frame, whose origin is the optical centre."""
+    lidar = scanner.lidar
+    x, y, height = lidar.body_mm
+    low, high = lidar.window_z_mm
+    return [
+        (_origin((0.0, 0.0, (low / 2 - lidar.optical_height_mm) / 1000)), _box((x, y, low))),
+        (
+            _origin((0.0, 0.0, ((low + high) / 2 - lidar.optical_height_mm) / 1000)),
+            _cylinder(lidar.window_radius_mm, high - low),
+        ),
+        (
+            _origin((0.0, 0.0, ((high + height) / 2 - lidar.optical_height_mm) / 1000)),
+            _cylinder(min(x, y) / 2 - 1.5, height - high),
+        ),
+    ]
+
+
+def _origin(xyz: Sequence[float] | Array) -> str:
+    return f'<origin xyz="{_row(xyz)}" rpy="0 0 0"/>'
+
+
+def _box(size_mm: Sequence[float] | Array) -> str:
+    return f'<box size="{_row(np.asarray(size_mm) / 1000)}"/>'
+
+
+def _cylinder(radius_mm: float, length_mm: float) -> str:
+    return f'<cylinder radius="{radius_mm / 1000:.9g}" length="{length_mm / 1000:.9g}"/>'
+
+
+def _row(values: Sequence[float] | Array, decimals: int = 12) -> str:
+    return " ".join(f"{round(float(v), decimals) + 0.0:.{decimals + 2}g}" for v in values)

@@ -1,0 +1,1 @@
+"""Solids measured: meshes, holes, inertia, how a part lies on the bed."""

@@ -1,0 +1,161 @@
+"""How a part lies on the printer's bed: one rule, shared by the print files and the checks. Millimetres.
+
+Of all poses in which the part lies on one of its larger flats, those that fit the bed; of these the least support,
+counted as the volume of the columns from overhanging faces down to the bed; of equal ones (to a cubic centimetre) the
+larger contact, then the lower pose. A face overhangs where it leans more than 45 deg out of the vertical. About the
+vertical the part is turned so that its smallest rectangle lies along the bed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from cad.geometry.mesh import Mesh
+from design.frames import Array, rigid
+
+OVERHANG_RAD = math.radians(45.0)
+CONTACT_SHARE = 0.25  # of the largest flat on the hull: what is smaller holds badly
+FLAT = 1e-3  # mm, within which points count as one plane
+SUPPORT_STEP_MM3 = 1000.0  # poses closer than this print alike
+
+
+@dataclass(frozen=True, slots=True)
+class PrintPose:
+    """One part on the bed.
+
+    Attributes:
+        T_bed_part: maps the part's frame to the bed's: origin in a corner of the bed, z up, shape (4, 4).
+        size_mm: box of the part on the bed.
+        contact_mm2: area that lies on the bed.
+        overhang_mm2: area of the faces that need support.
+        support_mm3: volume of the columns under them.
+        fits: whether the box fits the bed.
+    """
+
+    T_bed_part: Array
+    size_mm: tuple[float, float, float]
+    contact_mm2: float
+    overhang_mm2: float
+    support_mm3: float
+    fits: bool
+
+
+def print_pose(mesh: Mesh, bed_mm: tuple[float, float, float]) -> PrintPose:
+    """The pose in which a part is printed, by the rule at the top of this module."""
+    faces = _Faces.of(mesh)
+    poses = [_pose(mesh, faces, down, bed_mm) for down in _flats(mesh, faces)]
+
+    def cost(pose: PrintPose) -> tuple[bool, float, float, float]:
+        support = round(pose.support_mm3 / SUPPORT_STEP_MM3)
+        return not pose.fits, support, -round(pose.contact_mm2), round(pose.size_mm[2], 2)
+
+    return min(poses, key=cost)
+
+
+def on_bed(mesh: Mesh, pose: PrintPose) -> Mesh:
+    """The mesh in the frame of the bed, rounded as every mesh is; nothing is below the bed."""
+    vertices = np.round(mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3], 5)
+    vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
+    return Mesh(vertices + 0.0, mesh.faces)
+
+
+@dataclass(frozen=True, slots=True)
+class _Faces:
+    """Unit normals, areas and middles of the triangles."""
+
+    normals: Array
+    areas: Array
+    middles: Array
+
+    @staticmethod
+    def of(mesh: Mesh) -> _Faces:
+        a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        doubled = np.linalg.norm(cross, axis=1)
+        normals = np.divide(cross, doubled[:, None], out=np.zeros_like(cross), where=doubled[:, None] > 0)
+        return _Faces(normals, doubled / 2, (a + b + c) / 3)
+
+
+def _flats(mesh: Mesh, faces: _Faces) -> Array:
+    """Outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
+
+    A part without one, such as a ball, gets the largest facets of its hull.
+    """
+    hull = ConvexHull(mesh.vertices)
+    corners = mesh.vertices[hull.vertices]
+    found: list[tuple[float, Array]] = []
+    for normal in _directions(faces):
+        reach = float((corners @ normal).max())
+        lies = (faces.normals @ normal > 1 - 1e-8) & (faces.middles @ normal > reach - FLAT)
+        area = float(faces.areas[lies].sum())
+        if area > 0:
+            found.append((area, normal))
+    if not found:
+        a, b, c = (mesh.vertices[hull.simplices[:, i]] for i in range(3))
+        largest = np.argsort(-np.linalg.norm(np.cross(b - a, c - a), axis=1), kind="stable")
+        return hull.equations[largest[:20], :3]
+    found.sort(key=lambda item: (-round(item[0], 1), *np.round(item[1], 6)))
+    return np.array([normal for area, normal in found if area >= CONTACT_SHARE * found[0][0]])
+
+
+def _directions(faces: _Faces) -> list[Array]:
+    """Mean normals of the triangles that share a direction, where these are more than 1 % of the largest."""
+    key = np.round(faces.normals, 4) + 0.0
+    _, index = np.unique(key, axis=0, return_inverse=True)
+    index = index.reshape(-1)
+    area = np.bincount(index, weights=faces.areas)
+    sums = np.stack([np.bincount(index, weights=faces.areas * faces.normals[:, i]) for i in range(3)], axis=1)
+    kept = area > 0.01 * area.max()
+    return list(sums[kept] / np.linalg.norm(sums[kept], axis=1, keepdims=True))
+
+
+def _pose(mesh: Mesh, faces: _Faces, down: Array, bed: tuple[float, float, float]) -> PrintPose:
+    up = -down
+    R = _along_bed(mesh.vertices, _upright(up))
+    placed = mesh.vertices @ R.T
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    middle = np.array([bed[0] / 2, bed[1] / 2, 0.0]) - [*(low + high)[:2] / 2, low[2]]
+    size = high - low
+    height = faces.middles @ up - low[2]
+    lean = faces.normals @ up
+    contact = (lean < -1 + 1e-6) & (height < FLAT)
+    over = (lean < -math.cos(OVERHANG_RAD) - 1e-9) & ~contact
+    columns = faces.areas[over] * -lean[over] * height[over]
+    return PrintPose(
+        T_bed_part=rigid(R, middle),
+        size_mm=(float(size[0]), float(size[1]), float(size[2])),
+        contact_mm2=float(faces.areas[contact].sum()),
+        overhang_mm2=float(faces.areas[over].sum()),
+        support_mm3=float(columns.sum()),
+        fits=bool((size <= np.array(bed) + FLAT).all()),
+    )
+
+
+def _upright(up: Array) -> Array:
+    """A rotation whose third row is `up`: it maps that direction to z."""
+    helper = np.eye(3)[int(np.argmin(np.abs(np.round(up, 6))))]
+    x = np.cross(helper, up)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(up, x), up])
+
+
+def _along_bed(vertices: Array, R: Array) -> Array:
+    """R turned about z so that the smallest rectangle around the part lies along x, its longer side first."""
+    flat = (vertices @ R.T)[:, :2]
+    outline = flat[ConvexHull(flat).vertices]
+    edges = np.roll(outline, -1, axis=0) - outline
+    edges = edges[np.hypot(*edges.T) > 0.01]
+    best: tuple[float, Array] | None = None
+    for dx, dy in edges / np.hypot(*edges.T)[:, None]:
+        turned = outline @ np.array([[dx, -dy], [dy, dx]])
+        width, depth = np.ptp(turned, axis=0)
+        area = round(float(width * depth), 2)
+        if best is None or area < best[0]:
+            c, s = (dx, dy) if width >= depth else (-dy, dx)
+            best = area, np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    assert best is not None
+    return best[1] @ R

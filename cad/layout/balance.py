@@ -1,0 +1,213 @@
+"""The counterweight of a tilted axis: which bar, how long, and where it has room. Rotation frame, mm and grams.
+
+Lidar and linkage hang on one side of the axis. Where that is tilted, gravity turns the rotor to and fro, and the gears
+change their flank by the play between them. A piece of bright bar, screwed to an ear of the hub on the other side,
+takes that away. It must leave the lidar, its cables and screws, the neck, the deck and the fan alone, wherever its
+slots let it slide: where no bar does, there is none.
+
+The bar is chosen before there are solids, from an estimate of what it balances; only its length waits for them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cad.layout.deck import FOOT_THICKNESS, FREE, Deck, deck_of
+from cad.layout.direct_stack import Stack, rotor_radius
+from cad.layout.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.head import CLAMP_ABOVE_BOTTOM
+from cad.layout.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from cad.layout.linkage import CLAMP_DRIVER, AlignmentLinkage, Ear, neck_corners
+from cad.layout.loads import horn_bears, horn_bears_balanced, tilt_sine
+from cad.screws import SCREWS
+from design.frames import Array
+from design.left_out import LeftOut
+from design.scanner import Scanner
+
+PART = "counterweight"
+STEEL_G_CM3 = 7.85
+# bright steel bar as it is sold (EN 10278), across and along the axis, lightest first
+SECTIONS = (
+    (8, 8),
+    (10, 10),
+    (12, 12),
+    (20, 10),
+    (16, 16),
+    (30, 10),
+    (20, 20),
+    (40, 10),
+    (30, 15),
+    (25, 20),
+    (50, 10),
+    (40, 15),
+    (25, 25),
+    (30, 25),
+    (50, 15),
+    (40, 20),
+    (30, 30),
+    (40, 30),
+)
+SCREW = SCREWS["M4"]
+RUBS_NM = 5e-3  # what bearing and ring rub with at least: assumed, no data sheet of theirs says it
+UPRIGHT = 1e-6  # sine of the tilt
+EAR_ABOVE_SHOULDER = CLAMP_ABOVE_BOTTOM + CLAMP_DRIVER / 2 + 0.5  # clear of the drivers of the radial screws
+EAR_BELOW_TOP = 0.5  # of the hub
+FROM_HUB = 1.0
+TRIM = 5.0  # that the bar can slide either way: nobody tells where a lidar's centre of mass is
+SCREWS_AT = (9.0, 25.0)  # from the inner end of the bar
+LEAST_LENGTH = 32.0  # covers the screws
+LONGER = 2.0  # than estimated the bar may become (measured: 1.5)
+GAP = 1.0
+STEP = 2.0  # of the points that stand for a bar
+SAW = 0.5  # lengths are cut to this
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counterweight:
+    """A bar along a radius, on the ear of the hub, its screws in the middle of their slots."""
+
+    ear: Ear
+    section: tuple[float, float]  # across, and along the axis
+    start: float  # distance of its inner end from the axis
+    length: float
+
+    @property
+    def end(self) -> float:
+        """Distance of its outer end from the axis."""
+        return self.start + self.length
+
+    @property
+    def mass_g(self) -> float:
+        """Of the bar with its screws, which fill its threads."""
+        return _grams_per_mm(self.section) * self.length
+
+    @property
+    def stock(self) -> str:
+        """What to saw it from."""
+        return f"bright steel bar {self.section[0]:g} x {self.section[1]:g}, sawn to {self.length:g}"
+
+    @property
+    def screws(self) -> tuple[float, ...]:
+        """Distances of its screws from the axis."""
+        return tuple((first + last) / 2 for first, last in self.ear.slots)
+
+    def balancing(self, moment: Array) -> Counterweight:
+        """The same bar, cut to balance a moment of all else that turns, shape (2,) [g mm]."""
+        needed = max(0.0, -float(moment @ _direction(self.ear.azimuth)))
+        length = math.sqrt(self.start**2 + 2 * needed / _grams_per_mm(self.section)) - self.start
+        return replace(self, length=SAW * round(length / SAW))
+
+
+def counterweight_of(scanner: Scanner, linkage: AlignmentLinkage) -> Counterweight | LeftOut:
+    """The lightest bar that balances the rotor and has room, or why there is none.
+
+    Args:
+        scanner: angles and products.
+        linkage: without an ear.
+    """
+    if not play_matters(scanner):
+        return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
+    if tilt_sine(scanner) < UPRIGHT:
+        return _without("gravity does not turn an upright axis")
+    moment = estimated_moment(scanner, linkage)
+    if torque_nm(scanner, float(np.linalg.norm(moment))) <= RUBS_NM:
+        return _without(f"gravity turns the rotor with no more than bearing and ring rub with, {RUBS_NM:g} N m")
+    if keeps_flank(scanner, moment):
+        return _without("all over the sweep gravity keeps the gears on one flank")
+    azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
+    deck, neck, fault = deck_of(scanner, linkage.stack), neck_corners(linkage, 0), ""
+    for section in SECTIONS:
+        bar = _bar(scanner, linkage, azimuth, section)
+        bar = bar.balancing(moment + _ear_moment(scanner, linkage, bar.ear))
+        if bar.length < LEAST_LENGTH:
+            fault = fault or "would be shorter than its screws need"
+            break
+        fault = _fault(scanner, linkage, deck, neck, bar)
+        if not fault:
+            return bar
+    return _without(f"the rotor is out of balance, but the bar that would mend it {fault}")
+
+
+def _without(why: str) -> LeftOut:
+    return LeftOut(PART, why, 1, "parts")
+
+
+def _direction(azimuth: float) -> Array:
+    return np.array([math.cos(azimuth), math.sin(azimuth)])
+
+
+def _grams_per_mm(section: tuple[float, float]) -> float:
+    return section[0] * section[1] * STEEL_G_CM3 / 1000
+
+
+def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: tuple[float, float]) -> Counterweight:
+    stack = linkage.stack
+    start = stack.hub_radius + FROM_HUB + TRIM
+    ear = Ear(
+        azimuth=azimuth,
+        half_width=max(section[0] / 2, SCREW.head_room + TRIM / 2),
+        end=start + SCREWS_AT[-1] + TRIM + SCREW.head_room,
+        low=stack.shoulder + EAR_ABOVE_SHOULDER,
+        high=-stack.h - EAR_BELOW_TOP,
+        slots=tuple((start + at - TRIM, start + at + TRIM) for at in SCREWS_AT),
+        slot_width=SCREW.nominal + scanner.printer.screw_clearance_mm,
+    )
+    return Counterweight(ear=ear, section=section, start=start, length=LEAST_LENGTH)
+
+
+def _ear_moment(scanner: Scanner, linkage: AlignmentLinkage, ear: Ear) -> Array:
+    across = 2 * ear.half_width * (ear.high - ear.low) * scanner.printer.density_g_cm3 / 1000
+    return across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
+
+
+def _fault(scanner: Scanner, linkage: AlignmentLinkage, deck: Deck, neck: Array, bar: Counterweight) -> str:
+    """What a bar, wherever it slides, and its ear would meet; empty where nothing."""
+    ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
+    inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
+    if math.hypot(bar.end, half) > rotor_radius(scanner.lidar, stack.sub_plate):
+        return "would reach further than the lidar"
+    rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
+    if _height_over(deck, rims) < FOOT_THICKNESS + FREE / 2:
+        return "would come too near to the deck"
+    if isinstance(stack, Stack) and _overloads(scanner, stack, bar):
+        return f"would be more than the horn of {scanner.servo.name} bears alone"
+    of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
+    of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
+    held, put_in = of_bar @ stack.R(), of_ear @ stack.R()  # the bar comes last, when the lidar is in its place
+    boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
+    if any(in_box(held, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
+        return "would meet the lidar or its cables"
+    both = np.concatenate([held, put_in])
+    if in_fan(both, linkage, GAP).any():
+        return "would stand in the fan"
+    if behind_screws(both, linkage).any():
+        return "would stand before the screws of the lidar"
+    if in_hull(of_bar, neck, GAP).any():
+        return "would meet the neck of the linkage"
+    return ""
+
+
+def _overloads(scanner: Scanner, stack: Stack, bar: Counterweight) -> bool:
+    """Whether it is the bar that makes the rotor too heavy for a horn without a bearing."""
+    if stack.bearing is not None or not horn_bears(scanner, stack):
+        return False
+    return not horn_bears_balanced(scanner, stack, bar.mass_g, bar.ear.high + bar.section[1] / 2)
+
+
+def _height_over(deck: Deck, rims: tuple[tuple[float, float], ...]) -> float:
+    """Least height over the deck of circles about the axis, each a radius and a z."""
+    normal = np.array(deck.normal)
+    lean = math.hypot(normal[0], normal[1])
+    return float(min(z * normal[2] - around * lean for around, z in rims) - np.array(deck.centre) @ normal)
+
+
+def _points(low: tuple[float, float, float], high: tuple[float, float, float], azimuth: float) -> Array:
+    """Of a box whose first axis has an azimuth, its faces included, in the rotation frame, shape (n, 3)."""
+    axes = [np.linspace(a, b, max(2, math.ceil((b - a) / STEP) + 1)) for a, b in zip(low, high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    out = _direction(azimuth)
+    sideways = np.array([-out[1], out[0]])
+    return np.column_stack([points[:, :1] * out + points[:, 1:2] * sideways, points[:, 2]])

@@ -1,0 +1,392 @@
+"""The layout for capsule rings, which let no shaft through: a belt turns a hollow shaft. No kernel: plain numpy.
+
+The servo stands beside the shaft; its belt is toothed and 1:1, so that its absolute angle stays that of the axis.
+
+Rotation frame at gamma = 0, mm, from the hub of `cad/head.py` downwards:
+
+    hub_bottom        the shaft's spigot begins, which ends in the hub as in direct drive
+    pulley_top        LEADS_GAP below: the leads leave the shaft between
+    teeth_top         a boss with grub screws holds the pulley on the shaft
+    teeth_low         the pulley's lower face lies on a collar of the shaft
+    tower_top         the collar lies on the upper bearing; the plate of the servo slides on the tower beside it
+    lower_bottom      lower face of the lower bearing; a ring with grub screws holds the shaft up
+    shaft_bottom      a soft tube joins the shaft's bore to the stub of the capsule's rotor
+    flange_top        the capsule's flange, screwed to a disc in the tower
+    ring_bottom       the capsule's lower end
+    tower_bottom      on the base mount
+
+The servo's frame has the directions of the rotation frame turned by `quarter` about z. Its belt pulls along the line of
+centres, on which the plate slides: `centre` is the distance at which the belt is tight.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cad.layout.direct_stack import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
+from cad.layout.head import BEARING_STEP, HUB_WALL, Head
+from cad.screws import SCREWS
+from design.catalogue.catalogue import Bearing, Belt, Flange, Rotor, Servo, SlipRing
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+
+GRUB = SCREWS["M3"]  # of pulley and ring on the shaft
+PLATE_SCREW = SCREWS["M4"]
+FOOT_SCREW = SCREWS["M3"]  # between tower and mount
+SPIGOT_DIAMETER = 12.0  # as in direct drive: a wider hub would hide more
+LEADS_GAP = 14.0  # between hub and pulley
+SHAFT_WALL = 4.0  # least, around the bore
+SLIDES = 0.04  # of the shaft in its bearings: the lower end of f7, which slides in by hand
+TUBE_WALL = 2.5  # of the soft tube between rotor and bore
+SPAN = 30.0  # between the middles of the two bearings
+BOSS = 9.0  # height of the pulley's boss, and of the ring under the lower bearing
+BOSS_WALL = 9.0  # around the shaft: thread length of the grub screws
+RIM = 1.5  # thickness of a pulley's rims
+RIM_ABOVE_BELT = 0.5
+BELT_ROOM = 0.5  # on each side of the belt
+PULLEY_GAP = 2.0  # between plate and pulleys
+PLATE = 5.0  # of the servo
+SEAT_GAP = 0.2  # the feet carry, not the plate
+INNER_RING = 1.45  # how far a shoulder may touch a bearing's inner ring, on the radius
+SEAT_WALL = 5.0  # of the tower
+LIP = 1.5  # of the tower inside the bearings' outer rings
+RING_ROOM = 1.5  # around flange and ring in the tower
+CAPSULE_GAP = 1.5  # between shaft and capsule
+DISC = 10.0  # thickness, of the capsule's holder
+LEADS = 6.0  # between capsule and mount
+SHELF = 12.0  # thickness of the tower's arms
+PLATE_GRIP = 7.5  # of an arm above the nut of a screw of the plate
+SHELF_WALL = 4.0  # of an arm beside the heads of the plate's screws
+TRAVEL = 3.0  # of the plate to either side
+CASE_ROOM = 2.0  # around the servo's case, beyond the travel
+FOOT = 10.0  # thickness of the tower's foot
+FOOT_HALF = 32.0  # of its square
+FOOT_HOLE = 24.0  # x and y of its screws
+SWEEP_MARGIN = 3.0  # between the turning lidar and the deck
+TEETH_STEP = 10
+TEETH_LEAST = 80  # a smaller pulley makes more of its run-out
+QUARTERS = (3, 2, 0)  # not 1: there the shelf would hide the index groove at +y
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeltStack(Head):
+    """The hollow shaft along its axis, and the servo beside it. Lengths in mm."""
+
+    shaft_bore: float
+    carrier: Bearing  # two of them
+    belt: Belt
+    belt_teeth: int
+    teeth: int  # of each pulley
+    centre: float
+    quarter: int  # quarter turns of the servo's frame about z
+    flange: Flange
+    rotor: Rotor
+    servo: Servo
+
+    @property
+    def tube_diameter(self) -> float:
+        """Of the shaft below the hub: that of its bearings."""
+        return self.carrier.bore_mm
+
+    @property
+    def seat_diameter(self) -> float:
+        """Of the shaft in its bearings."""
+        return self.tube_diameter - SLIDES
+
+    @property
+    def pulley_top(self) -> float:
+        """Height of the upper end of the boss."""
+        return self.hub_bottom - LEADS_GAP
+
+    @property
+    def teeth_top(self) -> float:
+        """Height of the upper rim's upper face, of both pulleys."""
+        return self.pulley_top - BOSS
+
+    @property
+    def teeth_low(self) -> float:
+        """Height of the lower rim's lower face, of both pulleys."""
+        return self.teeth_top - self.belt.width_mm - 2 * (BELT_ROOM + RIM)
+
+    @property
+    def belt_middle(self) -> float:
+        """Height of the belt's middle."""
+        return (self.teeth_top + self.teeth_low) / 2
+
+    @property
+    def pitch_radius(self) -> float:
+        """Of the belt's cords on a pulley."""
+        return self.teeth * self.belt.pitch_mm / (2 * math.pi)
+
+    @property
+    def tip_radius(self) -> float:
+        """Of the pulleys' teeth."""
+        return self.pitch_radius - self.belt.pitch_line_mm
+
+    @property
+    def belt_radius(self) -> float:
+        """Of the belt's back on a pulley."""
+        return self.tip_radius + self.belt.thickness_mm - self.belt.tooth_height_mm
+
+    @property
+    def rim_radius(self) -> float:
+        """Of the pulleys' rims: the largest of what turns with them."""
+        return self.belt_radius + RIM_ABOVE_BELT
+
+    @property
+    def boss_radius(self) -> float:
+        """Of the boss, and of the ring under the lower bearing."""
+        return self.tube_diameter / 2 + BOSS_WALL
+
+    @property
+    def collar_radius(self) -> float:
+        """Of the shaft's collar, which touches the inner ring only."""
+        return self.tube_diameter / 2 + INNER_RING
+
+    @property
+    def tower_top(self) -> float:
+        """Height of tower, shelf and upper bearing."""
+        return self.teeth_low - PULLEY_GAP - PLATE
+
+    @property
+    def upper_middle(self) -> float:
+        """Height of the upper bearing's balls."""
+        return self.tower_top - self.carrier.width_mm / 2
+
+    @property
+    def lower_middle(self) -> float:
+        """Height of the lower bearing's balls."""
+        return self.upper_middle - SPAN
+
+    @property
+    def lower_bottom(self) -> float:
+        """Height of the lower bearing's lower face."""
+        return self.lower_middle - self.carrier.width_mm / 2
+
+    @property
+    def collar_low(self) -> float:
+        """Height of the lower end of the ring that holds the shaft up."""
+        return self.lower_bottom - BEARING_STEP - BOSS
+
+    @property
+    def shaft_bottom(self) -> float:
+        """Height of the shaft's lower end."""
+        return self.collar_low - 1.0
+
+    @property
+    def ring_top(self) -> float:
+        """Height of the capsule's body towards its rotor."""
+        return self.shaft_bottom - CAPSULE_GAP
+
+    @property
+    def flange_top(self) -> float:
+        """Height of the flange's face towards the rotor."""
+        return self.ring_top - self.flange.below_top_mm
+
+    @property
+    def disc_top(self) -> float:
+        """Height of the disc that the flange lies on."""
+        return self.flange_top - self.flange.thickness_mm
+
+    @property
+    def ring_bottom(self) -> float:
+        """Height of the capsule's lower end."""
+        return self.ring_top - self.ring_length
+
+    @property
+    def tower_bottom(self) -> float:
+        """Height of the tower's foot."""
+        return min(self.ring_bottom, self.disc_top - DISC) - LEADS
+
+    @property
+    def tower_radius(self) -> float:
+        """Outer radius of the tower around the bearings."""
+        return self.carrier.outer_mm / 2 + SEAT_WALL
+
+    @property
+    def chamber_radius(self) -> float:
+        """Inner radius of the tower around flange and ring."""
+        return max(self.flange.diameter_mm / 2, self.boss_radius) + RING_ROOM
+
+    @property
+    def wide_radius(self) -> float:
+        """Outer radius of the tower there."""
+        return self.chamber_radius + SEAT_WALL
+
+    @property
+    def horn(self) -> float:
+        """Height of the servo's horn face."""
+        return self.tower_top - SEAT_GAP - self.servo.case_max_mm[2]
+
+    @property
+    def plate_x(self) -> float:
+        """Half extent of the servo's plate along the line of centres."""
+        return max(self.servo.case_max_mm[0], -self.servo.case_min_mm[0]) + 8.0
+
+    @property
+    def slot_x(self) -> float:
+        """Distance of the plate's screws from the horn's axis along the line of centres."""
+        return self.plate_x - TRAVEL - PLATE_SCREW.head_room - 1.0
+
+    @property
+    def arms_y(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Inner side of the two arms beside the case, and the line of the plate's screws on them; servo's frame."""
+        low, high = self.servo.case_min_mm[1], self.servo.case_max_mm[1]
+        beyond = self.rim_radius + PLATE_SCREW.head_room + 0.6  # a driver passes pulley and belt
+        room = SHELF_WALL + PLATE_SCREW.head_room
+        inner = low - CASE_ROOM, high + CASE_ROOM
+        return (inner[0], min(inner[0] - room, -beyond)), (inner[1], max(inner[1] + room, beyond))
+
+    @property
+    def plate_y(self) -> tuple[float, float]:
+        """Extent of plate and arms across the line of centres, servo's frame."""
+        (_, low), (_, high) = self.arms_y
+        room = SHELF_WALL + PLATE_SCREW.head_room
+        return low - room, high + room
+
+    @property
+    def shadow_half_angle(self) -> float:
+        """Half angle [rad] of the cone about -z that hub and pulley hide."""
+        return max(math.atan2(self.hub_radius, -self.pulley_top), math.atan2(self.rim_radius, -self.teeth_top))
+
+    @property
+    def sure_half_angle(self) -> float:
+        """Half angle [rad] of a cone inside it: of the rim, which is round."""
+        return math.atan2(self.rim_radius - 0.1, -self.teeth_top)
+
+    def turn(self) -> Array:
+        """Servo's frame to rotation frame, shape (3, 3): a whole number of quarter turns."""
+        c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.quarter % 4]
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
+
+    def beside(self) -> Array:
+        """Where the horn's axis meets its face, rotation frame, shape (3,)."""
+        return self.turn() @ [self.centre, 0.0, self.horn]
+
+
+def belt_stack_of(scanner: Scanner) -> BeltStack:
+    """Lay out the scanner of a capsule ring.
+
+    Raises:
+        BuildError: no bearing or belt of the catalogue fits the capsule, or the lidar would hang upside down.
+    """
+    ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
+    assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
+    bore = ring.rotor.diameter_mm + 2 * TUBE_WALL
+    carrier = _carrier(scanner, ring, bore + 2 * SHAFT_WALL)
+    belt = _belt(scanner, ring)
+    hub = SPIGOT_DIAMETER / 2 + HUB_WALL
+    alone = BeltStack(
+        h=hub_height(scanner.lidar, R, hub, 0.0, None),
+        R_rot_laser=rows_of(R),
+        ring_length=ring.length_mm,
+        ring_radius=ring.outer_diameter_mm / 2,
+        shaft_diameter=SPIGOT_DIAMETER,
+        shaft_bore=bore,
+        bearing=None,
+        sub_plate=None,
+        carrier=carrier,
+        belt=belt,
+        belt_teeth=belt.teeth[-1],
+        teeth=TEETH_LEAST,
+        centre=0.0,
+        quarter=0,
+        flange=ring.flange,
+        rotor=ring.rotor,
+        servo=servo,
+    )
+    _check_tower(alone, ring, scanner)
+    teeth = TEETH_LEAST
+    while replace(alone, teeth=teeth).tip_radius - belt.tooth_height_mm < alone.boss_radius + 1.0:
+        teeth += TEETH_STEP
+    alone = replace(alone, teeth=teeth)
+    least = _least_centre(alone, servo)
+    stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
+    if not stock:
+        raise BuildError(
+            f"drive_pulley: centre distance >= {least:.1f} mm: the longest {belt.name} of the catalogue has "
+            f"{max(belt.teeth)} teeth and reaches {centre_of(max(belt.teeth), teeth, belt.pitch_mm):.1f}; add a longer "
+            "one to its teeth"
+        )
+    stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
+    if covered_screws(scanner.lidar, stack):
+        axis = leaning_least(R)
+        stack = replace(stack, h=hub_height(scanner.lidar, R, hub, 0.0, axis), sub_plate=axis)
+    return replace(stack, quarter=_quarter(scanner, stack))
+
+
+def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
+    """Centre distance at which a belt is tight around two equal pulleys: half of it goes around them."""
+    return (belt_teeth - teeth) * pitch_mm / 2
+
+
+def case_corners(stack: BeltStack) -> Array:
+    """Of the servo's case where it stands, rotation frame, shape (8, 3)."""
+    low, high = stack.servo.case_min_mm, stack.servo.case_max_mm
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    return corners @ stack.turn().T + stack.beside()
+
+
+def drive_corners(stack: BeltStack) -> Array:
+    """Of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
+    rim, (low, high) = stack.rim_radius, stack.plate_y
+    reach = stack.centre + stack.plate_x + TRAVEL
+    shelf = [(x, y, z) for x in (0.0, reach) for y in (low, high) for z in (stack.tower_top - SHELF, stack.tower_top)]
+    pulley = [(stack.centre + a * rim, b * rim, stack.teeth_top) for a in (1, -1) for b in (1, -1)]
+    return np.concatenate([case_corners(stack), np.array([*shelf, *pulley]) @ stack.turn().T])
+
+
+def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
+    fitting = next((bearing for bearing in scanner.bearings if bearing.bore_mm >= least), None)
+    if fitting is None:
+        most = max((bearing.bore_mm for bearing in scanner.bearings), default=0.0)
+        raise BuildError(
+            f"bearing_tower: slip_ring {ring.name}: rotor.diameter_mm = {least - 2 * (TUBE_WALL + SHAFT_WALL):g}: its "
+            f"shaft needs bearings with bore_mm >= {least:g}, the largest of the catalogue has {most:g}; add one, or "
+            "take a smaller capsule"
+        )
+    return fitting
+
+
+def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
+    if not scanner.belts:
+        raise BuildError(
+            f"drive_pulley: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
+            "catalogue has none; add a product of kind = 'belt'"
+        )
+    return scanner.belts[0]
+
+
+def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
+    """The screws of the tower's foot stand around the capsule's chamber."""
+    corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
+    if stack.chamber_radius > corner:
+        most = 2 * (corner - RING_ROOM)
+        raise BuildError(
+            f"bearing_tower: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
+            f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
+        )
+
+
+def _least_centre(stack: BeltStack, servo: Servo) -> float:
+    """Shortest centre distance: case beside the tower, and pulleys beside each other, with the belt put on."""
+    case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
+    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
+
+
+def _quarter(scanner: Scanner, stack: BeltStack) -> int:
+    """The side of the axis where the servo asks for the lowest deck; of equal ones, beside the axis and not above."""
+    up = scanner.angles.T_world_rot(0.0)[2, :3]
+    normal = up if up[2] >= -1e-6 else -up
+    rotor = rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN
+
+    def asks(quarter: int) -> tuple[float, float]:
+        turned = replace(stack, quarter=quarter)
+        below = max(rotor, float((drive_corners(turned) @ -normal).max()))
+        return round(below, 3), round(abs(float(turned.turn()[:, 0] @ normal)), 3)
+
+    return min(QUARTERS, key=asks)

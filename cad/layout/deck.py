@@ -1,0 +1,177 @@
+"""Where the deck lies that the scanner stands on or hangs from. No kernel: plain numpy.
+
+World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
+scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). Everything
+here is expressed in the rotation frame at gamma = 0, mm, unless its name says world.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.drives.drive import drive_of
+from cad.layout.direct_stack import rotor_radius
+from cad.layout.head import Head
+from cad.layout.mounted import Carried
+from cad.screws import SCREWS, Screw
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+from design.task.deck_holes import Circle, Rectangle
+
+FOOT_THICKNESS = 6.0
+PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
+BACK_THICKNESS = 8.0
+BACK_MARGIN = 5.0  # of the back plate around the rear holes
+USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
+PAD_HALF = 26.0  # of the strut on the foot
+HOLE_MARGIN = 10.0  # of the foot around a hole
+FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
+FREE = 5.0  # above the foot, for everything that is not the mount
+SWEEP_MARGIN = 3.0  # around the turning lidar
+
+
+@dataclass(frozen=True, slots=True)
+class Deck:
+    """The deck in the rotation frame: `T_world_rot` at gamma = 0 is [R_world_rot | t_world_rot]."""
+
+    normal: tuple[float, float, float]  # from the deck into the room
+    along: tuple[float, float, float]  # world x
+    centre: tuple[float, float, float]  # world origin
+    hangs: bool
+    flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
+    t_world_rot: tuple[float, float, float]
+    back_centre: tuple[float, float, float]  # middle of the back plate's front face
+    back_half: tuple[float, float]  # x, y
+    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold what the mount carries
+    screw: Screw  # that holds the mount on the deck
+    deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
+    foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
+
+    def rotation(self) -> Array:
+        """Axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
+        along, normal = np.array(self.along), np.array(self.normal)
+        return np.stack([along, np.cross(normal, along), normal], axis=1)
+
+
+def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
+    """`t_world_rot_mm`: the optical centre in the world, whose origin is the centre of the deck holes.
+
+    Raises:
+        BuildError: the scanner cannot be built, as for `stack_of`.
+    """
+    return deck_of(scanner, drive_of(scanner).stack).t_world_rot
+
+
+def deck_of(scanner: Scanner, stack: Head) -> Deck:
+    """Lay the deck so that rotor, ring, case and mount stay clear of it, rounded up to whole millimetres."""
+    carried, pattern = drive_of(scanner).carried(), scanner.deck or USUAL
+    screw = SCREWS[pattern.screw]
+    R = scanner.angles.T_world_rot(0.0)[:3, :3]
+    R = np.where(np.abs(R) < 1e-12, 0.0, R)
+    hangs = bool(R[2, 2] < -1e-6)
+    normal = -R[2] if hangs else R[2]
+    deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # to the left of x, seen from the room
+    along = R[0]
+    holes = carried.holes
+    xs, ys = [x for x, _ in holes], [y for _, y in holes]
+    half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
+    back = np.array([0.0, (max(ys) + min(ys)) / 2, carried.rear - PLUG_GAP])
+    flat = carried.stands_alone and scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
+    if flat:
+        centre = np.array([0.0, 0.0, carried.rear])
+    else:
+        height = _height_of_back(scanner, stack, carried, normal, back, half)
+        centre = back - height * normal + _foot_shift(scanner, carried, deck_holes, back, normal, R[0], height)
+    offset = -R @ centre
+    offset[np.abs(offset) < 1e-9] = 0.0
+    return Deck(
+        normal=_triple(normal),
+        along=_triple(along),
+        centre=_triple(centre),
+        hangs=hangs,
+        flat=flat,
+        t_world_rot=_triple(np.round(offset, 6)),
+        back_centre=_triple(back),
+        back_half=half,
+        rear_holes=holes,
+        screw=screw,
+        deck_holes=deck_holes,
+        foot=_foot(pattern, screw),
+    )
+
+
+def _height_of_back(
+    scanner: Scanner, stack: Head, carried: Carried, normal: Array, back: Array, half: tuple[float, float]
+) -> float:
+    """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
+    plate = [
+        (sx * half[0], back[1] + sy * half[1], back[2] - depth)
+        for sx in (1, -1)
+        for sy in (1, -1)
+        for depth in (0.0, BACK_THICKNESS)
+    ]
+    below = [float(-(np.array(point) @ normal)) for point in (*carried.corners, *plate)]
+    sideways = float(np.hypot(normal[0], normal[1]))
+    below += [around * sideways - z * float(normal[2]) for around, z in carried.discs]
+    below.append(rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN)
+    return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
+
+
+def _foot_shift(
+    scanner: Scanner,
+    carried: Carried,
+    deck_holes: tuple[tuple[float, float], ...],
+    back: Array,
+    normal: Array,
+    along: Array,
+    height: float,
+) -> Array:
+    """Least shift of the foot in the deck's plane that keeps the drivers of the case screws off the deck screws.
+
+    The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
+    """
+    screw = SCREWS[(scanner.deck or USUAL).screw]
+    room = carried.screw.head_room + screw.head_room
+    left = np.cross(normal, along)
+    shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
+    depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
+
+    def clearance(shift: tuple[float, float]) -> float:
+        centre = back - height * normal + shift[0] * along + shift[1] * left
+        screws = [centre + u * along + v * left + depth * normal for u, v in deck_holes for depth in depths]
+        return min(
+            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
+            for point in screws
+            for x, y in carried.holes
+        )
+
+    a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
+    return a * along + b * left
+
+
+def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, float]:
+    """Half extents of an octagon around all holes and the strut's pad, and what is cut off its corners.
+
+    Raises:
+        BuildError: a hole lies under the strut, where no driver reaches its screw.
+    """
+    least = PAD_HALF + screw.head_room + 1.0
+    near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]
+    if near:
+        raise BuildError(
+            f"base_mount: deck.shape = '{pattern.shape}': the hole at ({near[0][0]:g}, {near[0][1]:g}) mm is under the "
+            f"strut: {screw.name} needs {least:g} mm from the centre along x or y; take a larger pattern"
+        )
+    if isinstance(pattern, Circle):  # a regular octagon keeps the margin all around
+        half = pattern.diameter_mm / 2 + HOLE_MARGIN
+        return half, half, half * (2 - math.sqrt(2))
+    x, y = (max(size / 2, PAD_HALF) + HOLE_MARGIN for size in pattern.size_mm)
+    return x, y, 12.0
+
+
+def _triple(v: Array) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])

@@ -1,0 +1,65 @@
+"""What the sheet of a part says that its solid does not show: fits, the axis it is measured from, lines of text. mm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from design.catalogue.catalogue import Bearing
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Of the cylinders of one diameter about the axis that a part is measured from.
+
+    Attributes:
+        diameter: as the part is drawn.
+        hole: whether the material is outside.
+        tolerance: as it stands behind the diameter.
+        why: what it is for.
+    """
+
+    diameter: float
+    hole: bool
+    tolerance: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class OnSheet:
+    """What one part's sheet says beyond its shape.
+
+    Attributes:
+        fits: of its cylinders.
+        notes: lines of text.
+        axis: where the axis that its ordinates run from meets the rotation frame's plane z = 0.
+    """
+
+    fits: tuple[Fit, ...] = ()
+    notes: tuple[str, ...] = ()
+    axis: tuple[float, float] = (0.0, 0.0)
+
+
+def printed_seat(bearing: Bearing, fit: float) -> Fit:
+    """Of a bearing's outer ring in a printed part, which is drawn half of the sliding fit wider."""
+    why = f"seat of {bearing.name}, from size for size to a sliding fit"
+    return Fit(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
+
+
+def printed_journal(bearing: Bearing, fit: float) -> Fit:
+    """Of a printed part in a bearing's inner ring, which is drawn half of the sliding fit thinner."""
+    why = f"journal of {bearing.name}, from size for size to a sliding fit"
+    return Fit(bearing.bore_mm - fit / 2, False, f"±{_g(fit / 2)}", why)
+
+
+def no_wider(diameter: float, fit: float, why: str) -> Fit:
+    """A printed hole that is drawn with half of the sliding fit, and what goes wrong where it has more."""
+    return Fit(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)
+
+
+def turned_spigot(diameter: float, fit: float) -> Fit:
+    """Of a turned shaft in the printed hub."""
+    return Fit(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
+
+
+def _g(value: float) -> str:
+    return f"{round(value, 3):g}"

@@ -1,0 +1,54 @@
+"""Where the linkage is, and what it must leave free, as questions to points: for whatever is sized before the solids.
+
+Millimetres. Points are of the laser frame, shape (n, 3), but for `in_hull`; each answer has the shape (n,).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from cad.layout.direct_stack import PLATE_THICKNESS, Box
+from cad.layout.linkage import AlignmentLinkage
+from design.frames import Array
+
+FAR_ABOVE = 1e3
+
+Mask = NDArray[np.bool_]
+
+
+def in_box(points: Array, box: Box, gap: float) -> Mask:
+    """Points nearer to a box than a gap along each axis."""
+    return np.asarray(((points > np.array(box[0]) - gap) & (points < np.array(box[1]) + gap)).all(axis=1))
+
+
+def swept(box: Box) -> Box:
+    """The way on which something is put in from above."""
+    low, (x, y, _) = box
+    return low, (x, y, FAR_ABOVE)
+
+
+def in_fan(points: Array, p: AlignmentLinkage, gap: float) -> Mask:
+    """Points that the linkage leaves free for its beams."""
+    bearing = np.arctan2(points[:, 1], points[:, 0])
+    in_slab = (points[:, 2] > p.fan_z[0] - gap) & (points[:, 2] < p.fan_z[1] + gap)
+    in_slab &= np.hypot(points[:, 0], points[:, 1]) > min(p.half_x, p.half_y) - gap
+    return np.asarray(in_slab & np.any([(bearing - first) % (2 * math.pi) < last - first for first, last in p.fan], 0))
+
+
+def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
+    """Points where the drivers of the lidar's screws come from; under a sub-plate they are driven on the bench."""
+    below = points[:, 2] < p.top - PLATE_THICKNESS
+    if p.ears is not None:
+        return np.zeros_like(below)
+    near = [np.hypot(points[:, 0] - x, points[:, 1] - y) < p.screw.head_room for x, y in p.holes]
+    return np.asarray(below & np.any(near, axis=0))
+
+
+def in_hull(points: Array, corners: Array, gap: float) -> Mask:
+    """Points nearer than a gap to every plane of the convex hull of corners, shape (m, 3), or behind it."""
+    planes = ConvexHull(corners).equations
+    return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1) < gap)

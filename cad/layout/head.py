@@ -1,0 +1,117 @@
+"""The upper end of every scanner: the hub that carries the linkage on its shaft, whatever drives it. Plain numpy.
+
+What is below the hub is a layout of its own: `cad/layout/direct_stack.py` with the servo on the axis,
+`cad/layout/belt_stack.py` with it beside the axis.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from design.catalogue.catalogue import Bearing
+from design.frames import Array
+
+HUB_HEIGHT = 14.0
+HUB_WALL = 11.0  # around the spigot: thread length of the radial screws
+HUB_GAP = 10.0  # the rotor's wires leave here
+SPIGOT = 11.0  # length of the shaft inside the hub
+CLAMP_ABOVE_BOTTOM = 5.0  # of the radial screws, from the hub's lower face
+BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
+JOURNAL_END = 1.0  # of the journal below the bearing
+
+Axis = Literal["x", "y"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head(ABC):
+    """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
+
+    Where the hub would cover a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
+    to the linkage from the lidar's side by its ears.
+    """
+
+    h: float
+    R_rot_laser: tuple[tuple[float, float, float], ...]
+    ring_length: float
+    ring_radius: float
+    shaft_diameter: float
+    bearing: Bearing | None  # on a journal of the hub
+    sub_plate: Axis | None  # of the laser frame, along which its ears stick out
+
+    @property
+    def hub_radius(self) -> float:
+        """Of the linkage's hub."""
+        return self.shaft_diameter / 2 + HUB_WALL
+
+    @property
+    def shoulder(self) -> float:
+        """Height of the plane that parts what turns from what stands still, but for journal and shaft."""
+        return -self.h - HUB_HEIGHT
+
+    @property
+    def journal(self) -> float:
+        """Length of the hub below its shoulder."""
+        return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
+
+    @property
+    def hub_bottom(self) -> float:
+        """Height of the hub's lower face."""
+        return self.shoulder - self.journal
+
+    @property
+    def clamp(self) -> float:
+        """Height of the radial screws."""
+        return self.shoulder + CLAMP_ABOVE_BOTTOM
+
+    @property
+    def spigot(self) -> float:
+        """Length of the shaft inside the hub."""
+        return SPIGOT + self.journal
+
+    @property
+    def spigot_top(self) -> float:
+        """Height of the shaft's upper end, which is the floor of the hub's bore."""
+        return self.hub_bottom + self.spigot
+
+    @property
+    def bearing_top(self) -> float:
+        """Height of the upper face of the journal's bearing."""
+        return self.shoulder - BEARING_STEP
+
+    @property
+    def flat(self) -> float:
+        """Distance from the axis of the flat that keys the spigot."""
+        return self.shaft_diameter / 2 - 1.0
+
+    @property
+    @abstractmethod
+    def ring_top(self) -> float:
+        """Height of the ring's upper face."""
+
+    @property
+    @abstractmethod
+    def ring_bottom(self) -> float:
+        """Height of the ring's lower face."""
+
+    @property
+    @abstractmethod
+    def horn(self) -> float:
+        """Height of the servo's horn face."""
+
+    @property
+    @abstractmethod
+    def shadow_half_angle(self) -> float:
+        """Half angle [rad] of the cone about -z that what stands still hides from the optical centre, all around."""
+
+    @property
+    @abstractmethod
+    def sure_half_angle(self) -> float:
+        """Half angle [rad] of that cone by solids of revolution only, a little inside their edges."""
+
+    def R(self) -> Array:
+        """Laser in the rotation frame, shape (3, 3)."""
+        return np.array(self.R_rot_laser)

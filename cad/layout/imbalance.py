@@ -1,0 +1,72 @@
+"""How far a rotor is out of balance before there are solids, and what gravity makes of that. Grams and mm."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cad.layout.direct_stack import PLATE_THICKNESS
+from cad.layout.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.linkage import AlignmentLinkage, neck_corners
+from cad.layout.loads import STANDARD_GRAVITY, tilt_sine
+from design.frames import Array
+from design.motion import Sweep
+from design.scanner import Scanner
+
+CELL = 2.0
+FAR_MM = 10_000.0  # where play is compared with the noise of the ranges
+
+
+def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:
+    """Mass times distance from the axis of lidar, linkage and sub-plate, rotation frame, shape (2,) [g mm].
+
+    The linkage is counted in cells: within 3 % of its solid (`tests/cad/parts/test_balance.py`).
+    """
+    lidar, stack, R = scanner.lidar, p.stack, p.stack.R()
+    neck = neck_corners(p, 0)
+    reach = max(p.half_x, p.half_y) if p.ears is None else max(p.ears[1][:2])
+    plate = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0.0, 1.0)])
+    plate = plate * [reach, reach, p.seat - p.top + PLATE_THICKNESS] + [0.0, 0.0, p.top - PLATE_THICKNESS]
+    r = stack.hub_radius
+    corners = np.concatenate([neck, plate @ R.T, [[-r, -r, stack.shoulder], [r, r, -stack.h]]])
+    axes = [np.arange(low + CELL / 2, high, CELL) for low, high in zip(corners.min(0), corners.max(0), strict=True)]
+    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    seen = cells @ R
+    x, y, z = np.abs(seen[:, 0]), np.abs(seen[:, 1]), seen[:, 2]
+    on_plate = (x < p.half_x) & (y < p.half_y) & (x + y < p.half_x + p.half_y - p.chamfer)
+    if p.ears is not None:
+        on_plate |= (x < p.ears[1][0]) & (y < p.ears[1][1])
+    solid = (on_plate & (z > p.top - PLATE_THICKNESS) & (z < p.top)) | in_hull(cells, neck, 0.0)
+    around = np.hypot(cells[:, 0], cells[:, 1])
+    room = np.any([in_box(seen, swept(box), 0.0) for box in (p.body, *p.cables)], axis=0)
+    solid &= ~in_fan(seen, p, 0.0) & ~behind_screws(seen, p)
+    solid |= (around < stack.hub_radius) & (cells[:, 2] > stack.shoulder) & (cells[:, 2] < -stack.h)
+    solid &= ~room & ~((around < stack.shaft_diameter / 2) & (cells[:, 2] < stack.spigot_top))
+    solid |= on_plate & (z > p.top) & (z < p.seat)  # the sub-plate
+    printed = CELL**3 * scanner.printer.density_g_cm3 / 1000 * cells[solid, :2].sum(axis=0)
+    return printed + lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * R[:2, 2]
+
+
+def torque_nm(scanner: Scanner, moment: float) -> float:
+    """Largest torque of gravity about the axis, over a whole turn, for an imbalance [g mm]."""
+    return moment * 1e-6 * STANDARD_GRAVITY * tilt_sine(scanner)
+
+
+def keeps_flank(scanner: Scanner, moment: Array) -> bool:
+    """Whether a sweep stays where gravity turns the rotor one way only, and so keeps the gears on one flank."""
+    motion = scanner.angles.motion
+    if not isinstance(motion, Sweep):
+        return False
+    down = -scanner.angles.T_world_rot(0.0)[2, :3]
+    gamma = np.radians(np.linspace(*motion.limits_deg, 361))
+    x = np.cos(gamma) * moment[0] - np.sin(gamma) * moment[1]
+    y = np.sin(gamma) * moment[0] + np.cos(gamma) * moment[1]
+    torque = x * down[1] - y * down[0]
+    return bool((torque > 0).all() or (torque < 0).all())
+
+
+def play_matters(scanner: Scanner) -> bool:
+    """Whether the play of the servo's gears shows in a cloud; where nobody tells it, it does."""
+    play = scanner.servo.backlash_deg
+    return play is None or math.radians(play) * FAR_MM > scanner.lidar.range_sigma_mm

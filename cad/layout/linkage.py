@@ -1,0 +1,172 @@
+"""Every number of the alignment linkage. Rotation frame at gamma = 0, mm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad import solids
+from cad.layout.direct_stack import BODY_GAP, PLATE_THICKNESS, SUB_PLATE, Box, box_corners, envelope_of
+from cad.layout.head import Head
+from cad.parts.sub_plate import EAR_SCREW, ear_screws
+from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+
+PART = "alignment_linkage"
+CLAMP_SCREW = SCREWS["M3"]
+CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
+HEEL = 8.0  # how far the neck reaches below a lying plate
+
+
+@dataclass(frozen=True, slots=True)
+class Ear:
+    """Where a counterweight is screwed to the hub, on slots along the radius: lengths in mm, `azimuth` in rad."""
+
+    azimuth: float
+    half_width: float
+    end: float  # distance of its end from the axis
+    low: float
+    high: float
+    slots: tuple[tuple[float, float], ...]  # first and last place of a screw, as distances from the axis
+    slot_width: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentLinkage:
+    """Lengths in mm, angles in rad, directions in the rotation frame."""
+
+    stack: Head
+    seat: float  # z of the lidar's base in the laser frame
+    top: float  # z of the plate's upper face: the seat, or below a sub-plate
+    half_x: float
+    half_y: float
+    chamfer: float
+    body: Box
+    ears: Box | None  # room of a sub-plate's ears
+    ear_screws: tuple[tuple[float, float], ...]
+    ear_thread: float  # diameter
+    clamp_thread: float  # diameter
+    trap: Trap | None  # of all these screws, if they hold in nuts
+    cables: tuple[Box, ...]
+    fan_z: tuple[float, float]  # the window's edges in the laser frame
+    fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
+    screw: Screw
+    screw_hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+    fit: float  # diametral clearance of the spigot
+    clamp_azimuths: tuple[float, ...]
+    ear: Ear | None = None
+
+
+def linkage_of(scanner: Scanner, stack: Head) -> AlignmentLinkage:
+    """Parameters of the linkage of one scanner.
+
+    Raises:
+        BuildError: the screw holes come too near to the plate's edge.
+    """
+    lidar, printer = scanner.lidar, scanner.printer
+    envelope = envelope_of(lidar, stack.sub_plate)
+    screw = SCREWS[lidar.mount_screw]
+    hole = screw.nominal + printer.screw_clearance_mm
+    half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
+    edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in lidar.mount_holes_mm) - hole / 2
+    if edge < printer.min_wall_mm:
+        raise BuildError(
+            f"{PART}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm at the edge "
+            f"of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
+        )
+    # the cut corner leaves the wall that the straight edge leaves
+    corner = min(half_x + half_y - abs(x) - abs(y) for x, y in lidar.mount_holes_mm)
+    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
+    low, high = lidar.window_z_mm
+    trap = trap_of(CLAMP_SCREW, printer)
+    return AlignmentLinkage(
+        stack=stack,
+        seat=-lidar.optical_height_mm,
+        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE),
+        half_x=half_x,
+        half_y=half_y,
+        chamfer=chamfer,
+        body=envelope.body,
+        ears=None if stack.sub_plate is None else _grown(envelope.under),
+        ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
+        ear_thread=thread_hole(EAR_SCREW, printer) if trap is None else trap.hole,
+        clamp_thread=thread_hole(CLAMP_SCREW, printer) if trap is None else trap.hole,
+        trap=trap,
+        cables=envelope.cables,
+        fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
+        fan=_free_bearings(stack, lidar.bearings_rad()),
+        screw=screw,
+        screw_hole=hole,
+        holes=lidar.mount_holes_mm,
+        fit=printer.fit_clearance_mm,
+        clamp_azimuths=_clamp_azimuths(stack.R()[:, 2]),
+    )
+
+
+def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
+    """Of the hub's core, raised to just under the lidar, and of the plate: the neck is their hull, shape (n, 3).
+
+    No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
+    """
+    stack = p.stack
+    turn = math.radians(0.7 + 1.9 * attempt)
+    ring = solids.polygon(stack.hub_radius - 1.0 - 0.05 * attempt, 24, turn)
+    R = stack.R()
+    under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
+    top = min(max(-stack.h, under_body), 40.0 - stack.h)
+    layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.shoulder + 1.5, top)]
+    outline = solids.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
+    for z in (p.top - 0.2, p.top - PLATE_THICKNESS + 0.5):
+        layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
+    layers.append(_heel(np.concatenate(layers[2:]), stack))
+    return np.concatenate(layers)
+
+
+def _heel(plate: Array, stack: Head) -> Array:
+    """The lower half of the plate's corners, moved down: else a lying plate hangs on a wedge that ends in an edge."""
+    lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
+    if len(lower) == 0:
+        return plate
+    tilt_sine = math.hypot(stack.R()[2, 0], stack.R()[2, 1])
+    room = float(lower[:, 2].min()) - stack.shoulder - 2.0
+    return lower - [0.0, 0.0, max(0.0, min(HEEL * tilt_sine**2, room))]
+
+
+def _grown(box: Box) -> Box:
+    """A box with the lidar's gap around its sides."""
+    (x0, y0, z0), (x1, y1, z1) = box
+    return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
+
+
+def _free_bearings(stack: Head, bearings: Array) -> tuple[tuple[float, float], ...]:
+    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there."""
+    first, last = float(bearings.min()), float(bearings.max())
+    q = stack.R()[2]
+    tilt_sine = math.hypot(q[0], q[1])
+    cosine = math.cos(stack.shadow_half_angle)
+    if tilt_sine <= cosine:
+        return ((first, last),)
+    half = math.acos(cosine / tilt_sine)
+    centre = math.atan2(-q[1], -q[0])
+    pieces = [(first, last)]
+    for turn in (-2 * math.pi, 0.0, 2 * math.pi):
+        low, high = centre + turn - half, centre + turn + half
+        pieces = [
+            piece
+            for start, end in pieces
+            for piece in ((start, min(end, low)), (max(start, high), end))
+            if piece[1] - piece[0] > 1e-3
+        ]
+    return tuple(pieces)
+
+
+def _clamp_azimuths(normal: Array) -> tuple[float, ...]:
+    """Two radial screws 90 deg apart on the side away from the plate, in steps of 45 deg from the flat at +y."""
+    towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else math.pi / 4
+    middle = round((towards - math.pi / 2) / (math.pi / 4) - 1e-6) * (math.pi / 4) + math.pi / 2
+    return middle - math.pi / 4, middle + math.pi / 4

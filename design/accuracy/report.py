@@ -1,0 +1,67 @@
+"""The accuracy report on disk: work-precision diagram, its table, and the stress table."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from design.accuracy.methods import Point, Reference, on_front
+from design.accuracy.stress import Row
+
+MARKS = "osD^vP*X"
+GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
+
+
+def write_points(path: Path, points: list[Point], truth: Reference) -> None:
+    """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
+    header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front failed"
+    rows = []
+    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+        seconds = point.seconds or (np.nan,)
+        numbers = [point.J, point.J_error, point.argmin_error_deg]
+        numbers += [float(np.median(seconds)), min(seconds), max(seconds), point.peak_mb]
+        cells = ["" if np.isnan(n) else f"{n:.6g}" for n in numbers]
+        rows.append([point.method, point.setting, *cells, str(front).lower(), point.failed])
+    _write(path, header.split(), rows)
+
+
+def write_rows(path: Path, rows: list[Row]) -> None:
+    """The stress table."""
+    header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
+    _write(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
+
+
+def work_precision_picture(path: Path, points: list[Point], truth: Reference, title: str) -> None:
+    """Error against median seconds, both logarithmic, one curve per method, one point per setting."""
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    axis = figure.subplots()
+    floor = max(truth.J_error, 1e-16)
+    methods = list(dict.fromkeys(point.method for point in points))
+    for i, method in enumerate(methods):
+        mine = [p for p in points if p.method == method and p.seconds]
+        seconds = [float(np.median(p.seconds)) for p in mine]
+        error = [max(p.J_error, floor) for p in mine]
+        axis.plot(seconds, error, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
+        for s, e, p in zip(seconds, error, mine, strict=True):
+            axis.annotate(p.setting.split()[0], (s, e), textcoords="offset points", xytext=(4, 4), fontsize=6.5)
+    for p in points:
+        if not p.seconds:
+            axis.plot([], [], " ", label=f"{p.method}, {p.setting}: {p.failed}")
+    axis.axhline(floor, color="#888888", linestyle=":", linewidth=1)
+    axis.annotate("error of the reference", (1, floor), xycoords=("axes fraction", "data"), ha="right", va="bottom")
+    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel="error of J")
+    axis.grid(which="major", color="#dddddd", linewidth=0.6)
+    axis.legend(fontsize=8)
+    axis.set_title(title, fontsize=11)
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)

@@ -1,0 +1,233 @@
+"""Stiff and extreme cases with an answer known beforehand: what was expected, what came out, how far apart.
+
+Most expectations are one law: however the beams lie, the mean count integrates over the sphere to beams times lines
+times the share of the sphere that a ball covers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
+from design.density.spin import mean_count, zones
+from design.errors import TaskError
+from design.frames import Array
+from design.objective.objectives import log
+from design.objective.problem import Problem
+from design.objective.score import quick_J, score
+from design.sphere.directions import EMPTY
+from design.sphere.regions import field_of
+from design.task.shapes import All
+from design.task.task import LoadedTask, Task
+
+PIECE_NODES = 8
+HALF_TURN = np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One case; `error` is relative where `expected` is not zero."""
+
+    case: str
+    quantity: str
+    expected: float
+    got: float
+    error: float
+    allowed: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is within what is allowed; NaN never is."""
+        return bool(self.error <= self.allowed)
+
+
+def stress_rows(loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """All cases, with the beams of a task."""
+    cases: list[Callable[[LoadedTask, Problem], list[Row]]] = [
+        _planes,
+        _focus,
+        _balls,
+        _lines,
+        _gimbals,
+        _weights,
+        _regions,
+        _refusals,
+    ]
+    return [row for case in cases for row in case(loaded, problem)]
+
+
+def _row(case: str, quantity: str, expected: float, got: float, allowed: float) -> Row:
+    error = abs(got - expected) / (abs(expected) if expected else 1.0)
+    return Row(case, quantity, expected, got, error, allowed)
+
+
+def _integral(bearings: Array, plane: tuple[float, float], turns: float, ball: float) -> float:
+    """Integral of the mean count over the sphere: smooth between the polar angles where a beam comes or goes."""
+    polar, _ = polar_and_azimuth(beam_directions_rot(bearings, *plane))
+    marks = np.concatenate([[0, np.pi], polar - ball, polar + ball])
+    breaks = np.unique(np.clip(np.abs(marks), 0, np.pi))
+    x, w = np.polynomial.legendre.leggauss(PIECE_NODES)
+    s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
+    a, b = breaks[:-1, None], breaks[1:, None]
+    t = (a + (b - a) * np.sin(s / 2) ** 2).ravel()
+    width = ((b - a) * np.sin(s) * w * np.pi / 4).ravel()
+    return float(2 * np.pi * (width * np.sin(t)) @ mean_count(t, polar, scan_lines(turns, 1.0), ball))
+
+
+def _law(name: str, bearings: Array, plane: tuple[float, float], turns: float, ball: float, allowed: float) -> Row:
+    lines = scan_lines(turns, 1.0).count
+    expected = len(bearings) * lines * 2 * np.pi * (1 - np.cos(ball))
+    return _row(name, "integral of d", expected, _integral(bearings, plane, turns, ball), allowed)
+
+
+def _planes(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """Scan planes at and next to the perpendicular one, and with the fan's end on the axis."""
+    b, ball = problem.bearings_rad, problem.ball_rad
+    rows = []
+    for tilt in (0.0, 1e-12, 1e-9, 1e-6):
+        polar, _ = polar_and_azimuth(beam_directions_rot(b, tilt, 0.0))
+        got = mean_count(np.array([np.pi / 2]), polar, scan_lines(720, 1.0), ball)[0]
+        name = f"scan plane {tilt:g} rad from perpendicular to the axis"
+        rows.append(_row(name, "d on the equator", len(b) * 720 * ball / np.pi, float(got), 1e-6))
+        rows.append(_law(name, b, (tilt, 0.0), 720, ball, 1e-6))
+    for tilt_deg in (1e-3, 30.0, 61.98, 89.999):
+        plane = (float(np.radians(tilt_deg)), 0.0)
+        rows.append(_law(f"caustics at 90 +- {tilt_deg:g} deg", b, plane, 720, ball, 1e-5))
+    end = float(b.max())
+    plane = (HALF_TURN / 2, float(np.arcsin(-np.cos(end))))  # q = (cos end, sin end): the last beam is the axis
+    plane = (float(np.arcsin(np.sin(end) / np.cos(plane[1]))), plane[1])
+    rows.append(_law("end of the field of view exactly on the axis", b, plane, 720, ball, 1e-5))
+    return rows
+
+
+def _focus(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """At a focus point every line of the beams within a ball counts, at every phase."""
+    b, ball = problem.bearings_rad, problem.ball_rad
+    polar, _ = polar_and_azimuth(beam_directions_rot(b, 0.0, -HALF_TURN / 2))
+    expected = 720.0 * int((np.abs(b) <= ball * (1 + 1e-12)).sum())
+    at = np.array([0.0, 1e-15, 1e-9])
+    got = mean_count(at, polar, scan_lines(720, 1.0), ball)
+    # 1e-9 rad off, the beams on the rim are met by half of their lines, or by none
+    rim = 720.0 * int((np.abs(np.abs(b) - ball) < 1e-6).sum()) / max(expected, 1)
+    return [
+        _row(f"focus point, {t:g} rad off", "d", expected, float(d), 1e-9 if t == 0 else rim + 1e-6)
+        for t, d in zip(at, got, strict=True)
+    ]
+
+
+def _balls(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+    plane = (float(np.radians(-50.0)), float(np.radians(35.0)))
+    return [
+        _law(f"ball of {r:g} deg", problem.bearings_rad, plane, 720, float(np.radians(r)), 1e-5)
+        for r in (0.01, 0.1, 1.0, 10.0, 45.0, 90.0)
+    ]
+
+
+def _lines(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """From one line to ten million beams, one beam, and turns that are no whole number of lines."""
+    b, ball = problem.bearings_rad, problem.ball_rad
+    plane = (float(np.radians(-50.0)), float(np.radians(35.0)))
+    million = round(1e7 / len(b))
+    rows = [_law(f"{k:,} lines, {k * len(b):,} beams", b, plane, k, ball, 1e-5) for k in (1, 2, 720, million)]
+    rows.append(_law("one beam", b[:1], plane, 720, ball, 1e-5))
+    rows += [_law(f"T f = {turns}", b, plane, turns, ball, 1e-5) for turns in (0.5, 80.5, 719.999999, 720.000001)]
+    angles = np.radians([0.0, 0.0, -50.0, 35.0])
+    whole = quick_J(_with_turns(problem, 720), angles, 2187)
+    for turns in (720 - 1e-7, 720 + 1e-12):  # beating with the turn: the last gap is nearly full, or nothing is left
+        got = quick_J(_with_turns(problem, turns), angles, 2187)
+        rows.append(_row(f"T f = 720 {turns - 720:+.0e}: the rate beats with the turn", "J", whole, got, 1e-6))
+    return rows
+
+
+def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """Angles that name the same machine give the same J."""
+    pairs = [
+        ("beta_rot = 90: alpha_rot only rolls the case", (0, 90, 20, -40), (77, 90, 20, -40)),
+        ("beta_rot = -90", (0, -90, 20, -40), (-33, -90, 20, -40)),
+        ("beta_laser = -90: alpha_laser turns about the axis", (10, 20, 0, -90), (10, 20, 55, -90)),
+        ("alpha_rot a full turn on", (10, 20, 30, -40), (370, 20, 30, -40)),
+        ("(alpha, beta) about u is (-alpha, -beta) about -u", (0, 0, 30, -40), (180, 0, -30, 40)),
+    ]
+    return [
+        _row(name, "J", quick_J(problem, np.radians(a), 6561), quick_J(problem, np.radians(b), 6561), 1e-5)
+        for name, a, b in pairs
+    ]
+
+
+def _weights(loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """J does not know the unit of the weights."""
+    angles = np.radians([0.0, 0.0, -50.0, 35.0])
+    cone = {"shape": "cone", "axis": [1, 0, -1], "half_angle_deg": 40}
+    plain = quick_J(_with(loaded, problem, [cone]), angles, 2187)
+    return [
+        _row(
+            f"weights of {w:g}", "J", plain, quick_J(_with(loaded, problem, [cone | {"value": w}]), angles, 2187), 1e-9
+        )
+        for w in (1e-300, 1e-30, 1e30, 1e300)
+    ]
+
+
+def _regions(loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """A region that is nearly a point sees the density of that point."""
+    angles = np.radians([0.0, 0.0, -50.0, 35.0])
+    polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
+    at = np.radians([60.0])
+    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g[0])
+    axis = [float(np.sin(at[0])), 0.0, float(np.cos(at[0]))]
+    return [
+        _row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)
+        for half, allowed in ((1.0, 2e-2), (0.1, 1e-2), (0.01, 1e-3), (0.001, 1e-4))
+        for region in ({"shape": "cone", "axis": axis, "half_angle_deg": half},)
+    ]
+
+
+def _refusals(loaded: LoadedTask, problem: Problem) -> list[Row]:
+    """What has no answer is refused, and no number comes instead: 1 for a refusal."""
+    angles = np.radians([0.0, 0.0, -50.0, 35.0])
+    hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
+    rows = [_row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
+    rows.append(
+        _row(
+            "everything masked",
+            "refused",
+            1,
+            _refused(lambda: problem.with_objective(log(field_of(hidden))), angles),
+            0,
+        )
+    )
+    try:
+        All.model_validate({"shape": "all", "value": float("nan")})
+        refused = 0
+    except ValueError:
+        refused = 1
+    rows.append(_row("NaN weight", "refused", 1, refused, 0))
+    return rows
+
+
+def _refused(make: Callable[[], Problem], angles_rad: Array) -> int:
+    try:
+        quick_J(make(), angles_rad, 243)
+    except TaskError as error:
+        return int(str(error) == EMPTY)
+    return 0
+
+
+def _all(value: float) -> dict[str, object]:
+    return {"shape": "all", "value": value}
+
+
+def _task(loaded: LoadedTask, weight: list[dict[str, object]], mask: list[dict[str, object]]) -> Task:
+    density = loaded.task.density.model_dump() | {"background": 0.0, "quadrature": "solid_angle"}
+    return Task.model_validate(loaded.task.model_dump() | {"weight": weight, "mask": mask, "density": density})
+
+
+def _with(loaded: LoadedTask, problem: Problem, weight: list[dict[str, object]]) -> Problem:
+    changed = replace(loaded, task=_task(loaded, weight, []), maps=())
+    return replace(problem.with_objective(log(field_of(changed))), grid_step_deg=None)
+
+
+def _with_turns(problem: Problem, turns: float) -> Problem:
+    return problem.with_beams(problem.bearings_rad, scan_lines(turns, 1.0))

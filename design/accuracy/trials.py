@@ -1,0 +1,107 @@
+"""Error against run time of the numerical choices beside J: one record, its table and its picture.
+
+The rooms that make a choice measure it (`scanwright.trials.mesh`, `scanwright.trials.solver`,
+`scanwright.trials.axis`); the front door brings the trials here.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from matplotlib.figure import Figure
+
+T = TypeVar("T")
+REPEATS = 3
+MARKS = "osD^vP*X"
+GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One method at one setting of its knob.
+
+    Attributes:
+        choice: what is chosen, such as "mesh of a part".
+        method: its name.
+        setting: the knob and its value.
+        error: against a reference that is none of the trials; 0 where it cannot be told from that.
+        unit: of the error.
+        seconds: of the repeats, shortest to longest.
+        size: what else it costs, in words.
+        chosen: whether it is what the program uses.
+    """
+
+    choice: str
+    method: str
+    setting: str
+    error: float
+    unit: str
+    seconds: tuple[float, ...]
+    size: str = ""
+    chosen: bool = False
+
+    @property
+    def median_s(self) -> float:
+        """Median of the repeats [s]."""
+        return float(np.median(self.seconds))
+
+
+def timed(work: Callable[[], T], repeats: int = REPEATS) -> tuple[T, tuple[float, ...]]:
+    """What `work` gives, and the seconds of its repeats, shortest first; one more run before them warms up."""
+    found = work()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - start)
+    return found, tuple(sorted(seconds))
+
+
+def on_front(trial: Trial, others: Sequence[Trial]) -> bool:
+    """Whether none of the same choice is as fast and nearer, or as near and faster."""
+    rivals = (other for other in others if other.choice == trial.choice and other is not trial)
+    cost, error = trial.median_s, trial.error
+    return not any(r.median_s <= cost and r.error <= error and (r.median_s < cost or r.error < error) for r in rivals)
+
+
+def write_trials(path: Path, trials: Sequence[Trial]) -> None:
+    """One row per trial."""
+    header = "choice method setting error unit seconds_median seconds_min seconds_max size on_front chosen"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header.split())
+        for t in trials:
+            seconds = [f"{s:.4g}" for s in (t.median_s, t.seconds[0], t.seconds[-1])]
+            marks = [str(on_front(t, trials)).lower(), str(t.chosen).lower()]
+            writer.writerow([t.choice, t.method, t.setting, f"{t.error:.4g}", t.unit, *seconds, t.size, *marks])
+
+
+def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
+    """A diagram for each choice: error against median seconds, both logarithmic, the chosen setting ringed."""
+    choices = list(dict.fromkeys(trial.choice for trial in trials))
+    figure = Figure(figsize=(5.4 * len(choices), 5), layout="constrained")
+    for axis, choice in zip(figure.subplots(1, len(choices), squeeze=False)[0], choices, strict=True):
+        here = [trial for trial in trials if trial.choice == choice]
+        floor = min((t.error for t in here if t.error > 0), default=1e-16) / 3
+        for i, method in enumerate(dict.fromkeys(trial.method for trial in here)):
+            mine = [trial for trial in here if trial.method == method]
+            x, y = [t.median_s for t in mine], [max(t.error, floor) for t in mine]
+            axis.plot(x, y, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
+            for trial, at in zip(mine, zip(x, y, strict=True), strict=True):
+                axis.annotate(trial.setting, at, textcoords="offset points", xytext=(5, 4), fontsize=6.5)
+        for trial in here:
+            if trial.chosen:
+                ring = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "black"}
+                axis.plot([trial.median_s], [max(trial.error, floor)], "o", label="chosen", **ring)
+        axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=f"error [{here[0].unit}]")
+        axis.set_title(choice, fontsize=11)
+        axis.grid(which="major", color="#dddddd", linewidth=0.6)
+        axis.margins(0.15)
+        axis.legend(fontsize=8)
+    figure.savefig(path, dpi=110, metadata={"Software": None})

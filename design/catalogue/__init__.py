@@ -1,0 +1,1 @@
+"""Products that a task can name, each value with its source."""

@@ -1,0 +1,1 @@
+"""Beams per ball: the fan, exact counts of a turning and of a sweeping scanner."""

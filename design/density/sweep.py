@@ -1,0 +1,182 @@
+"""Density of a sweeping scanner, from its real trajectory: no longer the same all around the axis.
+
+The servo passes every angle twice in a period, on its way out and back. Beam b sees a direction at polar angle t and
+azimuth p of the rotation frame while the joint angle is within `delta_b(t)` of `p - p_b` (`design.density.spin`): one
+or two stretches of time each way. Scans start at the times `(k + s) / f` in the period, with the start phase s anywhere
+in 0 .. 1, so the count is a step function of s, and its statistics over s are exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from design.density.beams import polar_and_azimuth
+from design.density.spin import TIE, Zones, half_width
+from design.frames import Array
+from design.motion import Sweep
+from design.parallel import in_chunks
+
+
+@dataclass(frozen=True, slots=True)
+class SweepLines:
+    """The scan lines of one period out and back: at the times `(k + s) / scan_rate_hz` that lie in it."""
+
+    motion: Sweep
+    scan_rate_hz: float
+
+    @property
+    def scans(self) -> float:
+        """Scans in one period, in the mean over the start phase."""
+        return self.motion.period_s * self.scan_rate_hz
+
+    def angles_rad(self, start: float) -> Array:
+        """Joint angles of all lines for a start phase in 0 .. 1."""
+        k = np.arange(int(np.ceil(self.scans - start - 1e-12)))
+        return self.motion.angle_rad((k + start) / self.scan_rate_hz)
+
+    def numbers(self) -> Array:
+        """Lower limit, range, speed [rad, rad/s], ramp, half a period [s], scan rate: what the kernels read."""
+        motion = self.motion
+        lower, upper = np.radians(motion.limits_deg)
+        cruise = np.radians(motion.cruise_deg_s)
+        return np.array([lower, upper - lower, cruise, motion.ramp_s, motion.period_s / 2, self.scan_rate_hz])
+
+
+def mean_count_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines, ball_rad: float) -> Array:
+    """Mean over the start phase of the beams within a ball about directions of the rotation frame, shape (n,).
+
+    Args:
+        directions_rot: unit vectors, shape (n, 3), at joint angle 0.
+        beams_rot: unit vectors of the beams, shape (beams, 3).
+        lines: of one period.
+        ball_rad: ball radius.
+    """
+    t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
+    numbers = lines.numbers()
+    parts = in_chunks(lambda chunk: _mean(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad), len(t))
+    return np.concatenate(parts)
+
+
+def zones_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines, ball_rad: float, g: Array) -> Zones:
+    """Exact statistics over the start phase at directions of the rotation frame; arguments as `mean_count_swept`.
+
+    `g` holds its value for every count 0, 1, .. lines * beams.
+    """
+    t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
+    numbers = lines.numbers()
+    parts = in_chunks(lambda chunk: _zones(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad, g), len(t), smallest=16)
+    mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    return Zones(mean_g, mean, least, most)
+
+
+def _sorted(directions: Array, beams: Array) -> tuple[Array, Array, Array, Array]:
+    """Polar angles and azimuths of directions, and of beams in the order of their polar angle."""
+    t_b, p_b = polar_and_azimuth(beams)
+    order = np.argsort(t_b, kind="stable")
+    return *polar_and_azimuth(directions), t_b[order], p_b[order]
+
+
+@njit(cache=True, nogil=True)
+def _time(done: float, numbers: Array) -> float:
+    """Time of the way out at an angle above the lower limit; `Sweep.time_s` for one number."""
+    span, cruise, ramp, half = numbers[1], numbers[2], numbers[3], numbers[4]
+    if cruise <= 0.0:
+        return half if done > 0.0 else 0.0
+    if done <= 0.0:
+        return 0.0
+    if done >= span:
+        return half
+    slow = 0.5 * cruise * ramp
+    if done < slow:
+        return np.sqrt(2 * done * ramp / cruise)
+    if span - done < slow:
+        return half - np.sqrt(2 * (span - done) * ramp / cruise)
+    return 0.5 * ramp + done / cruise
+
+
+@njit(cache=True, nogil=True)
+def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> int:
+    """Times [scans] in which the joint is within an angle of a centre: (from, to) pairs in `out`, their number."""
+    lower, span, half, rate = numbers[0], numbers[1], numbers[4], numbers[5]
+    n = 0
+    turn = 2 * np.pi
+    if half_angle >= np.pi:
+        out[0, 0], out[0, 1] = 0.0, 2 * half * rate
+        return 1
+    # the first copy of the window that ends above the lower limit, and those after it that start below the upper one
+    start = (centre - half_angle - lower) % turn - turn
+    while start <= span:
+        end = start + 2 * half_angle
+        if end >= 0.0:
+            a, b = _time(max(start, 0.0), numbers), _time(end, numbers)
+            if end >= span:  # the turning point is inside: out and back are one stretch
+                out[n, 0], out[n, 1] = a * rate, (2 * half - a) * rate
+                n += 1
+            else:
+                out[n, 0], out[n, 1] = a * rate, b * rate
+                out[n + 1, 0], out[n + 1, 1] = (2 * half - b) * rate, (2 * half - a) * rate
+                n += 2
+        start += turn
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _mean(t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: float) -> Array:
+    out = np.zeros(len(t))
+    pairs = np.empty((6, 2))
+    for i in range(len(t)):
+        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), len(t_b)):
+            if t_b[b] > t[i] + ball + 1e-9:
+                break
+            half = half_width(t[i], t_b[b], ball)
+            if half < 0.0:
+                continue
+            for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
+                out[i] += pairs[k, 1] - pairs[k, 0]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _zones(
+    t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: float, g: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Walk the start phase from 0 to 1 per direction; see `zones_swept`."""
+    n = len(t)
+    mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    at, rise = np.empty(12 * len(t_b)), np.empty(12 * len(t_b), np.int64)
+    pairs = np.empty((6, 2))
+    for i in range(n):
+        level, steps = 0, 0
+        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), len(t_b)):
+            if t_b[b] > t[i] + ball + 1e-9:
+                break
+            half = half_width(t[i], t_b[b], ball)
+            if half < 0.0:
+                continue
+            for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
+                first, last = pairs[k, 0], pairs[k, 1]
+                mean[i] += last - first
+                # scans k + s in first .. last: floor(last - s) - ceil(first - s) + 1 of them
+                level += int(np.floor(last)) - int(np.ceil(first)) + 1
+                at[steps], rise[steps] = first - np.floor(first), 1
+                if first == np.floor(first):  # already counted at s = 0
+                    at[steps], rise[steps] = 0.0, 0
+                at[steps + 1], rise[steps + 1] = last - np.floor(last), -1
+                steps += 2
+        order = np.argsort(at[:steps])
+        here, lowest, highest = 0.0, 1 << 62, 0
+        for k in order:
+            if at[k] > here:
+                mean_g[i] += g[level] * (at[k] - here)
+                if at[k] - here > TIE:
+                    lowest, highest = min(lowest, level), max(highest, level)
+                here = at[k]
+            level += rise[k]
+        mean_g[i] += g[level] * (1.0 - here)
+        if 1.0 - here > TIE:
+            lowest, highest = min(lowest, level), max(highest, level)
+        least[i], most[i] = lowest, highest
+    return mean_g, mean, least, most

@@ -1,0 +1,264 @@
+"""The optimum of a task beside what else one could mount or buy.
+
+Rotating candidates have the lidar, the servo and the period of the task, whatever angles the task allows:
+
+- rolling and pitching, the standard alignments (Schubert 2016, section 4);
+- Bonn: axis 45 deg down ahead, scan plane along the axis, heading twisted away from it "slightly" (the UTM-30LX-EW on
+  an MX-28 that their MAV carries). How far was not found: the twist up to 45 deg that suits the task best is taken;
+- pitch only, as in Malaga (Mandow; Morales 2018): the axis stands upright, only `beta_laser` is free.
+
+Ready-made scanners are the `multibeam` products of the catalogue, mounted upright with x ahead. Their layers are cones
+about the axis, so their density is zonal as that of a fan whose bearings are the elevations and whose plane holds the
+axis: all that is true of a fan here is true of them. Each is judged twice, for one turn and for the whole turns that
+fit into the period of the task. Turns are not alike: the speed varies by some 3 rpm, so that the sensor "fills in the
+gaps" over time (VLS-128 User Manual, section 8.3.2), nobody says how evenly. But g is convex, so whatever the turns do,
+
+    g(n mean)  <=  < g(d_1 + .. + d_n) >  <=  < g(n d_1) >,
+
+the left side for turns that interlace to the mean, the right one for turns that repeat each other. J is the middle, and
+half of the distance goes into `J_error`. Not modelled: azimuth offsets of the single lasers, range, dropouts.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from design.angles import STANDARD_DEG
+from design.catalogue.catalogue import Multibeam, SlipRing
+from design.density.ball_count import ball_count
+from design.density.beams import Lines
+from design.evaluation.coverage import coverage
+from design.evaluation.gaps import gaps
+from design.frames import Array
+from design.objective.ball_search import SETS
+from design.objective.problem import NODES, Problem
+from design.objective.score import Score, score, score_on
+from design.search.coarse import Progress
+from design.search.families import Family
+from design.search.search import search
+from design.sphere.directions import sample_set, spiral
+from design.task.task import AngleRanges, LoadedTask
+
+LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
+UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations
+SEARCHED = {
+    "Bonn, 45 deg": AngleRanges(alpha_rot_deg=180, beta_rot_deg=45, alpha_laser_deg=90, beta_laser_deg=(-90, -45)),
+    "pitch only": AngleRanges(alpha_rot_deg=0, beta_rot_deg=0, alpha_laser_deg=0, beta_laser_deg=(-90, 90)),
+}
+PHASES = 4  # start phases, and directions, for a scanner that sees part of a turn only: it is no longer zonal
+DIRECTIONS = 10_000
+BLIND_DIRECTIONS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One candidate over one time.
+
+    Attributes:
+        name: of the candidate.
+        setting: its mounting angles, or how it stands.
+        time_s: what it measures for; all numbers but points_per_s are of this time.
+        turns: of the axis in that time.
+        J: the objective of the task, and in J_error a bound on its error.
+        blind_fraction: of the unmasked sphere, never seen.
+        blind_weight: share of the weight of the task, never seen.
+        gap_deg: widest distance between neighbouring scan lines or layers, across them.
+        layers: circles about the axis on which beams run: beams of the 2D lidar, lasers of a multibeam.
+        points_per_s: measurements per second; as the maker states it for a multibeam.
+        cost_usd: lidar, servo and slip ring, or the scanner; None where a price is not known.
+    """
+
+    name: str
+    setting: str
+    time_s: float
+    turns: int
+    J: float
+    J_error: float
+    blind_fraction: float
+    blind_weight: float
+    gap_deg: float
+    layers: int
+    points_per_s: float
+    cost_usd: float | None
+
+
+def compare(loaded: LoadedTask, problem: Problem, best: Family, progress: Progress = lambda _: None) -> list[Row]:
+    """Rows of the optimum, the alignments known from others, and every multibeam of the catalogue.
+
+    Args:
+        loaded: the task.
+        problem: its numbers.
+        best: its optimum, the first family of `search`.
+        progress: told of each step.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    rows = [_rotating("optimum", loaded, problem, best.angles_rad, best.score)]
+    for name, angles_deg in STANDARD_DEG.items():
+        setting = np.radians(angles_deg)
+        rows.append(_rotating(name, loaded, problem, setting, score(problem, setting)))
+    for name, ranges in SEARCHED.items():
+        progress(name)
+        family = search(problem, ranges).best[0]
+        rows.append(_rotating(name, loaded, problem, family.angles_rad, family.score))
+    for product in loaded.products:
+        if isinstance(product, Multibeam):
+            progress(product.name)
+            whole = max(1, int(np.floor(loaded.task.motion.duration_s * product.turn_rate_hz + 1e-9)))
+            rows += [ready_made(problem, product, turns) for turns in sorted({1, whole})]
+    return rows
+
+
+def ready_made(problem: Problem, product: Multibeam, turns: int) -> Row:
+    """The row of a multibeam over a number of turns.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    if np.ptp(product.azimuth_deg) == 360:
+        J, J_error, blind_fraction, blind_weight = _zonal(problem, product, turns)
+    else:
+        J, J_error, blind_fraction, blind_weight = sampled(problem, product, turns)
+    return Row(
+        name=product.name,
+        setting="upright",
+        time_s=turns / product.turn_rate_hz,
+        turns=turns,
+        J=J,
+        J_error=J_error,
+        blind_fraction=blind_fraction,
+        blind_weight=blind_weight,
+        gap_deg=float(np.diff(product.elevations_deg).max()),
+        layers=len(product.elevations_deg),
+        points_per_s=product.points_per_second,
+        cost_usd=product.price_usd,
+    )
+
+
+def lines_of(product: Multibeam) -> Lines:
+    """Directions in azimuth that each layer measures in one turn: a whole number of them, evenly spread."""
+    span = np.ptp(product.azimuth_deg)
+    count = max(1, round(span / product.azimuth_step_deg))
+    return Lines(count, float(np.radians(span / count)))
+
+
+def multibeam_scan(product: Multibeam, start: float = 0.0) -> Array:
+    """Directions of one turn, upright, shape (lines * layers, 3); `start` is the start phase in azimuth steps."""
+    lines = lines_of(product)
+    azimuth = np.radians(product.azimuth_deg[0]) + lines.angles_rad + start * lines.step_rad
+    p, e = np.meshgrid(azimuth, np.radians(product.elevations_deg), indexing="ij")
+    return np.stack([np.cos(e) * np.cos(p), np.cos(e) * np.sin(p), np.sin(e)], axis=-1).reshape(-1, 3)
+
+
+def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
+    """J, J_error, blind share of the sphere and of the weight, by ball search: for azimuths that are no full turn."""
+    scans = [multibeam_scan(product, (i + 0.5) / PHASES) for i in range(PHASES)]
+
+    def counts(directions: Array) -> Array:
+        return np.stack([ball_count(scan, directions, problem.ball_rad) for scan in scans])
+
+    uppers, lowers, blind = [], [], []
+    for index in range(SETS):
+        upper, lower = [], []
+        for moment in problem.objective.moments:
+            samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
+            found = turns * counts(samples.directions)
+            share = samples.weights / samples.weights.sum()
+            if moment.gathered == "highest":
+                upper.append(moment.g(found).max())
+                lower.append(moment.g(found.mean(axis=0)).max())
+            else:
+                upper.append(moment.g(found).mean(axis=0) @ share)
+                lower.append(moment.g(found.mean(axis=0)) @ share)
+            if moment is problem.objective.moments[0]:
+                blind.append(float((found.max(axis=0) == 0) @ share))
+        uppers.append(float(problem.objective.join(np.array(upper))))
+        lowers.append(float(problem.objective.join(np.array(lower))) if turns > 1 else uppers[-1])
+    sphere = spiral(BLIND_DIRECTIONS)
+    unseen = counts(sphere[~problem.field.masked_at(sphere)]).max(axis=0) == 0
+    middles = (np.array(uppers) + lowers) / 2
+    spread = 4 * float(np.std(middles, ddof=1)) / len(middles) ** 0.5 if len(middles) > 1 else 0.0
+    return (
+        float(middles.mean()),
+        float(np.mean(uppers) - np.mean(lowers)) / 2 + spread,
+        float(unseen.mean()) if len(unseen) else 0.0,
+        float(np.mean(blind)),
+    )
+
+
+def table(rows: list[Row]) -> list[str]:
+    """Lines of text for a person, the heading first."""
+    width = max(len(row.name) for row in rows)
+    lines = [
+        f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>6}"
+        f" {'of weight':>9} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'USD':>7}"
+    ]
+    for row in rows:
+        cost = "?" if row.cost_usd is None else f"{row.cost_usd:,.0f}"
+        lines.append(
+            f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f} {row.J_error:6.0e}"
+            f" {row.blind_fraction:6.1%} {row.blind_weight:9.1%} {row.gap_deg:9.3f} {row.layers:6}"
+            f" {row.points_per_s:9,.0f} {cost:>7}"
+        )
+    return lines
+
+
+def notes(loaded: LoadedTask) -> list[str]:
+    """What the columns mean, and which numbers of the ready-made scanners nobody has verified."""
+    ball = loaded.task.density.ball_radius_deg
+    doubts = [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam) and p.unverified()]
+    return [
+        "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
+        f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
+        "blind: of the sphere outside the masks; of weight: what of the task's weight is blind",
+        "gap: widest between neighbouring scan lines or layers, inside of what is seen",
+        "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
+        "ready-made scanners stand upright; Bonn takes the twist, pitch only the pitch, that suits this task best",
+        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts),
+    ]
+
+
+def write_csv(path: Path, rows: list[Row]) -> None:
+    """The rows under the names of their fields; what is not known is empty."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+
+
+def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Array, judged: Score) -> Row:
+    ring = loaded.task.slip_ring
+    parts = [loaded.lidar.price_usd, loaded.servo.price_usd]
+    parts += [loaded.products.get(ring, SlipRing).price_usd] if ring else []
+    known = [price for price in parts if price is not None]
+    return Row(
+        name=name,
+        setting="(" + ", ".join(f"{angle:g}" for angle in np.degrees(angles_rad).round(2) + 0.0) + ")",
+        time_s=loaded.task.motion.duration_s,
+        turns=1,
+        J=judged.J,
+        J_error=judged.J_error,
+        blind_fraction=coverage(problem, angles_rad).blind_fraction,
+        blind_weight=judged.blind_weight,
+        gap_deg=gaps(problem, angles_rad).line_gap_deg,
+        layers=len(problem.bearings_rad),
+        points_per_s=loaded.lidar.scan_rate_hz * len(problem.bearings_rad),
+        cost_usd=sum(known) if len(known) == len(parts) else None,
+    )
+
+
+def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
+    """J, J_error, blind share of the sphere and of the weight, of layers that run all around."""
+    lines = lines_of(product)
+    fan = problem.with_beams(np.radians(product.elevations_deg), replace(lines, repeats=turns))
+    judged = score_on(fan, UPRIGHT_RAD, NODES)
+    J, half = judged.J, LAYERED * judged.J_error
+    if turns > 1:
+        J, half = (judged.J + judged.J_lower) / 2, half + (judged.J - judged.J_lower) / 2
+    whole = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # -ln(1 + d) moves by less than d does
+    return J, half + whole, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight

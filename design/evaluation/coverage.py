@@ -1,0 +1,107 @@
+"""What a setting sees and what not, on the unmasked sphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.density.beams import polar_and_azimuth
+from design.density.spin import mean_count
+from design.density.sweep import mean_count_swept
+from design.frames import Array, R_world_rot
+from design.objective.problem import Problem
+from design.scene.surface import Surface
+from design.sphere.directions import spiral
+
+CIRCLES = 10_000
+TABLE = 3601  # polar angles
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """Shares of solid angle.
+
+    Attributes:
+        blind_fraction: of the unmasked sphere, where no beam comes at any start phase.
+        masked_fraction: of the whole sphere, what the robot hides.
+    """
+
+    blind_fraction: float
+    masked_fraction: float
+
+
+def coverage(problem: Problem, angles_rad: Array) -> Coverage:
+    """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    if problem.sweep is not None:
+        return _swept(problem, angles_rad)
+    polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
+    up = np.array([0.0, 0.0, 1.0])
+    open_share = _unmasked(problem, up, 0.0, np.pi)
+    blind = sum(_unmasked(problem, axis, a, b) for a, b in blind_zones(polar, problem.ball_rad))
+    return Coverage(
+        blind_fraction=blind / open_share if open_share > 0 else 0.0,
+        masked_fraction=max(0.0, 1.0 - open_share),
+    )
+
+
+def _swept(problem: Problem, angles_rad: Array) -> Coverage:
+    """For a sweep, whose blind region is no zone: over directions of equal solid angle."""
+    assert problem.sweep is not None
+    directions = spiral(CIRCLES)
+    masked = problem.field.masked_at(directions)
+    in_rot = directions[~masked] @ R_world_rot(angles_rad[0], angles_rad[1])
+    beams = problem.beams_rot(angles_rad[2:])
+    seen = mean_count_swept(in_rot, beams, problem.sweep, problem.ball_rad) > 0
+    return Coverage(float((~seen).mean()) if len(seen) else 0.0, float(masked.mean()))
+
+
+def mean_density_at(problem: Problem, angles_rad: Array, directions: Array) -> Array:
+    """Mean beams per ball at unit vectors (n, 3), from a table over the polar angle where the axis turns all around."""
+    R = R_world_rot(angles_rad[0], angles_rad[1])
+    beams = problem.beams_rot(angles_rad[2:])
+    if problem.sweep is not None:
+        return mean_count_swept(directions @ R, beams, problem.sweep, problem.ball_rad)
+    table = np.linspace(0, np.pi, TABLE)
+    counts = mean_count(table, polar_and_azimuth(beams)[0], problem.lines, problem.ball_rad)
+    return np.interp(np.arccos(np.clip(directions @ R[:, 2], -1, 1)), table, counts)
+
+
+def points_per_m2(problem: Problem, angles_rad: Array, surface: Surface) -> Array:
+    """Points per square metre of surface in the mean over the start phase, shape (rows, columns); 0 where none is.
+
+    Beams per steradian, from those within the ball, over the square metres that lie behind a steradian.
+    """
+    area = surface.area_per_sr()
+    density = mean_density_at(problem, angles_rad, surface.directions.reshape(-1, 3)).reshape(area.shape)
+    per_sr = density / (2 * np.pi * (1 - np.cos(problem.ball_rad)))
+    return np.divide(per_sr, area, out=np.zeros_like(area), where=area > 0)
+
+
+def on_surfaces(problem: Problem, angles_rad: Array, surface: Surface) -> dict[str, float]:
+    """Points per square metre in the weighted region: the lowest, and the median by area."""
+    density = points_per_m2(problem, angles_rad, surface).ravel()
+    directions = surface.directions.reshape(-1, 3)
+    solid_angle = np.sqrt(1 - directions[:, 2] ** 2)  # of equal cells in theta and phi
+    area = np.where(problem.field.weight_at(directions) > 0, surface.area_per_sr().ravel() * solid_angle, 0.0)
+    order = np.argsort(density)
+    seen = order[area[order] > 0]
+    middle = seen[np.searchsorted(np.cumsum(area[seen]), area[seen].sum() / 2)]
+    return {"lowest_points_per_m2": float(density[seen[0]]), "median_points_per_m2": float(density[middle])}
+
+
+def blind_zones(beam_polar_rad: Array, ball_rad: float) -> list[tuple[float, float]]:
+    """Ranges of the polar angle about the axis that lie further than a ball radius from every beam."""
+    polar = np.sort(beam_polar_rad)
+    starts = np.concatenate([[0.0], polar + ball_rad])
+    ends = np.concatenate([polar - ball_rad, [np.pi]])
+    return [(float(a), float(b)) for a, b in zip(starts, ends, strict=True) if b > a]
+
+
+def _unmasked(problem: Problem, axis: Array, low_rad: float, high_rad: float) -> float:
+    """Share of the whole sphere that lies between two polar angles and outside the masks."""
+    height = np.cos(low_rad) - np.cos(high_rad)
+    z = np.cos(low_rad) - height * (np.arange(CIRCLES) + 0.5) / CIRCLES
+    _, shares = problem.field.on_circles(axis, np.arccos(np.clip(z, -1, 1)))
+    return float(shares.mean() * height / 2)

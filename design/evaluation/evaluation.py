@@ -1,0 +1,186 @@
+"""Everything that is said of one setting: its figures (`facts`, for programs) and the same in words (`lines`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from design.density.beams import scan_at
+from design.errors import TaskError
+from design.evaluation.coverage import Coverage, coverage, on_surfaces
+from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
+from design.evaluation.poles import PoleChances, pole_chances, pole_of
+from design.frames import Array
+from design.objective.ball_search import BallScore, ball_score
+from design.objective.problem import Problem, problem_of
+from design.objective.score import Score, score
+from design.search.tolerance import rise_words, sensitivity
+from design.task.task import LoadedTask
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """One setting of a task, judged.
+
+    Attributes:
+        score: J by the closed form.
+        ball: J by the paper's ball search over simulated scans.
+        coverage: what is blind and what is masked.
+        gaps: blind cones, gaps and crossings of scan lines.
+        cap: the largest empty cap of a sweep; None for a spin, whose blind cones say it.
+        interlaced_s: the period whose next turn fills the gaps of this one; None where the axis does not spin.
+        rises: by how much J rises where each angle is 1 deg off.
+        hit: the chance to hit a pole, where one was asked for.
+        surfaces: points per square metre, where the task has a scene.
+    """
+
+    score: Score
+    ball: BallScore
+    coverage: Coverage
+    gaps: Gaps
+    cap: BlindCone | None
+    interlaced_s: float | None
+    rises: dict[str, float]
+    hit: PoleChances | None
+    surfaces: dict[str, float] | None
+
+    def facts(self) -> dict[str, Any]:
+        """Names with units and values, for JSON."""
+        return {
+            "J": self.score.J,
+            "J_error": self.score.J_error,
+            "J_lower": self.score.J_lower,
+            "J_ball": self.ball.J,
+            "J_ball_error": self.ball.J_error,
+            "blind_fraction": self.coverage.blind_fraction,
+            "blind_weight_fraction": self.score.blind_weight,
+            "masked_fraction": self.coverage.masked_fraction,
+            "min_density": self.score.least,
+            **asdict(self.gaps),
+            **({} if self.cap is None else {"empty_cap": asdict(self.cap)}),
+            **({} if self.interlaced_s is None else {"interlaced_period_s": self.interlaced_s}),
+            "J_rises_1_deg_off": self.rises,
+            **({} if self.hit is None else {"pole": asdict(self.hit)}),
+            **(self.surfaces or {}),
+        }
+
+    def lines(self) -> list[str]:
+        """The same, a line for each figure."""
+        J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
+        lines = [
+            f"J              {J.J:.5f} +- {J.J_error:.1e}   mean of g(true count) over the start phase",
+            f"J_lower        {J.J_lower:.5f}             g of the mean count: a lower bound",
+            f"J_ball         {ball.J:.5f} +- {ball.J_error:.1e}   ball search over 8 simulated scans",
+            f"blind          {seen.blind_fraction:.2%} of the unmasked sphere, {J.blind_weight:.2%} of the weight",
+            f"masked         {seen.masked_fraction:.2%} of the sphere",
+            f"min_density    {J.least} beams per ball, lowest in the weighted region at any start phase",
+        ]
+        lines += [f"blind cone     {_cap(cone)}" for cone in gap.blind_cones]
+        if self.cap is not None:
+            lines.append(f"empty cap      {_cap(self.cap)}, the largest without a beam")
+        lines.append(f"line gap       {gap.line_gap_deg:.3f} deg at the widest, {gap.line_gap_mm(10):.0f} mm at 10 m")
+        crossing = "" if gap.crossing_deg is None else f", lines crossing at {gap.crossing_deg:.0f} deg on average"
+        lines.append(f"seen twice     {gap.seen_twice:.1%} of the weight{crossing}")
+        if gap.half_turn_misses is not None:
+            lines.append(f"half a turn    misses {gap.half_turn_misses:.1%} of the weight that a full turn sees")
+        if self.hit is not None:
+            for found in self.hit.chances:
+                beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
+                chance = f"{found.chance:.2%} +- {found.error:.2%}"
+                lines.append(f"pole           {chance} get at least {beams} ({self.hit.stands} azimuths)")
+        if self.surfaces is not None:
+            low, middle = self.surfaces["lowest_points_per_m2"], self.surfaces["median_points_per_m2"]
+            lines.append(
+                f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
+            )
+        if self.interlaced_s is not None:
+            lines.append(
+                f"interlaced     {self.interlaced_s:g} s a turn: the next one's lines come halfway between those of "
+                "this one"
+            )
+        return [*lines, f"1 deg off      {rise_words(self.rises, J.J_error)}"]
+
+
+def evaluate(
+    loaded: LoadedTask, problem: Problem, angles_rad: Array, pole: str | None, progress: Callable[[str], None]
+) -> Evaluation:
+    """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+
+    Args:
+        loaded: the task.
+        problem: its numbers, `problem_to_judge`.
+        angles_rad: the setting.
+        pole: as `pole_of` reads it, None for no pole.
+        progress: is told what is being computed.
+
+    Raises:
+        TaskError: no direction has a weight, or the pole makes no sense.
+    """
+    asked = None if pole is None else pole_of(pole, loaded.lidar)
+    motion, sweep = loaded.task.motion, problem.sweep
+    progress("closed form")
+    cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
+    interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
+    found = score(problem, angles_rad)
+    progress("ball search, 8 start phases")
+    return Evaluation(
+        score=found,
+        ball=ball_score(problem, angles_rad),
+        coverage=coverage(problem, angles_rad),
+        gaps=gaps(problem, angles_rad),
+        cap=cap,
+        interlaced_s=interlaced_s,
+        rises=sensitivity(problem, angles_rad, np.radians(1.0)),
+        hit=None if asked is None else pole_chances(problem, angles_rad, asked),
+        surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
+    )
+
+
+def problem_to_judge(loaded: LoadedTask, lever: str | None) -> Problem:
+    """The numbers of a task, the optical centre off the axis as `lever` says: `X_MM,Y_MM,RANGE_M`.
+
+    Raises:
+        TaskError: these are no three numbers that make sense, or no direction has a weight.
+    """
+    return problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_lever_of(lever))
+
+
+def setting_of(text: str) -> Array:
+    """The setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] from four numbers in degrees.
+
+    Raises:
+        TaskError: these are not four angles.
+    """
+    try:
+        angles = [float(part) for part in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 4 or not all(abs(angle) <= 360 for angle in angles):
+        raise TaskError(f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling")
+    return np.radians(angles)
+
+
+def simulated_beams(problem: Problem, angles_rad: Array) -> Array:
+    """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
+    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    return scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+
+
+def _cap(cap: BlindCone) -> str:
+    x, y, z = cap.axis_world
+    return f"{cap.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})"
+
+
+def _lever_of(text: str) -> tuple[float, float, float]:
+    try:
+        x_mm, y_mm, range_m = (float(part) for part in text.split(","))
+    except ValueError:
+        x_mm = y_mm = range_m = 0.0
+    if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
+        raise TaskError(
+            f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
+        )
+    return x_mm / 1000 / range_m, y_mm / 1000 / range_m, 0.0

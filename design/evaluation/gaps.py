@@ -1,0 +1,191 @@
+"""What a density does not tell: blind cones, gaps between scan lines, how lines cross, what a half turn misses.
+
+All in closed form for a fan that spins at constant speed. With gamma the angle between axis and scan-plane normal, the
+plane meets the circle at polar angle t in at most two bearings phi0 +- sigma, sin(gamma) cos(sigma) = cos(t); each
+that lies in the field of view is a family of scan lines there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from design.density.beams import Lines, beam_directions_rot, polar_and_azimuth
+from design.density.spin import zones
+from design.errors import TaskError
+from design.frames import Array, R_rot_laser, R_world_rot
+from design.objective.problem import NODES, Problem
+from design.objective.quadrature import rule_of
+from design.sphere.directions import weighted_samples
+
+MOST_LINES = 200_000
+SWEPT_DIRECTIONS = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class BlindCone:
+    """A cone about the axis that no beam enters: the largest empty caps of a dense scan."""
+
+    axis_world: tuple[float, float, float]
+    half_angle_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gaps:
+    """Shares are of the weight of the task.
+
+    Attributes:
+        blind_cones: about the axis and about its opposite, the wider one first; none where beams reach the axis.
+        line_gap_deg: widest distance between neighbouring scan lines of one family, across the lines.
+        seen_twice: where both families of lines come.
+        crossing_deg: mean angle at which they cross there, 0 to 90; None where nothing is seen twice.
+        half_turn_misses: what half a turn does not see of what a full turn sees, in the mean over its start; None for
+            a sweep.
+    """
+
+    blind_cones: tuple[BlindCone, ...]
+    line_gap_deg: float
+    seen_twice: float
+    crossing_deg: float | None
+    half_turn_misses: float | None
+
+    def line_gap_mm(self, range_m: float) -> float:
+        """Widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
+        return float(np.radians(self.line_gap_deg) * range_m * 1000)
+
+
+def gaps(problem: Problem, angles_rad: Array) -> Gaps:
+    """Gaps of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    u = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    beams = problem.beams_rot(angles_rad[2:])
+    normal = R_rot_laser(angles_rad[2], angles_rad[3])[:, 2]
+    across = np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal)
+    polar_rad, weights, families = (_around if problem.sweep is None else _within_limits)(problem, angles_rad)
+    seen = families.any(axis=0)
+    twice = families.all(axis=0)
+    apart, crossing = _between_families(normal, polar_rad)
+    total = float(weights.sum())
+    weight_twice = float(weights @ twice)
+    # half a turn sees half of what one family sees, and more by how far the second one is ahead or behind
+    misses = np.where(twice, 0.5 - apart / (2 * np.pi), 0.5) * seen
+    return Gaps(
+        blind_cones=_blind_cones(u, polar_and_azimuth(beams)[0]),
+        line_gap_deg=float(np.degrees(problem.lines.step_rad * across.max())),
+        seen_twice=weight_twice / total,
+        crossing_deg=float(np.degrees(weights @ (crossing * twice) / weight_twice)) if weight_twice > 0 else None,
+        half_turn_misses=float(weights @ misses / total) if problem.sweep is None else None,
+    )
+
+
+def empty_cap(scan: Array) -> BlindCone:
+    """The largest cap that holds no beam of a simulated scan, unit vectors (n, 3): exact, from the convex hull.
+
+    The plane of a facet cuts a cap off the sphere, and no beam lies beyond it.
+    """
+    planes = ConvexHull(scan).equations
+    widest = int(planes[:, 3].argmax())
+    x, y, z = (float(value) + 0.0 for value in planes[widest, :3])
+    return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
+
+
+def shortest_period_s(
+    problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int, nodes: int = NODES
+) -> float:
+    """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
+
+    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats. The region is looked at
+    on `nodes` circles about the axis: with fewer a thin spot between two of them may go unseen.
+
+    Raises:
+        TaskError: the region holds directions that no period brings that many beams to.
+    """
+    if least < 1:
+        raise TaskError(f"density {least}: ask for at least 1 beam per ball")
+    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, nodes)
+    polar_rad = rule.polar_rad[rule.fine > 0]
+
+    def enough(count: int) -> bool:
+        lines = Lines(count, 2 * np.pi / count)
+        flat = np.zeros(count * len(problem.bearings_rad) + 1)
+        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, flat)
+        return bool(found.least.min() >= least)
+
+    upper = 1
+    while not enough(upper):
+        upper *= 2
+        if upper > MOST_LINES:
+            raise TaskError(
+                f"density {least} per ball: not reached with {MOST_LINES} lines; part of the region is blind: "
+                "make it smaller, mask it, or take other angles"
+            )
+    lower = upper // 2
+    while upper - lower > 1:
+        middle = (upper + lower) // 2
+        lower, upper = (lower, middle) if enough(middle) else (middle, upper)
+    return upper / scan_rate_hz
+
+
+def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
+    """The period nearest to one given whose next turn puts its lines halfway between those of this one."""
+    return (np.floor(period_s * scan_rate_hz) + 0.5) / scan_rate_hz
+
+
+def _blind_cones(u: Array, beam_polar: Array) -> tuple[BlindCone, ...]:
+    cones = [(u, float(beam_polar.min())), (-u, float(np.pi - beam_polar.max()))]
+    found = [
+        BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h)))
+        for a, h in cones
+        if h > 1e-9
+    ]
+    return tuple(sorted(found, key=lambda cone: -cone.half_angle_deg))
+
+
+def _around(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+    """Polar angles, their weights, and the families that come there, where the axis turns all around."""
+    rule, _, _ = rule_of(problem, angles_rad, NODES)
+    return rule.polar_rad, rule.fine, _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)[0]
+
+
+def _within_limits(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+    """The same at directions, for a sweep: a family comes where the joint angle it needs lies within the limits."""
+    assert problem.sweep is not None
+    samples = weighted_samples(problem.field, SWEPT_DIRECTIONS)
+    polar, azimuth = polar_and_azimuth(samples.directions @ R_world_rot(angles_rad[0], angles_rad[1]))
+    families, bearings = _families(problem.bearings_rad, angles_rad[2:], polar)
+    beam_azimuth = np.stack([polar_and_azimuth(beam_directions_rot(b, *angles_rad[2:]))[1] for b in bearings])
+    lower, upper = np.radians(problem.sweep.motion.limits_deg)
+    return polar, samples.weights, families & ((azimuth - beam_azimuth - lower) % (2 * np.pi) <= upper - lower)
+
+
+def _families(bearings_rad: Array, plane_rad: Array, polar_rad: Array) -> tuple[Array, Array]:
+    """Whether each of the two bearings of a polar angle lies in the field of view, and the bearings, (2, n) both."""
+    alpha, beta = plane_rad
+    q = np.array([-np.sin(beta), np.cos(beta) * np.sin(alpha)])
+    slope = np.hypot(*q)  # sin(gamma)
+    nearest = np.arctan2(q[1], q[0])  # the bearing that comes closest to the axis
+    if slope < 1e-12:
+        return np.zeros((2, len(polar_rad)), dtype=bool), np.zeros((2, len(polar_rad)))
+    ratio = np.cos(polar_rad) / slope
+    met = np.abs(ratio) <= 1
+    sigma = np.arccos(np.clip(ratio, -1, 1))
+    step = np.diff(bearings_rad).max() / 2
+    low, high = bearings_rad.min() - step, bearings_rad.max() + step
+    both = np.stack([nearest + sigma, nearest - sigma])
+    return met & ((both - low) % (2 * np.pi) <= high - low), both
+
+
+def _between_families(normal: Array, polar_rad: Array) -> tuple[Array, Array]:
+    """Azimuth between the two lines through a polar angle, 0 to pi, and the angle at which they cross, 0 to pi/2."""
+    slope, upright = np.hypot(normal[0], normal[1]), abs(normal[2])
+    sine = np.maximum(np.sin(polar_rad), 1e-12)
+    # in the plane: slope sin(t) cos(azimuth) = -upright cos(t), so the two lie on both sides of the plane's foot
+    azimuth = np.arccos(np.clip(-upright * np.cos(polar_rad) / np.maximum(slope * sine, 1e-12), -1, 1))
+    apart = 2 * np.minimum(azimuth, np.pi - azimuth)
+    half = np.arccos(np.clip(upright / sine, -1, 1))
+    return apart, np.minimum(2 * half, np.pi - 2 * half)

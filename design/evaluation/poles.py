@@ -1,0 +1,164 @@
+"""The chance to hit a thin upright pole: where scan lines run along it, a fast turn passes it by (paper, Fig. 3).
+
+The pole's middle stands at the height of the optical centre. Seen from there it fills the azimuths within
+`asin(width / (2 range))` of its own and the elevations within `atan(height / (2 range))` of the horizon; beams are
+lines without a width. For one simulated scan the poles that get at least n beams stand in a union of intervals of
+azimuth, one for every n hits in a row, so only the start phase is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.catalogue.catalogue import Lidar
+from design.density.beams import scan_at
+from design.errors import TaskError
+from design.frames import Array
+from design.objective.problem import Problem
+
+BEAMS = 1, 3  # that a pole is asked for: to be seen at all, and to be more than a stray point
+PHASES = 24
+CELLS = 18_000  # of azimuth, for the weights
+HEIGHTS = 9  # at which a pole's weight is looked up
+SEED = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pole:
+    """An upright pole and how far away it stands."""
+
+    width_m: float
+    height_m: float
+    range_m: float
+
+    @property
+    def half_width_rad(self) -> float:
+        """Azimuth from its middle to its edge."""
+        return float(np.arcsin(self.width_m / (2 * self.range_m)))
+
+    @property
+    def half_height_rad(self) -> float:
+        """Elevation of its upper end."""
+        return float(np.arctan(self.height_m / (2 * self.range_m)))
+
+
+@dataclass(frozen=True, slots=True)
+class Chance:
+    """That a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase.
+
+    Attributes:
+        beams: asked for.
+        chance: 0 to 1.
+        error: four standard errors of the mean over start phases, and the width of a cell of azimuth.
+    """
+
+    beams: int
+    chance: float
+    error: float
+
+
+@dataclass(frozen=True, slots=True)
+class PoleChances:
+    """What one setting makes of a pole.
+
+    Attributes:
+        chances: for each of `BEAMS`.
+        stands: "weighted" where poles stand in proportion to the weight of the task along them; "unmasked" where the
+            region does not reach them, and they stand anywhere that the robot does not hide.
+    """
+
+    chances: tuple[Chance, ...]
+    stands: str
+
+
+def pole_of(text: str, lidar: Lidar) -> Pole:
+    """A pole from `WIDTH_MM,HEIGHT_MM,RANGE_M`.
+
+    Raises:
+        TaskError: these are not three numbers above 0, or the lidar does not see that far or that near.
+    """
+    try:
+        width_mm, height_mm, range_m = (float(part) for part in text.split(","))
+    except ValueError:
+        width_mm = height_mm = range_m = np.nan
+    if not (0 < width_mm < np.inf and 0 < height_mm < np.inf and 0 < range_m < np.inf):
+        raise TaskError(f"--pole = '{text}': WIDTH_MM,HEIGHT_MM,RANGE_M, all above 0, such as --pole=20,1000,5")
+    low, high = lidar.range_min_mm / 1000, lidar.range_max_mm / 1000
+    if not low <= range_m <= high:
+        raise TaskError(f"--pole = '{text}': range_m = {range_m:g}: the {lidar.name} sees from {low:g} to {high:g} m")
+    if width_mm / 1000 >= 2 * range_m:
+        raise TaskError(f"--pole = '{text}': width_mm = {width_mm:g}: the scanner would stand in the pole")
+    return Pole(width_mm / 1000, height_mm / 1000, range_m)
+
+
+def pole_chances(problem: Problem, angles_rad: Array, pole: Pole) -> PoleChances:
+    """The chance of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] to hit a pole.
+
+    Raises:
+        TaskError: the robot hides every azimuth.
+    """
+    weights, stands = _standing(problem, pole)
+    total = float(weights.sum())
+    if not total > 0:
+        raise TaskError("--pole: the robot hides every azimuth at that height: make the pole higher, or move it away")
+    below = np.concatenate([[0.0], np.cumsum(weights)]) / total
+    rng = np.random.default_rng(SEED)
+    per_phase = []
+    for i in range(PHASES):
+        azimuths = _hits(problem, angles_rad, pole, (i + rng.random()) / PHASES, rng)
+        need = [-(-beams // problem.lines.repeats) for beams in BEAMS]  # each is measured that often
+        per_phase.append([_share(azimuths, n, pole.half_width_rad, below) for n in need])
+    found = np.array(per_phase)
+    cell = 1 / np.count_nonzero(weights)
+    errors = 4 * found.std(axis=0, ddof=1) / PHASES**0.5 + cell
+    chances = [Chance(n, float(p), float(e)) for n, p, e in zip(BEAMS, found.mean(axis=0), errors, strict=True)]
+    return PoleChances(tuple(chances), stands)
+
+
+def _standing(problem: Problem, pole: Pole) -> tuple[Array, str]:
+    """How likely a pole stands at each cell of azimuth, from -pi on, shape (cells,), and what that is taken from."""
+    azimuth = -np.pi + 2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS
+    elevation = pole.half_height_rad * ((np.arange(HEIGHTS) + 0.5) * 2 / HEIGHTS - 1)
+    p, e = (grid.ravel() for grid in np.meshgrid(azimuth, elevation, indexing="ij"))
+    directions = np.stack([np.cos(e) * np.cos(p), np.cos(e) * np.sin(p), np.sin(e)], axis=1)
+    weights = problem.field.weight_at(directions).reshape(CELLS, HEIGHTS).mean(axis=1)
+    if weights.any():
+        return weights, "weighted"
+    return 1.0 - problem.field.masked_at(directions).reshape(CELLS, HEIGHTS).mean(axis=1), "unmasked"
+
+
+def _hits(problem: Problem, angles_rad: Array, pole: Pole, start: float, rng: np.random.Generator) -> Array:
+    """Sorted azimuths, -pi to pi, of the beams of one scan that pass at the height of the pole."""
+    if problem.sweep is not None:
+        joint = problem.sweep.angles_rad(start)
+    else:  # a start anywhere in the turn: between two lines by `start`, and at any of them
+        joint = problem.lines.angles_rad + problem.lines.step_rad * (start + rng.integers(problem.lines.count))
+    beams = scan_at(problem.bearings_rad, joint, angles_rad)
+    level = beams[np.abs(beams[:, 2]) <= np.sin(pole.half_height_rad)]
+    seen = level[~problem.field.masked_at(level)]
+    return np.sort(np.arctan2(seen[:, 1], seen[:, 0]))
+
+
+def _share(azimuths: Array, beams: int, half_rad: float, below: Array) -> float:
+    """Share of the poles within `half_rad` of at least `beams` hits; `below` is the share up to each cell's edge."""
+    if len(azimuths) < beams:
+        return 0.0
+    around = np.concatenate([azimuths, azimuths[: beams - 1] + 2 * np.pi])
+    first, last = around[: len(azimuths)], around[beams - 1 :]
+    start, end = last - half_rad, first + half_rad
+    start, end = start[end > start], end[end > start]
+    # both rise: each interval adds what lies behind the end of the one before, and before the first one's next turn
+    if not len(start):
+        return 0.0
+    start = np.maximum(start, np.concatenate([start[:1], end[:-1]]))
+    end = np.minimum(end, start[0] + 2 * np.pi)
+    start = np.minimum(start, end)
+    return float((_turned(end, below) - _turned(start, below)).sum())
+
+
+def _turned(azimuth_rad: Array, below: Array) -> Array:
+    """Share of the poles from -pi up to azimuths beyond the turn, going on around."""
+    turns, rest = np.divmod((azimuth_rad + np.pi) / (2 * np.pi), 1.0)
+    return turns + np.interp(rest, np.linspace(0, 1, len(below)), below)

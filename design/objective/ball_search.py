@@ -1,0 +1,100 @@
+"""J by the paper's own way, the ball search over a simulated scan: slow, obvious, shares no density with the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from design.density.beams import scan_at
+from design.frames import Array, R_world_rot, rotvec_to_matrix
+from design.objective.problem import Problem
+from design.sphere.directions import sample_set
+
+PHASES = 8
+SETS = 4  # of directions for every phase: 32 estimates of J, so that their spread is known well enough
+DIRECTIONS = 4000  # for every phase
+
+
+@dataclass(frozen=True, slots=True)
+class BallScore:
+    """Mean of the estimates of J, and four standard errors of that mean."""
+
+    J: float
+    J_error: float
+
+
+def ball_score(problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
+    """Ball search of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], mean over 8 start phases.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    if problem.sweep is not None:
+        return _swept_score(problem, angles_rad, directions)
+    return ball_score_on(scan_tree(problem, angles_rad), problem, angles_rad, directions)
+
+
+def scan_tree(problem: Problem, angles_rad: Array) -> cKDTree:
+    """The simulated full scan of a setting, ready to be searched; it depends on beams and lines only."""
+    return _tree(scan_at(problem.bearings_rad, problem.lines.angles_rad, angles_rad, problem.lever))
+
+
+def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
+    """As `ball_score`, for a scan of a full turn that is there already.
+
+    Another start phase is the same scan turned about the axis, so the directions are turned back instead.
+    """
+    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    estimates = []
+    for i, phase in enumerate(start_phases(problem.lines.count, problem.lines.step_rad)):
+        back = rotvec_to_matrix(axis * phase)  # rows times R(phase): columns turned back
+        for k in range(SETS):
+            estimates.append(_estimate(tree, problem, back, directions // SETS, SETS * i + k))
+    return _score(problem, estimates)
+
+
+def start_phases(lines: int, step_rad: float) -> Array:
+    """Eight phases spread over the turn and, at once, evenly over the gap between two lines, shape (8,)."""
+    i = np.arange(PHASES)
+    return step_rad * (np.round(i * lines / PHASES) + (i + 0.5) / PHASES)
+
+
+def _swept_score(problem: Problem, angles_rad: Array, directions: int) -> BallScore:
+    assert problem.sweep is not None
+    estimates = []
+    for i in range(PHASES):
+        joint = problem.sweep.angles_rad((i + 0.5) / PHASES)
+        tree = _tree(scan_at(problem.bearings_rad, joint, angles_rad, problem.lever))
+        for k in range(SETS):
+            estimates.append(_estimate(tree, problem, np.eye(3), directions // SETS, SETS * i + k))
+    return _score(problem, estimates)
+
+
+def _tree(scan: Array) -> cKDTree:
+    return cKDTree(scan, balanced_tree=False, compact_nodes=False)
+
+
+def _estimate(tree: cKDTree, problem: Problem, back: Array, wanted: int, index: int) -> Array:
+    """Each moment over one set of directions, at one start phase, shape (moments,)."""
+    chord = 2 * np.sin(problem.ball_rad / 2)
+    values = []
+    for moment in problem.objective.moments:
+        samples = sample_set(moment.field, problem.grid_step_deg, wanted, index)
+        counts = tree.query_ball_point(samples.directions @ back, chord, return_length=True, workers=-1)
+        g = moment.g(problem.lines.repeats * counts)
+        highest = moment.gathered == "highest"
+        values.append(g.max() if highest else samples.weights @ g / samples.weights.sum())
+    return np.array(values)
+
+
+def _score(problem: Problem, estimates: list[Array]) -> BallScore:
+    moments = np.array(estimates).T
+    each = problem.objective.join(moments)
+    highest = [moment.gathered == "highest" for moment in problem.objective.moments]
+    gathered = np.where(highest, moments.max(axis=1), moments.mean(axis=1))
+    return BallScore(
+        J=float(problem.objective.join(gathered)),
+        J_error=float(4 * np.std(each, ddof=1) / np.sqrt(len(each))),
+    )

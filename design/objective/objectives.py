@@ -1,0 +1,171 @@
+"""What the search minimises. Each objective is one function below, with its formula; README says when to use which.
+
+An objective is a few moments of the density, joined: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a
+weight and over the start phase of the turn, or the highest g(d) anywhere in it. Every g is convex and every join rises
+with every moment whose g bends, so J of the mean counts is a lower bound of J: what the search orders its work by.
+Weights that differ from region to region (`required`) are split by their levels: exact, one moment a level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from design.errors import TaskError
+from design.frames import Array
+from design.sphere.regions import MAP, Field, Layers, field_of
+from design.task.shapes import Region
+from design.task.task import LoadedTask
+
+INTEGRAL_CIRCLES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One number about a density.
+
+    Attributes:
+        field: the weights, masks included.
+        g: of counts, convex.
+        gathered: over the field: the mean, or the highest at any start phase.
+        share: of the whole weight of the task that this moment speaks for; 0 where another one does already.
+    """
+
+    field: Field
+    g: Callable[[Array], Array]
+    gathered: Literal["mean", "highest"] = "mean"
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """Moments and how they become J: `join` takes them along the first axis. `field` is the weight of the task."""
+
+    name: str
+    field: Field
+    moments: tuple[Moment, ...]
+    join: Callable[[Array], Array]
+
+
+def log_density(counts: Array) -> Array:
+    """`g(d) = -ln(1 + d)`: rewards every direction's first beams most (the paper's logarithm, with its sign)."""
+    return -np.log1p(counts)
+
+
+def objective_of(loaded: LoadedTask, field: Field) -> Objective:
+    """The objective that a task names, over its weights.
+
+    Raises:
+        TaskError: `required` without a number, or one that nothing asks for.
+    """
+    name = loaded.task.density.objective
+    if name == "required":
+        return required(loaded, field)
+    return {"log": log, "kl": kl, "homogeneity": homogeneity, "worst": worst}[name](field)
+
+
+def log(field: Field) -> Objective:
+    """`J = mean_w <-ln(1 + d)>`: `exp(J_other - J)` times more beams per ball, on the geometric mean."""
+    return Objective("log", field, (Moment(field, log_density),), _first)
+
+
+def kl(field: Field) -> Objective:
+    """Distance to the target distribution [nat], 0 where the density is spread just as the weights are.
+
+    `J = int p ln(p / q) dO` over the directions that have a weight, p = w / int w, q = (1 + d) / int (1 + d): only how
+    the beams are shared out counts, not how many they are. The phase mean is taken of the logarithm, and of the
+    normaliser by itself.
+    """
+    support = _mapped(field, lambda w: (w > 0).astype(float))
+    entropy = _integral(_mapped(field, lambda w: w * np.log(np.where(w > 0, w, 1.0)))) / _integral(field)
+    shift = entropy - np.log(_integral(field) / _integral(support))
+    moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
+    return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift)
+
+
+def required(loaded: LoadedTask, field: Field) -> Objective:
+    """Mean shortfall, 0 to 1: `J = mean_w <max(0, 1 - d / r)>` with the density r that each region requires."""
+    asked = loaded.task.density.required
+    wanted = [asked if region.required is None else region.required for region in loaded.task.weight]
+    wanted += [asked] if loaded.task.density.background > 0 else []
+    lacking = [i for i, r in enumerate(wanted) if r is None]
+    if lacking or not wanted:
+        where = f"weight.{lacking[0]}.required" if lacking and lacking[0] < len(loaded.task.weight) else "required"
+        raise TaskError(
+            f"{loaded.source}: density.objective = 'required': {where}: say how many beams per ball, for all "
+            "regions (density.required) or in each ([[weight]] required)"
+        )
+    moments = []
+    for level in sorted({r for r in wanted if r is not None}):
+        part = field_of(loaded, _asking(level, asked))
+        part = replace(part, background=field.background * (asked == level))
+        if len(part.weight.caps) or part.background:
+            moments.append(Moment(part, _shortfall(level), share=_integral(part)))
+    total = sum(moment.share for moment in moments)
+    shared = tuple(replace(moment, share=moment.share / total) for moment in moments if moment.share > 0)
+    if len(shared) == 1:
+        shared = (replace(shared[0], field=field),)
+    shares = np.array([moment.share for moment in shared])
+    return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1))
+
+
+def homogeneity(field: Field) -> Objective:
+    """Evenness in the region, 0 where every ball holds the same count: `J = ln(mean_w <d^2> / (mean_w <d>)^2)`.
+
+    The second moment of counts in balls is the spherical Ripley function, integrated over the overlap of two balls;
+    unlike it, it knows weights, masks and the phase of the turn.
+    """
+    moments = (Moment(field, np.square), Moment(field, _itself, share=0.0))
+    return Objective("homogeneity", field, moments, _dispersion)
+
+
+def worst(field: Field) -> Objective:
+    """`J = -ln(1 + least)`, least = the fewest beams per ball anywhere in the region, at any start phase."""
+    return Objective("worst", field, (Moment(field, log_density, "highest"),), _first)
+
+
+def _first(moments: Array) -> Array:
+    return moments[0]
+
+
+def _itself(counts: Array) -> Array:
+    return np.asarray(counts, dtype=float)
+
+
+def _one_more(counts: Array) -> Array:
+    return 1.0 + counts
+
+
+def _asking(level: float, otherwise: float | None) -> Callable[[Region], float]:
+    """Weight of the regions that require just this density."""
+    return lambda region: region.value if (region.required or otherwise) == level else 0.0
+
+
+def _shortfall(level: float) -> Callable[[Array], Array]:
+    return lambda counts: np.maximum(0.0, 1.0 - counts / level)
+
+
+def _dispersion(moments: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(moments[1] > 0, np.log(moments[0] / moments[1] ** 2), np.inf)
+
+
+def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
+    """The field with every weight passed through a function."""
+    rows, tables = field.weight.rows.copy(), field.weight.tables.copy()
+    maps = rows[:, 0] == MAP
+    for row in rows[maps]:
+        tables[int(row[1])] = function(row[7] * tables[int(row[1])])
+    rows[:, 7] = np.where(maps, 1.0, function(rows[:, 7]))
+    weight = Layers(rows, field.weight.planes, tables, field.weight.caps)
+    return replace(field, weight=weight, background=float(function(np.array([field.background]))[0]))
+
+
+def _integral(field: Field) -> float:
+    """`int w dO` outside the masks: circles about z, exact along each, evenly spaced in height."""
+    z = 1 - 2 * (np.arange(INTEGRAL_CIRCLES) + 0.5) / INTEGRAL_CIRCLES
+    means, _ = field.on_circles(np.array([0.0, 0.0, 1.0]), np.arccos(z))
+    return float(4 * np.pi * means.mean())

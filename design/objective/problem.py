@@ -1,0 +1,134 @@
+"""A task as numbers: what the density and every search of it are computed from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from design.density.beams import NO_LEVER, Lines, beam_directions_rot, scan_lines
+from design.density.sweep import SweepLines
+from design.errors import TaskError
+from design.frames import Array
+from design.motion import Motion, Shortest, StopAndGo, Sweep
+from design.objective.objectives import Objective, objective_of
+from design.sphere.directions import EMPTY, equal_angle_grid, weighted_samples
+from design.sphere.regions import Field, field_of
+from design.task.task import LoadedTask
+
+FRONT = Path(__file__).parent / "front.csv"
+NODES = 6561  # per setting, spread over the segments
+A_FEW = 100  # directions that show that a region is not empty
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A task as numbers.
+
+    Attributes:
+        bearings_rad: of the beams, shape (beams,).
+        lines: of one full turn; of a sweep, as many as one period has, the widest step apart.
+        sweep: the trajectory, where the servo sweeps.
+        ball_rad: ball radius.
+        objective: what is minimised.
+        tables: g of each moment for every possible count of measured lines, (moments, lines * beams + 1).
+        grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
+        nodes: quadrature nodes that a score starts with, from the task's `tolerance` or `budget_s`.
+        tolerance: a score takes more nodes as long as it states a larger error.
+        lever: of the optical centre off the axis, `t_rot_laser / range`. By design 0; the search takes it for 0.
+    """
+
+    bearings_rad: Array
+    lines: Lines
+    sweep: SweepLines | None
+    ball_rad: float
+    objective: Objective
+    tables: tuple[Array, ...]
+    grid_step_deg: float | None
+    nodes: int = NODES
+    tolerance: float = 1e-3
+    lever: tuple[float, float, float] = NO_LEVER
+
+    def beams_rot(self, plane_rad: Array) -> Array:
+        """Unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser), shape (beams, 3)."""
+        return beam_directions_rot(self.bearings_rad, plane_rad[0], plane_rad[1], self.lever)
+
+    @property
+    def field(self) -> Field:
+        """Weights and masks of the task."""
+        return self.objective.field
+
+    def with_objective(self, objective: Objective) -> Problem:
+        """The same scanner with another aim."""
+        return replace(self, objective=objective).with_beams(self.bearings_rad, self.lines, self.sweep)
+
+    def with_beams(self, bearings_rad: Array, lines: Lines, sweep: SweepLines | None = None) -> Problem:
+        """The same task for other beams on other lines."""
+        counts = lines.repeats * np.arange(lines.count * len(bearings_rad) + 1.0)
+        tables = tuple(moment.g(counts) for moment in self.objective.moments)
+        return replace(self, bearings_rad=bearings_rad, lines=lines, sweep=sweep, tables=tables)
+
+
+def problem_of(loaded: LoadedTask) -> Problem:
+    """The numbers that decide J.
+
+    Raises:
+        TaskError: no direction has a weight, or the tolerance or the budget cannot be kept.
+    """
+    density = loaded.task.density
+    field = field_of(loaded)
+    step_deg = density.grid_step_deg if density.quadrature == "equal_angle" else None
+    try:
+        nodes = nodes_for(density.tolerance, density.budget_s)
+        if step_deg is None:
+            weighted_samples(field, A_FEW)
+        elif not field.weight_at(equal_angle_grid(step_deg)).any():
+            raise TaskError(EMPTY)
+    except TaskError as error:
+        raise TaskError(f"{loaded.source}: {error}") from error
+    motion, lidar = loaded.task.motion, loaded.lidar
+    bearings = lidar.bearings_rad()
+    lines = lines_of(motion, lidar.scan_rate_hz)
+    return Problem(
+        bearings_rad=bearings,
+        lines=lines,
+        sweep=None,
+        ball_rad=float(np.radians(density.ball_radius_deg)),
+        objective=objective_of(loaded, field),
+        tables=(),
+        grid_step_deg=step_deg,
+        nodes=nodes,
+        tolerance=density.tolerance or (np.inf if density.budget_s else 1e-3),
+    ).with_beams(bearings, lines, SweepLines(motion, lidar.scan_rate_hz) if isinstance(motion, Sweep) else None)
+
+
+def lines_of(motion: Motion | Shortest, scan_rate_hz: float) -> Lines:
+    """The scan lines of a motion; of a sweep as many as one period holds, the widest step apart."""
+    if isinstance(motion, StopAndGo):
+        repeats = max(1, int(motion.dwell_s * scan_rate_hz + 1e-9))
+        return Lines(motion.stops, 2 * np.pi / motion.stops, repeats)
+    if isinstance(motion, Sweep):
+        step = np.radians(motion.cruise_deg_s) / scan_rate_hz
+        return Lines(int(np.ceil(motion.period_s * scan_rate_hz)), float(step))
+    return scan_lines(motion.duration_s, scan_rate_hz)
+
+
+def nodes_for(tolerance: float | None, budget_s: float | None) -> int:
+    """The cheapest nodes that keep a tolerance of J, or the most that a budget pays for, from the measured front.
+
+    `design/objective/front.csv` is the front; `benchmarks/design/front.py` measures it.
+
+    Raises:
+        TaskError: nothing on the front is that near, or that fast.
+    """
+    if tolerance is None and budget_s is None:
+        return NODES
+    front = np.loadtxt(FRONT, delimiter=",", skiprows=1)
+    paid = front[front[:, 2] <= (np.inf if budget_s is None else budget_s)]
+    if not len(paid):
+        raise TaskError(f"density.budget_s = {budget_s:g}: the fastest score takes {front[:, 2].min():g} s")
+    near = paid[paid[:, 1] <= (np.inf if tolerance is None else tolerance)]
+    if not len(near):
+        raise TaskError(f"density.tolerance = {tolerance:g}: the nearest that can be had is {paid[:, 1].min():g}")
+    return int(near[-1, 0] if tolerance is None else near[0, 0])

@@ -1,0 +1,167 @@
+"""J of one setting, with the error of its own quadrature, for any objective of `design.objective.objectives`.
+
+In coordinates about the axis each moment `int w <g(d)> dO / int w dO` is one-dimensional: the zonal `<g(d)>`
+(`design.density.spin`) times the mean weight of each circle (`design.sphere.regions`), both exact at every polar angle.
+What is left is the quadrature over that angle. Its segments end where a circle touches an edge of the region or passes
+a corner of it; the rule with a third of the nodes is inside the full one, and their difference measures the error.
+A sweep is not zonal: its moments are means over sets of directions that share none, and their spread is the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.density.spin import Zones, zones
+from design.density.sweep import zones_swept
+from design.frames import Array, R_world_rot
+from design.objective.objectives import Moment
+from design.objective.problem import Problem
+from design.objective.quadrature import rule_of
+from design.sphere.directions import sample_set
+
+MOST_NODES = 200_000
+ROUNDING = 1e-6  # floor of the stated error
+SETS = 4  # of directions for a sweep
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """J of one setting.
+
+    Attributes:
+        J: the objective.
+        J_error: estimate of its numerical error, on the safe side; see `score_on`.
+        J_lower: with g of the mean counts, a lower bound of J as g is convex.
+        least: lowest count in the weighted region at any start phase, beams per ball.
+        blind_weight: share of the weight that is never seen, at no phase.
+    """
+
+    J: float
+    J_error: float
+    J_lower: float
+    least: int
+    blind_weight: float
+
+
+def score(problem: Problem, angles_rad: Array) -> Score:
+    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], on as many nodes as its tolerance needs.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    nodes = problem.nodes
+    while True:
+        found = score_on(problem, angles_rad, nodes)
+        if found.J_error <= problem.tolerance or nodes >= MOST_NODES or problem.grid_step_deg:
+            return found
+        nodes *= 3
+
+
+def score_on(problem: Problem, angles_rad: Array, nodes: int) -> Score:
+    """J of a setting on a number of nodes.
+
+    The rule with a third of the nodes is inside the full one. Their differences on the segments have no common sign,
+    so their root sum of squares stands for the error; added is twice that of the steps of g from node to node, which
+    both rules may miss alike: `benchmarks.design.claims` found no smaller sum that always held.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    take = _moment_on_circles if problem.sweep is None else _moment_on_directions
+    found = [take(problem, k, angles_rad, nodes) for k in range(len(problem.objective.moments))]
+    join, moments = problem.objective.join, problem.objective.moments
+    values = np.array([moment.value for moment in found])
+    J = float(join(values))
+    moved = [join(np.where(np.arange(len(values)) == k, m.value + m.error, values)) - J for k, m in enumerate(found)]
+    spoken = [(moment.share, m) for moment, m in zip(moments, found, strict=True) if moment.share > 0]
+    return Score(
+        J=J,
+        J_error=float(np.linalg.norm(moved)) + ROUNDING if np.isfinite(J) else 0.0,
+        J_lower=float(join(np.array([moment.lower for moment in found]))),
+        least=min(m.least for _, m in spoken),
+        blind_weight=sum(share * m.blind for share, m in spoken),
+    )
+
+
+def quick_J(problem: Problem, angles_rad: Array, nodes: int) -> float:
+    """J alone, as `score` computes it: for searches that call it often."""
+    take = _moment_on_circles if problem.sweep is None else _moment_on_directions
+    found = [take(problem, k, angles_rad, nodes).value for k in range(len(problem.objective.moments))]
+    return float(problem.objective.join(np.array(found)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A moment of one setting, with its error, its lower bound, the least count and the share that is blind."""
+
+    value: float
+    error: float
+    lower: float
+    least: int
+    blind: float
+
+
+def _moment_on_circles(problem: Problem, index: int, angles_rad: Array, nodes: int) -> _Found:
+    """A moment by quadrature over the polar angle."""
+    moment = problem.objective.moments[index]
+    rule, polar, azimuth = rule_of(problem, angles_rad, nodes, moment.field)
+    z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[index])
+    lower = moment.g(z.mean)
+    if moment.gathered == "highest":
+        return _highest(moment, z, lower, rule.fine, rule.coarse)
+    total = rule.fine.sum()
+    share = rule.fine / total
+    by_segment = np.bincount(rule.segment, (share - rule.coarse / total) * z.mean_g)
+    # both rules may miss a step of g between two nodes alike: the steps that are seen tell how large one may be
+    inside = rule.segment[1:] == rule.segment[:-1]
+    steps = np.abs(np.diff(z.mean_g)) * np.maximum(share[1:], share[:-1]) * inside
+    return _Found(
+        value=float(share @ z.mean_g),
+        error=float(np.linalg.norm(by_segment) + 2 * np.linalg.norm(steps)),
+        lower=float(share @ lower),
+        least=int(z.least[share > 0].min()),
+        blind=float(share @ (z.most == 0)),
+    )
+
+
+def _moment_on_directions(problem: Problem, index: int, angles_rad: Array, nodes: int) -> _Found:
+    """A moment over `SETS` sets of directions; four standard errors of their mean are its error."""
+    assert problem.sweep is not None
+    moment = problem.objective.moments[index]
+    R = R_world_rot(angles_rad[0], angles_rad[1])
+    beams = problem.beams_rot(angles_rad[2:])
+    sets = [sample_set(moment.field, problem.grid_step_deg, nodes // SETS, k) for k in range(SETS)]
+    found = []
+    for samples in sets:
+        z = zones_swept(samples.directions @ R, beams, problem.sweep, problem.ball_rad, problem.tables[index])
+        lower = moment.g(z.mean)
+        if moment.gathered == "highest":
+            found.append(_highest(moment, z, lower, samples.weights, samples.weights))
+        else:
+            share = samples.weights / samples.weights.sum()
+            blind = float(share @ (z.most == 0))
+            found.append(_Found(float(share @ z.mean_g), 0.0, float(share @ lower), int(z.least.min()), blind))
+    values = np.array([f.value for f in found])
+    gather = np.max if moment.gathered == "highest" else np.mean
+    return _Found(
+        value=float(gather(values)),
+        error=float(np.ptp(values) if moment.gathered == "highest" else 4 * np.std(values, ddof=1) / SETS**0.5),
+        lower=float(gather([f.lower for f in found])),
+        least=min(f.least for f in found),
+        blind=float(np.mean([f.blind for f in found])),
+    )
+
+
+def _highest(moment: Moment, z: Zones, lower: Array, fine: Array, coarse: Array) -> _Found:
+    """The highest g anywhere; its error is what a third of the nodes misses."""
+    g = moment.g(z.least)
+    value = float(g[fine > 0].max())
+    return _Found(
+        value=value,
+        error=value - float(g[coarse > 0].max()),
+        lower=float(lower[fine > 0].max()),
+        least=int(z.least[fine > 0].min()),
+        blind=float(fine @ (z.most == 0) / fine.sum()),
+    )

@@ -1,0 +1,72 @@
+"""What is around the scanner: the surfaces of a mesh, seen from the optical centre, on a grid of directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from design.errors import TaskError
+from design.frames import Array, Rx, Ry, Rz
+from design.task.shapes import Placed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Rays at the middles of cells: rows theta 0 .. 180, columns phi 0 .. 360 of the world.
+
+    Attributes:
+        directions: unit vectors in the world, shape (rows, columns, 3).
+        range_m: inf where nothing is hit, shape (rows, columns).
+        incidence_rad: between ray and surface normal, NaN where nothing is hit, shape (rows, columns).
+        points_m: what is hit, in the frame of the mesh, shape (rows, columns, 3).
+    """
+
+    directions: Array
+    range_m: Array
+    incidence_rad: Array
+    points_m: Array
+
+    def area_per_sr(self) -> Array:
+        """Square metres of surface behind a steradian, `r^2 / cos(incidence)`; 0 where nothing is hit."""
+        hit = np.isfinite(self.range_m)
+        across = np.cos(np.where(hit, self.incidence_rad, 0.0))
+        return np.where(hit & (across > 1e-3), np.where(hit, self.range_m, 0.0) ** 2 / np.maximum(across, 1e-3), 0.0)
+
+    def within(self, low_m: float, high_m: float) -> Array:
+        """Whether a surface lies between two ranges, shape (rows, columns)."""
+        return (self.range_m >= low_m) & (self.range_m <= high_m)
+
+
+def cell_directions(step_deg: float) -> Array:
+    """Middles of the cells of a grid in theta and phi, shape (180 / step, 360 / step, 3)."""
+    rows = round(180 / step_deg)
+    theta = (np.arange(rows) + 0.5) * np.pi / rows
+    phi = (np.arange(2 * rows) + 0.5) * np.pi / rows
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+
+
+def surface_of(placed: Placed, folder: Path) -> Surface:
+    """Cast a ray at every cell.
+
+    Raises:
+        TaskError: the mesh cannot be read, or is hit nowhere.
+    """
+    from design.scene.ray_caster import cast, load_scene  # loads the ray caster
+
+    directions = cell_directions(placed.step_deg)
+    roll, pitch, yaw = np.radians(placed.rpy_deg)
+    R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
+    path = folder / placed.file
+    rays = directions.reshape(-1, 3) @ R_mesh_world.T
+    hits = cast(load_scene(path, placed.unit_m), np.array(placed.sensor_m), rays)
+    if not np.isfinite(hits.range_m).any():
+        raise TaskError(f"{path}: sensor_m = {list(placed.sensor_m)}: no ray from there hits the mesh; unit_m right?")
+    shape = directions.shape[:2]
+    far = np.where(np.isfinite(hits.range_m), hits.range_m, 0.0)
+    points = np.array(placed.sensor_m) + far[:, None] * rays
+    return Surface(
+        directions, hits.range_m.reshape(shape), hits.incidence_rad.reshape(shape), points.reshape(*shape, 3)
+    )

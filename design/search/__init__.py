@@ -1,0 +1,1 @@
+"""The exhaustive search over the mounting angles: grid, coarse landscape, families, limits, parts."""

@@ -1,0 +1,228 @@
+"""From the coarse landscape of J to the few answers a person wants: leaders, rescored exactly and refined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from design.frames import Array, R_world_rot
+from design.objective.problem import NODES, Problem
+from design.objective.score import Score, quick_J, score
+from design.search.coarse import Landscape
+from design.search.grid_classes import Folded, Mask
+from design.search.tolerance import worst_within
+from design.task.task import NAMES, AngleRanges
+
+FAMILIES = 10
+EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
+SINGLE = 2e-6  # rounding of a landscape's lowest values, which are made in single precision
+VALLEY_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one answer
+VALLEY_J = 2e-2
+NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
+MOST_LOOKS = 80  # for local minima, before the list is left shorter
+REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
+FINEST_DEG = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Settings of equal J, shown by the one that builds best.
+
+    Attributes:
+        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        score: its J, rescored exactly.
+        members: grid settings of the search that stand behind it.
+        word: what the others are, for a person.
+        grid_deg: the setting of the grid that it was refined from.
+    """
+
+    angles_deg: tuple[float, float, float, float]
+    score: Score
+    members: int
+    word: str
+    grid_deg: tuple[float, float, float, float] | None = None
+
+    @property
+    def angles_rad(self) -> Array:
+        """The four angles in radians, shape (4,)."""
+        return np.radians(self.angles_deg)
+
+
+@dataclass(frozen=True, slots=True)
+class Leader:
+    """Settings of equal coarse J, shown by the one that builds best; no `minimum` is on the slope of a better one."""
+
+    angles_deg: Array
+    J_coarse: float
+    members: int
+    axes: int
+    every_axis: bool
+    minimum: bool
+
+
+def leaders_of(land: Landscape, planes: Folded, axes: Folded, mirrors: Array) -> list[Leader]:
+    """Local minima of J over planes and axes, lowest first, then settings on their slopes; equal ones are one.
+
+    A minimum takes its valley with it: settings about nearly the same axis with nearly the same J, whatever the plane.
+    """
+    J = np.stack([np.where(_open(planes, axes, c), land.about_axes(c), np.inf) for c in range(len(planes.first))])
+    left = J.copy()
+    q = planes.representatives
+    u = np.stack([axes.representatives, -axes.representatives])
+    minima: list[Leader] = []
+    slopes: list[Leader] = []
+    for _ in range(MOST_LOOKS):
+        lowest = left.min()
+        if len(minima) == FAMILIES or not np.isfinite(lowest):
+            break
+        c, way, axis = (int(i) for i in np.unravel_index(int((left <= lowest + EQUAL).argmax()), left.shape))
+        same = J[c] <= lowest + EQUAL
+        around = (u @ u[same].T).max(axis=2) >= np.cos(NEAR_RAD)
+        beaten = False
+        for mirror in mirrors:
+            for sign, there in ((1, around), (-1, around[::-1])):
+                beside = np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD
+                beaten |= bool((J[beside][:, there] < lowest - EQUAL).any())
+                left[beside] += np.where(there, np.inf, 0.0)
+        (slopes if beaten else minima).append(_leader(J[c], planes, axes, c, way, axis, not beaten))
+        if not beaten:
+            valley = around | around[::-1]
+            left[:, valley] = np.where(left[:, valley] <= lowest + VALLEY_J, np.inf, left[:, valley])
+    return minima + slopes
+
+
+def best_leader(land: Landscape, planes: Folded, axes: Folded) -> Leader:
+    """The lowest entry of a landscape too large to be looked at whole."""
+    lowest = land.by_plane.min(axis=0)
+    c = int((lowest <= lowest.min() + SINGLE).argmax())
+    J = np.where(_open(planes, axes, c), land.about_axes(c), np.inf)
+    way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
+    return _leader(J, planes, axes, c, int(way), int(axis), minimum=True)
+
+
+def _open(planes: Folded, axes: Folded, plane: int) -> Mask:
+    """Entries (way round, axis class) of one plane class that the grid holds, shape (2, axes)."""
+    p = planes.has[:, plane, None]
+    return np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)])
+
+
+def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, minimum: bool) -> Leader:
+    """All grid settings that equal one entry by symmetry, shown by the one that builds best.
+
+    `J` is that of the plane class about all axes, shape (2, axes); `way` is 1 where just one of plane and axis is
+    flipped.
+    """
+    same = np.abs(J - J[way, axis]) <= EQUAL
+    p = np.flatnonzero(planes.classes == plane)
+    ways = planes.flip[p][:, None] ^ axes.flip[None, :]
+    member = same[ways.astype(int), axes.classes[None, :]]
+    which_p, which_a = np.nonzero(member)
+    angles = np.hstack([axes.settings_deg[which_a], planes.settings_deg[p[which_p]]])
+    u = axes.points[which_a]
+    distinct = np.unique(np.round(u, 9) + 0.0, axis=0)
+    # builds best: stands rather than hangs, blind wedge of the fan to the servo, axis upright, angles small
+    preference = (
+        angles[:, 3],
+        angles[:, 2],
+        angles[:, 1],
+        angles[:, 0],
+        np.abs(angles[:, 2:]).sum(axis=1).round(6),
+        np.abs(angles[:, :2]).sum(axis=1).round(6),
+        -u[:, 2].round(6),
+        angles[:, 3] > 0,
+        u[:, 2] < -1e-9,
+    )
+    every = len(axes.settings_deg) > 1 and len(distinct) == len(np.unique(np.round(axes.points, 9) + 0.0, axis=0))
+    best = angles[np.lexsort(preference)[0]]
+    return Leader(best, float(J[way, axis]), len(angles), len(distinct), every, minimum)
+
+
+def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> tuple[Family, ...]:
+    """Score leaders exactly and refine the minima, the winner twice; valleys of better ones are dropped."""
+    minima = [(score(problem, np.radians(leader.angles_deg)), leader) for leader in leaders if leader.minimum]
+    minima.sort(key=lambda pair: pair[0].J)
+    families: list[Family] = []
+    for grid_score, leader in minima:
+        if len(families) == FAMILIES:
+            break
+        if not any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
+            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2])
+            again = score(problem, np.radians(refined))
+            # the rounder angles of the grid are as good
+            if again.J + again.J_error >= grid_score.J and not ranges.tolerance_deg:
+                families.append(_family(leader.angles_deg, grid_score, leader))
+            elif not any(_same_valley(refined, again.J, better) for better in families):
+                families.append(_family(refined, again, leader))
+    for leader in leaders:
+        if len(families) == FAMILIES:
+            break
+        if not leader.minimum and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
+            families.append(_family(leader.angles_deg, score(problem, np.radians(leader.angles_deg)), leader))
+    if ranges.tolerance_deg:
+        return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
+    return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
+    """Families in the order of their highest J when one angle is off by the tolerance of the mounting."""
+    worst = [worst_within(problem, family.angles_rad, off_rad, NODES) for family in families]
+    order = np.argsort(worst, kind="stable")
+    told = [f"J <= {J:.4f} within {np.degrees(off_rad):g} deg" for J in worst]
+    words = [", ".join(filter(None, [family.word, more])) for family, more in zip(families, told, strict=True)]
+    return tuple(replace(families[i], word=words[i]) for i in order)
+
+
+def _family(angles_deg: Array, exact: Score, leader: Leader) -> Family:
+    word = "any axis" if leader.every_axis else f"{leader.axes} axes" if leader.axes > 1 else ""
+    return Family(_four(angles_deg), exact, leader.members, word, _four(leader.angles_deg))
+
+
+def _four(angles_deg: Array) -> tuple[float, float, float, float]:
+    alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
+    return alpha_rot, beta_rot, alpha_laser, beta_laser
+
+
+def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
+    """Whether a setting has nearly the axis and nearly the J of a better one: the scan plane is then indifferent."""
+    u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
+    v = R_world_rot(*np.radians(better.angles_deg[:2]))[:, 2]
+    return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)
+
+
+def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...]) -> Array:
+    """The nearest minimum of J, rounded to 0.01 deg; angles that the task fixes stay, and an axis that is any."""
+    limits = np.array([ranges.limits(name) for name in NAMES])
+    free = limits[:, 1] > limits[:, 0]
+    free[:2] &= not leader.every_axis
+    angles = leader.angles_deg.copy()
+    if not free.any():
+        return angles
+    for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
+
+        def J(moved: Array, nodes: int = nodes) -> float:
+            setting = angles.copy()
+            setting[free] = moved
+            if ranges.tolerance_deg:
+                return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
+            return quick_J(problem, np.radians(setting), nodes)
+
+        start, step = angles[free], reach * ranges.step_deg
+        shift = np.where(start + step <= limits[free, 1], step, -step)
+        found = minimize(
+            J,
+            start,
+            method="Nelder-Mead",
+            bounds=limits[free],
+            options={
+                "initial_simplex": np.vstack([start, start + np.diag(shift)]),
+                "xatol": FINEST_DEG / 2,
+                "fatol": 1e-7,
+                "maxfev": 30 * len(start),
+            },
+        )
+        angles[free] = found.x
+    rounded = np.round(angles[free] / FINEST_DEG) * FINEST_DEG
+    angles[free] = np.clip(rounded, limits[free, 0], limits[free, 1]).round(2)
+    return angles + 0.0  # -0.0 is 0.0

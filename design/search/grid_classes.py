@@ -1,0 +1,104 @@
+"""Grid settings of the four angles, folded to the few that differ.
+
+The four angles act through two things only (design.md, Definitions): which polar angles the beams sweep, decided by
+the third row q of `R_rot_laser`, and where the axis u points. And with the same J for it,
+
+    (q0, q1) about u is (-q0, -q1) about -u       for any fan
+    (q0, q1) about u is (q0, -q1) about u         for a symmetric fan
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.frames import Array, R_world_rot
+from design.task.task import AngleRanges
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Folded:
+    """Settings of one pair of angles, shape (n, 2): setting i belongs to classes[i], turned round where flip[i].
+
+    Attributes:
+        settings_deg: the grid settings, shape (n, 2).
+        points: what decides J: unit axes (n, 3), or (q0, q1) of the scan planes (n, 2).
+        classes: class of each setting, shape (n,).
+        flip: whether a setting is its class turned round, shape (n,).
+        first: the first setting of each class; it is never flipped.
+        has: whether a class has a setting that is not flipped, and one that is, shape (2, classes).
+        own: whether a class is its own turned image: its J is the same both ways round, shape (classes,).
+    """
+
+    settings_deg: Array
+    points: Array
+    classes: NDArray[np.intp]
+    flip: Mask
+    first: NDArray[np.intp]
+    has: Mask
+    own: Mask
+
+    @property
+    def representatives(self) -> Array:
+        """`points` of the first setting of each class."""
+        return self.points[self.first]
+
+
+def mirrors_of(bearings_rad: Array) -> Array:
+    """Mirrors of (q0, q1) that a fan allows, shape (1 or 2, 2, 2); the identity is the first."""
+    symmetric = np.allclose(bearings_rad, -bearings_rad[::-1], atol=1e-9)
+    return np.array([np.eye(2), np.diag([1.0, -1.0])])[: 2 if symmetric else 1]
+
+
+def fold_axes(ranges: AngleRanges) -> Folded:
+    """Axes of the grid up to their sign."""
+    settings = _grid(ranges, "alpha_rot", "beta_rot")
+    return _fold(settings, R_world_rot(*np.radians(settings.T))[:, :, 2], np.eye(3)[None])
+
+
+def fold_planes(ranges: AngleRanges, mirrors: Array) -> Folded:
+    """Scan planes of the grid up to the mirrors and the sign."""
+    settings = _grid(ranges, "alpha_laser", "beta_laser")
+    return _fold(settings, plane_key(np.radians(settings)), mirrors)
+
+
+def unfolded(ranges: AngleRanges) -> tuple[Folded, Folded]:
+    """Axes and scan planes of the grid, each setting a class of its own: for a sweep, where nothing is equivalent."""
+    axes = _grid(ranges, "alpha_rot", "beta_rot")
+    planes = _grid(ranges, "alpha_laser", "beta_laser")
+    return _apart(axes, R_world_rot(*np.radians(axes.T))[:, :, 2]), _apart(planes, plane_key(np.radians(planes)))
+
+
+def plane_key(plane_rad: Array) -> Array:
+    """(q0, q1) of scan planes (alpha_laser, beta_laser) (n, 2): beam polar angles are acos(q0 cos b + q1 sin b)."""
+    alpha, beta = plane_rad.T
+    return np.stack([-np.sin(beta), np.cos(beta) * np.sin(alpha)], axis=1)
+
+
+def _grid(ranges: AngleRanges, first: str, second: str) -> Array:
+    a, b = np.meshgrid(ranges.grid_deg(first), ranges.grid_deg(second), indexing="ij")
+    return np.stack([a.ravel(), b.ravel()], axis=1)
+
+
+def _apart(settings: Array, points: Array) -> Folded:
+    each = np.arange(len(settings))
+    no = np.zeros(len(settings), dtype=bool)
+    return Folded(settings, points, each, no, each, np.stack([~no, no]), no)
+
+
+def _fold(settings: Array, points: Array, mirrors: Array) -> Folded:
+    """Group points that are equal up to the mirrors (no flip), or up to the mirrors and the sign (flip)."""
+    images = np.concatenate([points @ m for m in mirrors] + [-points @ m for m in mirrors])
+    keys = np.round(images, 9) + 0.0  # -0.0 is 0.0
+    _, numbers = np.unique(keys, axis=0, return_inverse=True)
+    numbers = numbers.reshape(2, len(mirrors), len(points))
+    straight, turned = numbers[0].min(axis=0), numbers[1].min(axis=0)
+    _, first, classes = np.unique(np.minimum(straight, turned), return_index=True, return_inverse=True)
+    flip = (turned < straight) != (turned < straight)[first][classes]
+    has = np.zeros((2, len(first)), dtype=bool)
+    has[flip.astype(int), classes] = True
+    return Folded(settings, points, classes, flip, first, has, (straight == turned)[first])

@@ -1,0 +1,90 @@
+"""What a task demands of a setting whatever its J: no gap, blind cone or density beyond a limit.
+
+Gaps between lines and blind cones are decided by the scan plane alone, so the search never looks at planes that break
+them. The lowest density depends on everything: settings are asked one by one, best J first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from design.density.beams import beam_directions_rot, polar_of_planes
+from design.errors import TaskError
+from design.frames import Array, R_rot_laser
+from design.objective.problem import Problem
+from design.objective.score import Score
+from design.search.grid_classes import Folded, Mask
+from design.task.task import Limits
+
+
+def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
+    """The scan planes of the grid that keep the limits on gaps and blind cones.
+
+    Raises:
+        TaskError: none does.
+    """
+    if limits.max_line_gap_deg is None and limits.max_blind_cone_deg is None:
+        return planes
+    shown = np.radians(planes.settings_deg[planes.first])
+    gap, cone = line_gaps_deg(problem, shown), blind_cones_deg(problem, shown)
+    for name, values, limit in (
+        ("max_line_gap_deg", gap, limits.max_line_gap_deg),
+        ("max_blind_cone_deg", cone, limits.max_blind_cone_deg),
+    ):
+        if limit is not None and values.min() > limit:
+            hint = "; a longer period narrows it" if name == "max_line_gap_deg" else ""
+            raise TaskError(f"limits.{name} = {limit:g}: the scan planes of this task reach {values.min():.3g}{hint}")
+    keep = planes_keep(problem, shown, limits)
+    if not keep.any():
+        raise TaskError("limits: no scan plane keeps max_line_gap_deg and max_blind_cone_deg at once")
+    return _only(planes, keep)
+
+
+def planes_keep(problem: Problem, planes_rad: Array, limits: Limits) -> Mask:
+    """Whether scan planes (n, 2) keep the limits on gaps and blind cones, shape (n,)."""
+    keep = np.ones(len(planes_rad), dtype=bool)
+    if limits.max_line_gap_deg is not None:
+        keep &= line_gaps_deg(problem, planes_rad) <= limits.max_line_gap_deg * (1 + 1e-9)
+    if limits.max_blind_cone_deg is not None:
+        keep &= blind_cones_deg(problem, planes_rad) <= limits.max_blind_cone_deg + 1e-9
+    return keep
+
+
+def keeps(score: Score, limits: Limits) -> bool:
+    """Whether a scored setting keeps the limits that depend on the axis too."""
+    return score.least >= (limits.min_density or 0) and score.blind_weight <= (limits.max_blind_weight or 1.0)
+
+
+def blind_cones_deg(problem: Problem, planes_rad: Array) -> Array:
+    """Half angle of the wider blind cone about the axis, of scan planes (n, 2), shape (n,)."""
+    polar = polar_of_planes(problem.bearings_rad, planes_rad)
+    return np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
+
+
+def line_gaps_deg(problem: Problem, planes_rad: Array) -> Array:
+    """Widest distance between neighbouring scan lines of one family, across them, of scan planes (n, 2), shape (n,)."""
+    gaps = []
+    for plane in planes_rad:
+        beams = beam_directions_rot(problem.bearings_rad, *plane)
+        normal = R_rot_laser(*plane)[:, 2]
+        gaps.append(np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal).max())
+    return np.degrees(problem.lines.step_rad * np.array(gaps))
+
+
+def _only(planes: Folded, keep: Mask) -> Folded:
+    """The classes that are kept, with their settings."""
+    numbers = np.cumsum(keep) - 1
+    kept = keep[planes.classes]
+    places = np.cumsum(kept) - 1
+    return replace(
+        planes,
+        settings_deg=planes.settings_deg[kept],
+        points=planes.points[kept],
+        classes=numbers[planes.classes[kept]],
+        flip=planes.flip[kept],
+        first=places[planes.first[keep]],
+        has=planes.has[:, keep],
+        own=planes.own[keep],
+    )

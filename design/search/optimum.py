@@ -1,0 +1,123 @@
+"""The answer to a task: the search, the standard alignments beside it, and what is said of both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from design.angles import standard_settings
+from design.frames import Array
+from design.left_out import LeftOut
+from design.motion import Shortest
+from design.objective.problem import Problem, problem_of
+from design.objective.score import Score, score
+from design.search.coarse import Progress
+from design.search.search import SearchResult, search
+from design.search.shortest_period import fastest
+from design.sphere.directions import spiral
+from design.task.task import NAMES, LoadedTask
+
+SQUARE_DEGREES = 41_253  # on the whole sphere
+
+
+@dataclass(frozen=True, slots=True)
+class Optimum:
+    """What a task comes to.
+
+    Attributes:
+        asked: the task as it was read.
+        loaded: the same; where it asks for the shortest period, with the one that was found.
+        problem: its numbers.
+        search: the best families and how they were found.
+        standard: scores of the standard alignments by name.
+    """
+
+    asked: LoadedTask
+    loaded: LoadedTask
+    problem: Problem
+    search: SearchResult
+    standard: dict[str, Score]
+
+    @property
+    def title(self) -> str:
+        """Sensor and duration of one full scan."""
+        task = self.loaded.task
+        verb = "out and back" if task.motion.mode == "sweep" else "one turn"
+        return f"{task.sensor}, {verb} in {task.motion.duration_s:g} s"
+
+    @property
+    def long_title(self) -> str:
+        """The same, and where the duration comes from."""
+        shortest = isinstance(self.asked.task.motion, Shortest)
+        return f"{self.title}, the shortest found that keeps the limits" if shortest else self.title
+
+    @property
+    def left_out(self) -> list[LeftOut]:
+        """What the task made superfluous in the search."""
+        return [*directions_left_out(self.problem), *self.search.left_out]
+
+    def facts(self) -> dict[str, Any]:
+        """Names with units and values, for JSON."""
+        return {
+            "task": self.loaded.task.name,
+            "duration_s": self.loaded.task.motion.duration_s,
+            "best": [
+                {f"{name}_deg": angle for name, angle in zip(NAMES, family.angles_deg, strict=True)}
+                | {"J": family.score.J, "J_error": family.score.J_error, "settings": family.members}
+                | {"note": family.word}
+                for family in self.search.best
+            ],
+            "standard": {name: {"J": s.J, "J_error": s.J_error} for name, s in self.standard.items()},
+            "covered": self.search.covered,
+            "evaluated": self.search.evaluated,
+            "seconds": round(self.search.seconds, 3),
+            "left_out": [asdict(entry) for entry in self.left_out],
+        }
+
+    def table(self) -> list[str]:
+        """The best families, a line each, and what the best buys against the standard alignments."""
+        lines = ["  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings"]
+        for family in self.search.best:
+            angles = "".join(f"{a:{width}.2f}" for a, width in zip(family.angles_deg, (11, 10, 13, 12), strict=True))
+            J = f"{family.score.J:9.4f}   {family.score.J_error:.0e}"
+            lines.append(f"{angles} {J} {family.members:9} {family.word}")
+        best = self.search.best[0].score
+        for name, other in self.standard.items():
+            if self.problem.objective.name == "log":  # the one objective whose differences are ratios of densities
+                gain = math.exp(other.J - best.J)
+                lines.append(f"beams per ball over the weighted region: {gain:.2f} x {name} (J = {other.J:.4f})")
+            else:
+                lines.append(f"J = {other.J:.4f} +- {other.J_error:.0e} for {name}")
+        return lines
+
+
+def optimum_of(loaded: LoadedTask, progress: Progress) -> Optimum:
+    """Search a task, for the shortest period first if it asks for that.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting keeps the limits.
+    """
+    progress("reading the task (the first run compiles the numerics: some 20 s)")
+    found = loaded
+    if isinstance(loaded.task.motion, Shortest):
+        found, problem, result = fastest(loaded, progress)
+        progress(f"one turn in {found.task.motion.duration_s:g} s: the shortest found that keeps the limits")
+    else:
+        problem = problem_of(loaded)
+        result = search(problem, loaded.task.angles, progress, loaded.task.limits)
+    standard = {name: score(problem, setting) for name, setting in standard_settings().items()}
+    return Optimum(loaded, found, problem, result, standard)
+
+
+def directions_left_out(problem: Problem) -> list[LeftOut]:
+    """Directions that no J ever looked at, in square degrees."""
+    directions: Array = spiral(SQUARE_DEGREES)
+    masked = problem.field.masked_at(directions)
+    ignored = (problem.field.weight_at(directions) == 0) & ~masked
+    out = []
+    if masked.any():
+        out.append(LeftOut("masked directions", "the robot hides them", int(masked.sum()), "square degrees"))
+    if ignored.any():
+        out.append(LeftOut("directions of weight zero", "they add nothing to J", int(ignored.sum()), "square degrees"))
+    return out

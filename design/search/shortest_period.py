@@ -1,0 +1,81 @@
+"""The shortest period that keeps the limits of a task, and the settings that allow it (`period_s = "shortest"`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from design.errors import TaskError
+from design.evaluation.gaps import shortest_period_s
+from design.motion import Shortest, Spin
+from design.objective.problem import Problem, problem_of
+from design.objective.score import score
+from design.search.coarse import Progress
+from design.search.families import Family
+from design.search.limits import line_gaps_deg
+from design.search.search import SearchResult, search
+from design.task.task import LoadedTask
+
+ROUNDS = 6  # the best settings of a slow turn are seldom those of a fast one: search again at the period found
+
+
+def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem, SearchResult]:
+    """The task with the shortest period found, its numbers, and its search.
+
+    Every family of a search is asked how fast it may turn, and the search is made again at the fastest, until nothing
+    turns faster. What is found keeps the limits for certain; that nothing faster exists between the families is not
+    proved.
+
+    Raises:
+        TaskError: the limits are not kept even at `longest_s`.
+    """
+    motion, limits = loaded.task.motion, loaded.task.limits
+    assert isinstance(motion, Shortest)
+    now = _at(loaded, motion.longest_s)
+    problem = problem_of(now)
+    try:
+        result = search(problem, now.task.angles, progress, limits)
+    except TaskError as error:
+        raise TaskError(f"{loaded.source}: even with motion.longest_s = {motion.longest_s:g}: {error}") from error
+    for _ in range(ROUNDS):
+        periods = [_shortest(loaded, problem, family) for family in result.best]
+        period = min(periods)
+        if period >= now.task.motion.duration_s * (1 - 1e-9):
+            break
+        progress(f"{period:g} s keep the limits: searching again")
+        now = _at(loaded, period)
+        problem = problem_of(now)
+        result = replace(result, best=_rescored(problem, result.best, periods, period))
+        try:
+            result = search(problem, now.task.angles, progress, limits)
+        except TaskError:  # none of the families of this period is the one that allows it: that one stays
+            break
+    return now, problem, result
+
+
+def _at(loaded: LoadedTask, period_s: float) -> LoadedTask:
+    return replace(loaded, task=loaded.task.model_copy(update={"motion": Spin(period_s=period_s)}))
+
+
+def _shortest(loaded: LoadedTask, problem: Problem, family: Family) -> float:
+    """Shortest period of one family: the longer of what density and gaps ask for."""
+    limits, rate = loaded.task.limits, loaded.lidar.scan_rate_hz
+    periods = []
+    if limits.max_line_gap_deg is not None:
+        gap = float(line_gaps_deg(problem, family.angles_rad[None, 2:])[0]) / np.degrees(problem.lines.step_rad)
+        periods.append(np.ceil(360 * gap / limits.max_line_gap_deg - 1e-9) / rate)
+    if limits.min_density is not None:
+        least = int(np.ceil(limits.min_density))
+        periods.append(shortest_period_s(problem, family.angles_rad, rate, least))
+    return float(max(periods))
+
+
+def _rescored(
+    problem: Problem, families: tuple[Family, ...], periods: list[float], period_s: float
+) -> tuple[Family, ...]:
+    """The families that may turn that fast, scored there."""
+    able = [family for family, p in zip(families, periods, strict=True) if p <= period_s * (1 + 1e-9)]
+    return tuple(
+        sorted((replace(f, score=score(problem, f.angles_rad)) for f in able), key=lambda family: family.score.J)
+    )

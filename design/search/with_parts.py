@@ -1,0 +1,188 @@
+"""The optimum with what the parts hide: bounds first, solids only for the leaders.
+
+The J of a setting without parts is a lower bound of its J with them, and so is the J without the beams that its parts
+hide in any case. Families are taken in the order of the first, their equivalent settings in that of the second, and
+the work ends when no bound is below the best J found: what is left cannot win.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from design.density.ball_count import ball_count
+from design.density.beams import scan_at
+from design.errors import BuildError
+from design.frames import Array
+from design.objective.ball_search import start_phases
+from design.objective.problem import Problem
+from design.objective.score import Score, score
+from design.search.coarse import Progress
+from design.search.families import Family
+from design.search.grid_classes import mirrors_of
+from design.shadow import AXIS_STEPS, Refused, Shadow, Workshop
+from design.sphere.directions import sample_set
+from design.task.task import NAMES, AngleRanges, Limits
+
+SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
+MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The best setting with its parts.
+
+    Attributes:
+        family: its angles, and its J with what the parts hide.
+        bare: its J without them.
+        hidden: share of all beams of a full scan that the parts hide.
+        bounded: settings that a bound was computed for.
+        built: settings whose solids were made.
+        refused: why settings cannot be built, one line each.
+        open: families whose bound is below the J found, left because `MOST_BUILT` were made.
+    """
+
+    family: Family
+    bare: Score
+    hidden: float
+    bounded: int
+    built: int
+    refused: tuple[str, ...]
+    open: int
+
+    def lines(self) -> list[str]:
+        """What was chosen, and what was not and why."""
+        setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
+        lines = [
+            f"built ({setting}): J = {self.family.score.J:.4f} with its parts, which hide {self.hidden:.1%} of the "
+            f"beams ({self.bare.J:.4f} without); of {self.bounded} settings bounded, {self.built} made, "
+            f"{len(self.refused)} refused",
+            *(f"refused {reason}" for reason in self.refused),
+        ]
+        if self.open:
+            lines.append(f"{self.open} more families might be better with their parts: not made")
+        return lines
+
+
+def choose(
+    problem: Problem,
+    families: tuple[Family, ...],
+    ranges: AngleRanges,
+    limits: Limits,
+    workshop: Workshop,
+    progress: Progress,
+) -> Chosen:
+    """The family that is best with its parts.
+
+    Raises:
+        BuildError: none can be built within the limits of the task.
+    """
+    best: Chosen | None = None
+    refused: list[str] = []
+    bounded = built = 0
+    queue = sorted(families, key=lambda family: family.score.J)
+    for place, family in enumerate(queue):
+        if best is not None and family.score.J >= best.family.score.J:
+            break
+        if built == MOST_BUILT and best is not None:
+            left = sum(other.score.J < best.family.score.J for other in queue[place:])
+            best = replace(best, open=left)
+            break
+        bounds = []
+        for angles_deg in equivalents(problem, family.angles_deg, ranges):
+            bound = workshop.bound(np.radians(angles_deg))
+            bounded += 1
+            if isinstance(bound, Refused):
+                refused.append(f"{_shown(angles_deg)}: {bound.reason}")
+                continue
+            bounds.append((_without(problem, bound, angles_deg).J, angles_deg))
+        # the family's own setting stands upright: another one must be better by more than a thousandth
+        for J, angles_deg in sorted(bounds, key=lambda pair: round(pair[0], 3))[:1]:
+            if best is not None and best.family.score.J <= J:
+                continue
+            progress(f"parts of {_shown(angles_deg)}: what they hide")
+            built += 1
+            shadow = workshop.shadow(np.radians(angles_deg))
+            if isinstance(shadow, Refused):
+                refused.append(f"{_shown(angles_deg)}: {shadow.reason}")
+                continue
+            hidden = float(shadow.hidden().mean())
+            if limits.max_blocked is not None and hidden > limits.max_blocked:
+                refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
+                continue
+            found = score_with(problem, np.radians(angles_deg), shadow)
+            if best is None or found.J < best.family.score.J:
+                chosen = replace(family, angles_deg=angles_deg, score=found)
+                best = Chosen(chosen, family.score, hidden, 0, 0, (), 0)
+    if best is None:
+        raise BuildError(f"none of the {len(families)} best families can be built: {refused[0]}")
+    return replace(best, bounded=bounded, built=built, refused=tuple(refused))
+
+
+def score_with(problem: Problem, angles_rad: Array, shadow: Shadow) -> Score:
+    """J of a setting whose parts hide beams.
+
+    What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
+    difference of two samplings on the same directions and phases. `least` and `blind_weight` are told without it.
+    """
+    visible = ~shadow.beams
+    seen = problem.with_beams(problem.bearings_rad[visible], problem.lines, problem.sweep)
+    plain = score(seen, angles_rad)
+    if shadow.stator is None or not shadow.stator[visible].any():
+        return plain
+    both = [_sampled(seen, angles_rad, shadow.stator[visible], index) for index in range(SETS)]
+    change = np.array([problem.objective.join(hidden) - problem.objective.join(bare) for hidden, bare in both])
+    spread = float(4 * np.std(change, ddof=1) / SETS**0.5)
+    return replace(plain, J=plain.J + float(change.mean()), J_error=float(np.hypot(plain.J_error, spread)))
+
+
+def equivalents(
+    problem: Problem, angles_deg: tuple[float, float, float, float], ranges: AngleRanges
+) -> list[tuple[float, float, float, float]]:
+    """The setting and those of equal J that the ranges of the task hold, itself first (design.md, Definitions)."""
+    a, b, c, d = angles_deg
+    if problem.sweep is not None:
+        return [angles_deg]
+    turned = (a + 360.0) % 360.0 - 180.0  # with -b the axis points the other way
+    found = [(a, b, c, d), (turned, 0.0 - b, 0.0 - c, 0.0 - d)]
+    if len(mirrors_of(problem.bearings_rad)) == 2:
+        found += [(a, b, 0.0 - c, d), (turned, 0.0 - b, c, 0.0 - d)]
+    limits = [ranges.limits(name) for name in NAMES]
+    inside = [
+        setting
+        for setting in found[1:]
+        if all(low - 1e-9 <= x <= high + 1e-9 for x, (low, high) in zip(setting, limits, strict=True))
+    ]
+    return list(dict.fromkeys([found[0], *inside]))
+
+
+def _without(problem: Problem, shadow: Shadow, angles_deg: tuple[float, ...]) -> Score:
+    visible = ~shadow.beams
+    seen = problem.with_beams(problem.bearings_rad[visible], problem.lines, problem.sweep)
+    return score(seen, np.radians(angles_deg))
+
+
+def _sampled(problem: Problem, angles_rad: Array, stator: Array, index: int) -> Array:
+    """Moments with and without what stands still, over one set of directions at one start phase, (2, moments)."""
+    if problem.sweep is None:
+        joint = problem.lines.angles_rad + start_phases(problem.lines.count, problem.lines.step_rad)[2 * index]
+    else:
+        joint = problem.sweep.angles_rad((index + 0.5) / SETS)
+    scan = scan_at(problem.bearings_rad, joint, angles_rad)
+    column = np.rint(joint / (2 * np.pi / AXIS_STEPS)).astype(int) % AXIS_STEPS
+    free = ~stator[:, column].T.ravel()  # line after line, as the scan
+    out = []
+    for moment in problem.objective.moments:
+        samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
+        pair = []
+        for beams in (scan[free], scan):
+            g = moment.g(problem.lines.repeats * ball_count(beams, samples.directions, problem.ball_rad))
+            highest = moment.gathered == "highest"
+            pair.append(g.max() if highest else samples.weights @ g / samples.weights.sum())
+        out.append(pair)
+    return np.array(out).T
+
+
+def _shown(angles_deg: tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"

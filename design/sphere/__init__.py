@@ -1,0 +1,1 @@
+"""Directions and their weights: points on the sphere, regions as fields."""

@@ -1,0 +1,319 @@
+"""Weights and masks on the sphere: painted in order, the last region that contains a direction wins.
+
+Every edge of a band, a cone or a map cell lies in a plane `x . m = c`. So along a circle about any axis the weight
+is piecewise constant between the circle's crossings with those planes, and its integral over the circle is a
+finite sum: exact, region edges included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from design.frames import Array
+from design.parallel import in_chunks
+from design.scene.surface import Surface
+from design.task.shapes import All, Band, Box, Cone, Map, MaskRegion, Region
+from design.task.task import LoadedTask
+
+ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
+SPHERE = [0.0, 0.0, 1.0, np.pi]
+EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """Painted regions as numbers.
+
+    `rows`: (kind, six parameters, value) of each region, in painting order, shape (regions, 8).
+    `planes`: (m, c) of each edge, shape (edges, 4). `tables`: the maps, padded to one shape, (maps, rows, columns).
+    `caps`: for each region with a value above 0 a cap that holds it, (direction, angular radius), shape (caps, 4).
+    """
+
+    rows: Array
+    planes: Array
+    tables: Array
+    caps: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """Weight and mask of a task; equal to itself only, so that what is computed of one can be kept with it."""
+
+    weight: Layers
+    mask: Layers
+    background: float
+
+    def weight_at(self, directions: Array) -> Array:
+        """Weight of unit vectors (n, 3); masked directions weigh 0. Shape (n,)."""
+        painted = _paint(self.weight, directions, self.background)
+        return np.where(self.masked_at(directions), 0.0, painted)
+
+    def masked_at(self, directions: Array) -> Array:
+        """Whether unit vectors (n, 3) are hidden by the robot, shape (n,)."""
+        return _paint(self.mask, directions, 0.0) > 0
+
+    @property
+    def edges(self) -> int:
+        """Number of edge planes: what a circle integral costs."""
+        return len(self.weight.planes) + len(self.mask.planes)
+
+    def on_circles(self, axis: Array, polar_rad: Array) -> tuple[Array, Array]:
+        """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
+        numbers = self._numbers()
+        frame = frames_about(axis[None])
+        parts = in_chunks(lambda chunk: _circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
+        return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
+
+    def on_circles_about(self, axes: Array, polar_rad: Array) -> Array:
+        """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
+        numbers = self._numbers()
+        frames = frames_about(axes)
+        parts = in_chunks(lambda chunk: _circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
+        return np.concatenate(parts)
+
+    def _numbers(self) -> tuple[Array, Array, Array, Array, Array, float]:
+        weight, mask = self.weight, self.mask
+        planes = np.concatenate([weight.planes, mask.planes])
+        return planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
+
+
+def value_of(region: Region | MaskRegion) -> float:
+    """What a region is painted with."""
+    return region.value
+
+
+def field_of(loaded: LoadedTask, weight_of: Callable[[Region], float] = value_of) -> Field:
+    """The weights and masks of a task; `weight_of` tells what each region is painted with.
+
+    With a scene both become tables on its grid of rays: directions without a surface in range are masked, and what
+    lies in a box weighs by its area.
+    """
+    maps = list(loaded.maps)
+    if loaded.surface is not None:
+        return _on_surface(loaded, loaded.surface, maps, weight_of)
+    weight = _layers(loaded.task.weight, maps, weight_of)
+    mask = _layers(loaded.task.mask, maps, value_of)
+    return Field(weight, mask, loaded.task.density.background)
+
+
+def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_of: Callable[[Region], float]) -> Field:
+    shape = surface.range_m.shape
+    flat = surface.directions.reshape(-1, 3)
+    area = surface.area_per_sr()
+    painted = np.full(shape, loaded.task.density.background)
+    for region in loaded.task.weight:
+        if isinstance(region, Box):
+            inside = ((surface.points_m >= region.min_m) & (surface.points_m <= region.max_m)).all(axis=2)
+            painted = np.where(inside, weight_of(region) * area, painted)
+            continue
+        one = _layers([region], maps, lambda _: 1.0)
+        here = _paint(one, flat, -1.0).reshape(shape)
+        painted = np.where(here >= 0, weight_of(region) * np.maximum(here, 0.0), painted)
+    robot = _paint(_layers(loaded.task.mask, maps, value_of), flat, 0.0).reshape(shape) > 0
+    lidar = loaded.lidar
+    seen = surface.within(lidar.range_min_mm / 1000, (lidar.range_practical_mm or lidar.range_max_mm) / 1000)
+    hidden = Map(shape="map", file="")
+    weight = _layers([hidden], [np.where(robot | ~seen, 0.0, painted)], value_of)
+    return Field(weight, _layers([hidden], [(robot | ~seen).astype(float)], value_of), 0.0)
+
+
+def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of: Callable[[Any], float]) -> Layers:
+    """Turn regions into numbers; takes as many tables off the front of `maps` as there are map regions."""
+    rows: list[list[float]] = []
+    planes = [np.empty((0, 4))]
+    tables: list[Array] = []
+    caps: list[list[float]] = []
+    for region in regions:
+        value = weight_of(region)
+        cap = SPHERE
+        if isinstance(region, All):
+            rows.append([ALL, 0, 0, 0, 0, 0, 0, value])
+        elif isinstance(region, Band):
+            theta, phi = np.radians(region.theta_deg), np.radians(region.phi_deg)
+            middle, half = (phi[0] + phi[1]) / 2, (phi[1] - phi[0]) / 2
+            around = [np.cos(middle), np.sin(middle), np.cos(half)]
+            rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, value])
+            planes.append(_edges_of_band(theta, phi))
+            cap = _cap_of_band(theta, middle, half)
+        elif isinstance(region, Cone):
+            axis = np.array(region.axis) / np.linalg.norm(region.axis)
+            half_angle = np.radians(region.half_angle_deg)
+            rows.append([CONE, *axis, np.cos(half_angle), 0, 0, value])
+            planes.append(np.array([[*axis, np.cos(half_angle)]]))
+            cap = [*axis, half_angle]
+        else:
+            table = maps.pop(0)
+            rows.append([MAP, len(tables), *table.shape, 0, 0, 0, value])
+            tables.append(table)
+            planes.append(_edges_of_map(*table.shape))
+        if value > 0:
+            caps.append(cap)
+    return Layers(
+        np.array(rows, dtype=float).reshape(-1, 8),
+        np.concatenate(planes),
+        _stack(tables),
+        np.array(caps, dtype=float).reshape(-1, 4),
+    )
+
+
+def _cap_of_band(theta: Array, middle: float, half: float) -> list[float]:
+    """A cap about the middle of a band, or about a pole where the band goes more than half around."""
+    if half > np.pi / 2:
+        return [0.0, 0.0, 1.0, theta[1]] if theta[1] <= np.pi - theta[0] else [0.0, 0.0, -1.0, np.pi - theta[0]]
+    t, p = np.meshgrid(np.linspace(theta[0], theta[1], 33), np.linspace(-half, half, 33))
+    points = np.stack([np.sin(t) * np.cos(middle + p), np.sin(t) * np.sin(middle + p), np.cos(t)], axis=-1)
+    centre = points[16, 16]
+    reach = np.arctan2(np.linalg.norm(np.cross(points, centre), axis=-1), points @ centre).max()
+    return [*centre, float(min(np.pi, 1.05 * reach + 1e-9))]
+
+
+def _edges_of_band(theta: Array, phi: Array) -> Array:
+    inner = [t for t in theta if 0 < t < np.pi]
+    edges = [[0.0, 0.0, 1.0, np.cos(t)] for t in inner]
+    if phi[1] - phi[0] < 2 * np.pi:
+        edges += [[-np.sin(p), np.cos(p), 0.0, 0.0] for p in phi]
+    return np.array(edges).reshape(-1, 4)
+
+
+def _edges_of_map(rows: int, columns: int) -> Array:
+    theta = np.pi * np.arange(1, rows) / rows
+    phi = 2 * np.pi * np.arange(columns) / columns
+    phi = phi[: columns // 2] if columns % 2 == 0 else phi  # a meridian plane serves phi and phi + 180 deg
+    across = np.stack([0 * theta, 0 * theta, 1 + 0 * theta, np.cos(theta)], axis=1)
+    along = np.stack([-np.sin(phi), np.cos(phi), 0 * phi, 0 * phi], axis=1)
+    return np.concatenate([across, along])
+
+
+def frames_about(axes: Array) -> Array:
+    """Rows e1, e2, axis for each axis (n, 3): right-handed, orthonormal, shape (n, 3, 3)."""
+    helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
+    e1 = np.cross(axes, helper)
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    return np.stack([e1, np.cross(axes, e1), axes], axis=1)
+
+
+def _stack(tables: list[Array]) -> Array:
+    if not tables:
+        return np.zeros((1, 1, 1))
+    shape = np.max([t.shape for t in tables], axis=0)
+    stacked = np.zeros((len(tables), *shape))
+    for i, t in enumerate(tables):
+        stacked[i, : t.shape[0], : t.shape[1]] = t
+    return stacked
+
+
+def _paint(layers: Layers, directions: Array, background: float) -> Array:
+    return _values(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables, background)
+
+
+@njit(cache=True, nogil=True)
+def _value(x: float, y: float, z: float, rows: Array, tables: Array, background: float) -> float:
+    """Value of the last painted region that contains the direction."""
+    for i in range(rows.shape[0] - 1, -1, -1):
+        row = rows[i]
+        kind = row[0]
+        if kind == ALL:
+            return row[7]
+        if kind == CONE:
+            if x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE:
+                return row[7]
+            continue
+        if kind == BAND:
+            if row[1] - EDGE <= z <= row[2] + EDGE:
+                ahead = x * row[3] + y * row[4]
+                if ahead >= row[5] * np.sqrt(x * x + y * y) - EDGE:
+                    return row[7]
+            continue
+        theta = np.arctan2(np.sqrt(x * x + y * y), z)
+        phi = np.arctan2(y, x)
+        height, width = int(row[2]), int(row[3])
+        r = min(int(theta / np.pi * height), height - 1)
+        c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
+        return row[7] * tables[int(row[1]), r, c]
+    return background
+
+
+@njit(cache=True, nogil=True)
+def _values(directions: Array, rows: Array, tables: Array, background: float) -> Array:
+    out = np.empty(directions.shape[0])
+    for i in range(directions.shape[0]):
+        out[i] = _value(directions[i, 0], directions[i, 1], directions[i, 2], rows, tables, background)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _sort(values: Array, n: int) -> None:
+    """Sort the first n values in place: by insertion while they are few, as on nearly every circle."""
+    if n > 32:
+        values[:n] = np.sort(values[:n])
+        return
+    for i in range(1, n):
+        value = values[i]
+        j = i - 1
+        while j >= 0 and values[j] > value:
+            values[j + 1] = values[j]
+            j -= 1
+        values[j + 1] = value
+
+
+@njit(cache=True, nogil=True)
+def _circle_means(
+    frames: Array,
+    polar: Array,
+    planes: Array,
+    weight_rows: Array,
+    weight_tables: Array,
+    mask_rows: Array,
+    mask_tables: Array,
+    background: float,
+) -> tuple[Array, Array]:
+    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles)."""
+    weights = np.empty((len(frames), len(polar)))
+    shares = np.empty((len(frames), len(polar)))
+    cuts = np.empty(2 * len(planes) + 1)
+    inside = np.empty((len(planes), 3))
+    for f in range(len(frames)):
+        frame = frames[f]
+        for k in range(len(planes)):
+            for axis in range(3):
+                m = planes[k]
+                inside[k, axis] = m[0] * frame[axis, 0] + m[1] * frame[axis, 1] + m[2] * frame[axis, 2]
+        for i in range(len(polar)):
+            st, ct = np.sin(polar[i]), np.cos(polar[i])
+            n = 0
+            for k in range(len(planes)):
+                a, b = st * inside[k, 0], st * inside[k, 1]
+                c = planes[k, 3] - ct * inside[k, 2]
+                r = np.sqrt(a * a + b * b)
+                if r > abs(c):
+                    middle, half = np.arctan2(b, a), np.arccos(c / r)
+                    cuts[n] = (middle - half) % (2 * np.pi)
+                    cuts[n + 1] = (middle + half) % (2 * np.pi)
+                    n += 2
+            if n == 0:
+                cuts[0] = 0.0
+                n = 1
+            _sort(cuts, n)
+            weight, share = 0.0, 0.0
+            for j in range(n):
+                after = cuts[j + 1] if j + 1 < n else cuts[0] + 2 * np.pi
+                arc = after - cuts[j]
+                if arc <= 0.0:
+                    continue
+                p = 0.5 * (cuts[j] + after)
+                u, v = st * np.cos(p), st * np.sin(p)
+                x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
+                y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]
+                z = u * frame[0, 2] + v * frame[1, 2] + ct * frame[2, 2]
+                if _value(x, y, z, mask_rows, mask_tables, 0.0) > 0.0:
+                    continue
+                share += arc
+                weight += arc * _value(x, y, z, weight_rows, weight_tables, background)
+            weights[f, i] = weight / (2 * np.pi)
+            shares[f, i] = share / (2 * np.pi)
+    return weights, shares

@@ -1,0 +1,48 @@
+"""Records that come with the package by name, or from a file that a person names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from design.catalogue.catalogue import read_toml
+from design.errors import TaskError
+from design.record import Record, explain
+
+R = TypeVar("R", bound=Record)
+
+
+def named_record(path: Path, kind: type[R], shipped: Path, what: str) -> tuple[R, Path]:
+    """A record from a TOML file, or from one of the folder `shipped` by its bare name; and the file it came from.
+
+    Args:
+        path: the file, or the name.
+        kind: of record.
+        shipped: folder of those that come with the package.
+        what: the word for it in messages, such as "task".
+
+    Raises:
+        TaskError: there is none, or it is malformed.
+    """
+    source = _found(path, shipped, what)
+    table = read_toml(source, f"the {what} file")
+    try:
+        return kind.model_validate(table), source
+    except ValidationError as error:
+        raise TaskError(explain(error, source, kind)) from error
+
+
+def names_in(shipped: Path) -> list[str]:
+    """What can be named without a file."""
+    return sorted(path.stem for path in shipped.glob("*.toml"))
+
+
+def _found(path: Path, shipped: Path, what: str) -> Path:
+    if path.suffix == ".toml" or path.is_file():
+        return path
+    named = shipped / f"{path}.toml"
+    if path.parent == Path() and named.exists():
+        return named
+    raise TaskError(f"{path}: no such {what} file, and no shipped {what} of that name: {', '.join(names_in(shipped))}")

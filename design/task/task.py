@@ -1,0 +1,274 @@
+"""The task file: what the scanner shall see, what it is made of, and which angles may be chosen.
+
+Files speak degrees and millimetres; every key that has a unit ends in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from design.camera import Camera
+from design.catalogue.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
+from design.errors import TaskError
+from design.frames import Array
+from design.motion import Motion, Shortest, Spin, Sweep
+from design.record import Record
+from design.scene.surface import Surface, surface_of
+from design.task.deck_holes import DeckHoles
+from design.task.named_record import named_record, names_in
+from design.task.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
+
+SHIPPED = Path(__file__).parent / "shipped"
+
+Angle = Number | Span
+"""One value fixes the angle; two are the range to search, in degrees."""
+
+NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+
+
+class AngleRanges(Record):
+    """Mounting angles to search over, or fixed."""
+
+    alpha_rot_deg: Angle = (-180.0, 180.0)
+    beta_rot_deg: Angle = (-90.0, 90.0)
+    alpha_laser_deg: Angle = (-90.0, 90.0)
+    beta_laser_deg: Angle = (-90.0, 90.0)
+    step_deg: Number = Field(default=5.0, ge=0.5, le=45)
+    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
+
+    @model_validator(mode="after")
+    def _within_bounds(self) -> AngleRanges:
+        for name, bound in (("alpha_rot", 180), ("beta_rot", 90), ("alpha_laser", 90), ("beta_laser", 90)):
+            lower, upper = self.limits(name)
+            if not -bound <= lower <= upper <= bound:
+                raise ValueError(f"{name}_deg = {[lower, upper]} does not rise within -{bound} .. {bound}")
+        return self
+
+    def limits(self, name: str) -> Span:
+        """Range of one angle in degrees; both ends are equal where it is fixed."""
+        angle: Angle = getattr(self, f"{name}_deg")
+        return angle if isinstance(angle, tuple) else (angle, angle)
+
+    def grid_deg(self, name: str) -> Array:
+        """Settings of one angle that the search visits, both limits included."""
+        lower, upper = self.limits(name)
+        steps = int(np.floor((upper - lower) / self.step_deg + 1e-9))
+        grid = lower + self.step_deg * np.arange(steps + 1)
+        return grid if upper - grid[-1] < 1e-9 else np.append(grid, upper)
+
+
+class DensityRules(Record):
+    """How density is counted and judged; see `design.md`, Definitions."""
+
+    ball_radius_deg: Number = Field(default=2.0, ge=0.01, le=90)
+    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = "log"
+    required: Required = None
+    background: Value = 0.0
+    quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
+    grid_step_deg: GridStep = 1.0
+    tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
+    budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
+
+
+class Limits(Record):
+    """What every reported setting must keep, whatever its J."""
+
+    min_density: Number | None = Field(default=None, ge=1, description="beams per ball, anywhere in the region")
+    max_line_gap_deg: Number | None = Field(default=None, gt=0, le=360, description="between neighbouring scan lines")
+    max_blind_cone_deg: Number | None = Field(default=None, ge=0, le=90, description="half angle, about the axis")
+    max_blocked: Number | None = Field(default=None, gt=0, le=1, description="share of the beams that parts may hide")
+    max_blind_weight: Number | None = Field(default=None, ge=0, le=1, description="share of the weight never seen")
+
+
+class Task(Record):
+    """One task file with every default written out."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
+    sensor: str
+    servo: str
+    slip_ring: str | None = None
+    printer: str = "fdm-0.4"
+    catalogue: tuple[str, ...] = ()
+    deck: DeckHoles | None = None
+    motion: Annotated[Motion | Shortest, Field(discriminator="mode")]
+    angles: AngleRanges = AngleRanges()
+    density: DensityRules = DensityRules()
+    limits: Limits = Limits()
+    weight: tuple[Region, ...] = ()
+    mask: tuple[MaskRegion, ...] = ()
+    scene: Placed | None = None
+    camera: Camera | None = None
+
+    @model_validator(mode="after")
+    def _boxes_stand_in_a_scene(self) -> Task:
+        if self.scene is None and any(isinstance(region, Box) for region in self.weight):
+            raise ValueError("a weight of shape = 'box' needs a [scene] that it stands in")
+        return self
+
+    @field_validator("motion", mode="before")
+    @classmethod
+    def _spins_if_not_told(cls, motion: Any) -> Any:
+        if not isinstance(motion, dict):
+            return motion
+        if motion.get("period_s") == "shortest" and motion.get("mode", "spin") == "spin":
+            return {key: value for key, value in motion.items() if key != "period_s"} | {"mode": "shortest"}
+        return {"mode": "spin"} | motion
+
+    @field_validator("name", mode="before")
+    @classmethod
+    def _is_a_folder_name(cls, name: Any) -> Any:
+        if isinstance(name, str) and ("/" in name or "\\" in name or ".." in name):
+            raise ValueError("a task name becomes a folder name and cannot hold a path: use letters, digits, _ and -")
+        return name
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedTask:
+    """A task, the file it came from, the products it names, and its maps.
+
+    `maps` holds the tables of the `map` and `mesh` regions, weights first, then masks, in their order; (rows, columns)
+    each. `surface` is what the rays into the scene hit.
+    """
+
+    task: Task
+    source: Path
+    products: Catalogue
+    maps: tuple[Array, ...]
+    surface: Surface | None = None
+
+    @property
+    def lidar(self) -> Lidar:
+        """The 2D lidar of the task."""
+        return self.products.get(self.task.sensor, Lidar)
+
+    @property
+    def servo(self) -> Servo:
+        """The servo of the task."""
+        return self.products.get(self.task.servo, Servo)
+
+    def warnings(self) -> list[str]:
+        """What the task can do, but not as well as its author may think."""
+        seen_deg = self.servo.position_feedback_deg
+        if seen_deg < 360 and not isinstance(self.task.motion, Sweep):
+            return [
+                f"{self.servo.name}: position_feedback_deg = {seen_deg:g}: in {360 - seen_deg:g} deg of every turn no "
+                "angle is read, and scans there have none; take a servo that reads all around, such as MX-64R"
+            ]
+        return []
+
+    def sha256(self) -> str:
+        """Digest of all that decides the result: the task, its maps, and the records of its products."""
+        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # it only looks on
+        for region in [*task["weight"], *task["mask"]]:
+            region.pop("file", None)  # what is in it counts, not what it is called
+        if task["scene"]:
+            task["scene"].pop("file")
+        parts = [json.dumps(task, sort_keys=True)]
+        names = [self.task.sensor, self.task.servo, self.task.slip_ring, self.task.printer]
+        parts += [self.products.products[name].model_dump_json() for name in names if name]
+        digest = hashlib.sha256("\n".join(parts).encode())
+        for table in self.maps:
+            digest.update(np.ascontiguousarray(table).tobytes())
+        if self.surface is not None:
+            digest.update(self.surface.range_m.tobytes())
+        return digest.hexdigest()
+
+
+def load_task(path: Path) -> LoadedTask:
+    """Read a task file, or a shipped task by its name.
+
+    Raises:
+        TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
+            cannot do the motion.
+    """
+    task, source = named_record(path, Task, SHIPPED, "task")
+    products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
+    check_products(task, products, source)
+    limits = task.limits
+    if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
+        raise TaskError(
+            f"{source}: motion.period_s = 'shortest': shortest for what? Set limits.min_density or "
+            "limits.max_line_gap_deg"
+        )
+    regions = [*task.weight, *task.mask]
+    maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, Map | Mesh))
+    surface = None if task.scene is None else surface_of(task.scene, source.parent)
+    return LoadedTask(task=task, source=source, products=products, maps=maps, surface=surface)
+
+
+def shipped_tasks() -> list[str]:
+    """Names of the tasks that come with the package."""
+    return names_in(SHIPPED)
+
+
+def check_products(task: Task, products: Catalogue, source: Path) -> None:
+    """Whether the products of a task exist and can do its motion.
+
+    Raises:
+        TaskError: they cannot.
+    """
+    field = "sensor"
+    try:
+        products.get(task.sensor, Lidar)
+        field = "servo"
+        products.get(task.servo, Servo)
+        field = "printer"
+        products.get(task.printer, Printer)
+        field = "slip_ring"
+        ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
+    except TaskError as error:
+        raise TaskError(f"{source}: {field}: {error}") from error
+    if isinstance(task.motion, Sweep):
+        reach = products.get(task.servo, Servo).angular_range_deg / 2
+        if max(-task.motion.limits_deg[0], task.motion.limits_deg[1]) > reach:
+            raise TaskError(
+                f"{source}: motion.limits_deg = {list(task.motion.limits_deg)}: the {task.servo} reaches "
+                f"-{reach:g} .. {reach:g}"
+            )
+        return
+    if ring is None:
+        word = "turns without end" if isinstance(task.motion, Spin | Shortest) else "goes all around"
+        raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
+
+
+def _table(region: Map | Mesh, folder: Path) -> Array:
+    """Weights of a map, or 1 where a mesh is hit and 0 where not."""
+    if isinstance(region, Map):
+        return _read_map(folder / region.file)
+    return np.isfinite(surface_of(region, folder).range_m).astype(float)
+
+
+def _read_map(path: Path) -> Array:
+    try:
+        table = _map_table(path)
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        raise TaskError(f"{path}: cannot read the map: {error}") from error
+    if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
+        raise TaskError(f"{path}: a map is one table of real numbers")
+    if table.ndim != 2 or table.size == 0:
+        raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
+    if not np.isfinite(table).all() or (table < 0).any():
+        raise TaskError(f"{path}: a map holds weights: finite and not negative")
+    return table.astype(float)
+
+
+def _map_table(path: Path) -> Any:
+    if path.suffix == ".npy":
+        with path.open("rb") as file:  # an archive of tables would keep it open
+            return np.load(file, allow_pickle=False)
+    if path.suffix == ".csv":
+        text = path.read_text(encoding="utf-8")
+        return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
+    if path.suffix == ".png":
+        from matplotlib.image import imread
+
+        picture = imread(path)  # 0..1 already, (rows, columns[, channels])
+        return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
+    raise TaskError(f"{path}: a map is a .png, .csv or .npy file")

@@ -1,0 +1,239 @@
+"""`scanwright assemble`: recording and angle set become point clouds.
+
+A stream: chunks of the recording become blocks of scans, blocks become rows, rows are written. Nothing but the joint
+log, the times of the scans and the poses is held. How a beam finds its place is `deskew`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.angles import AngleSet
+from design.errors import RecordingError, suggest
+from firmware_io.assembly.axis_curve import axis_curve
+from firmware_io.assembly.beam_outcome import Verdict
+from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.assembly.turns import turn_starts
+from firmware_io.clouds.point_file import PlyWriter
+from firmware_io.recording.recording import Recording, open_recording
+from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
+
+Per = Literal["recording", "turn", "half"]
+COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
+"""What a cloud can tell of each point beside x y z."""
+_WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
+_FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
+
+
+@dataclass(frozen=True, slots=True)
+class AssembleSummary:
+    """What became of every beam: `beams == points + sum(left_out.values())`.
+
+    Attributes:
+        out: the cloud, or the name that the clouds are numbered after.
+        clouds: the files written.
+        points: beams with a place in the world.
+        beams: beams in the recording.
+        width: rows of a cloud per scan; 0 in a flat cloud.
+        height: scans.
+        padding: rows that fill up scans shorter than `width`.
+        left_out: reason -> beams; NaN rows in an organised cloud, absent in a flat one.
+        said: what a person should know, one sentence each.
+    """
+
+    out: Path
+    clouds: tuple[Path, ...]
+    points: int
+    beams: int
+    width: int
+    height: int
+    padding: int
+    left_out: dict[str, int]
+    said: tuple[str, ...]
+
+
+def assemble_recording(
+    recording: Path,
+    angles: AngleSet,
+    out: Path,
+    *,
+    flat: bool = False,
+    lag_s: float = 0.0,
+    per: Per = "recording",
+    poses: Trajectory | None = None,
+    own_body: OwnBody | None = None,
+    smooth: bool = True,
+    columns: Iterable[str] = COLUMNS,
+) -> AssembleSummary:
+    """Write the cloud of a recording, or one for each turn of the axis, in constant memory whatever its length.
+
+    Args:
+        recording: MCAP recording.
+        angles: angle set of the scanner that made it.
+        out: the cloud, `.ply`: x y z [m] and `columns`; `out_000.ply` and so on where there are several.
+        flat: leave out rows without a point; the organised form keeps them as NaN, `width` rows to a scan.
+        lag_s: how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
+        per: a new cloud after each whole (half) turn since the first scan, and where the axis turns back; a scan
+            belongs where its first beam does.
+        poses: where the platform was, for clouds on a map; without them the platform stands still.
+        own_body: beams that end on the scanner, to be left out.
+        smooth: smooth the steps of the encoder where that helps; else go straight from sample to sample.
+        columns: of `COLUMNS`; time_s counts from the first beam, ring is the beam's index.
+
+    Raises:
+        RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
+    """
+    columns = list(columns)
+    _check(out, lag_s, columns)
+    source = open_recording(recording)
+    if smooth:
+        curve, said = axis_curve(source.joint_log, held=source.held)
+    else:
+        curve, said = straight(source.joint_log), "axis angle: straight between samples, as asked"
+    cloud_of = _cloud_of(source, per, round(lag_s * 1e9))
+    fields = cloud_fields(source.has_intensity, columns)
+    width = 0 if flat else int(source.beams.max())
+    counts: Counter[int] = Counter()
+    clouds: list[Path] = []
+    for which, tagged in groupby(zip(cloud_of.tolist(), source.scans(), strict=True), key=itemgetter(0)):
+        path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
+        comments = _comments(source, angles, width, int(np.sum(cloud_of == which)), lag_s, poses is not None)
+        before = counts[Verdict.POINT]
+        with PlyWriter(path, fields, comments) as cloud:
+            for block, placed in _placed(map(itemgetter(1), tagged), curve, angles, lag_s, poses, own_body, columns):
+                counts.update({verdict: int(np.sum(placed.verdict == verdict)) for verdict in Verdict})
+                rows = _rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
+                cloud.write(rows[placed.verdict == Verdict.POINT] if flat else rows)
+            if not counts[Verdict.POINT] and which == cloud_of[-1]:
+                reasons = ", ".join(f"{count} {reason}" for reason, count in _left_out(counts).items())
+                raise RecordingError(f"{recording}: none of the {source.beams.sum()} beams becomes a point: {reasons}")
+        if counts[Verdict.POINT] == before:
+            path.unlink()
+        else:
+            clouds.append(path)
+    beams = int(source.beams.sum())
+    return AssembleSummary(
+        out=out,
+        clouds=tuple(clouds),
+        points=counts[Verdict.POINT],
+        beams=beams,
+        width=width,
+        height=source.beams.size,
+        padding=width * source.beams.size - beams if width else 0,
+        left_out=_left_out(counts),
+        said=(said, *_about_poses(poses), *_about_own_body(own_body, source)),
+    )
+
+
+def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dtype[np.void]:
+    """Columns of our clouds. A recording without intensities has no such column."""
+    # joint_rad counts turns: after ten minutes float32 would be a hundredth of a degree coarse
+    kinds = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u4"}
+    wanted = [name for name in COLUMNS if name in columns and (has_intensity or name != "intensity")]
+    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, kinds[name]) for name in wanted)])
+
+
+def _check(out: Path, lag_s: float, columns: list[str]) -> None:
+    if out.suffix != ".ply":
+        raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")
+    if not np.isfinite(lag_s):
+        raise RecordingError(f"lag {lag_s} s: not a finite number")
+    for name in columns:
+        if name not in COLUMNS:
+            raise RecordingError(f"column '{name}': not one of a cloud{suggest(name, COLUMNS)}")
+
+
+def _cloud_of(source: Recording, per: Per, lag_ns: int) -> NDArray[np.int64]:
+    """Number of the cloud that each scan belongs to, not decreasing, shape (scans,)."""
+    if per == "recording":
+        return np.zeros(source.stamp_ns.size, np.int64)
+    logged_ns = source.stamp_ns + lag_ns
+    starts_ns = turn_starts(source.joint_log, int(logged_ns[0]), _WHOLE_RAD[per])
+    return np.maximum.accumulate(np.searchsorted(starts_ns, logged_ns, side="right"))
+
+
+def _placed(
+    scans: Iterable[Scan],
+    curve: AxisCurve,
+    angles: AngleSet,
+    lag_s: float,
+    poses: Trajectory | None,
+    own_body: OwnBody | None,
+    columns: list[str],
+) -> Iterator[tuple[Block, PlacedBlock]]:
+    for block in blocks(scans):
+        with_joint = "joint_rad" in columns
+        yield block, place_block(block, curve, angles, lag_s, poses=poses, own_body=own_body, with_joint=with_joint)
+
+
+def _rows(block: Block, placed: PlacedBlock, fields: np.dtype[np.void], start_ns: int, width: int) -> NDArray[np.void]:
+    """Rows of a cloud, shape (scans, width); those behind the last beam are NaN."""
+    scans, beams = block.range_m.shape
+    rows = np.empty((scans, width), fields)
+    for column, name in enumerate("xyz"):
+        rows[name][:, :beams] = placed.points_m[:, :, column]
+        rows[name][:, beams:] = np.nan
+    names = fields.names or ()
+    if "intensity" in names:
+        rows["intensity"] = np.nan
+        rows["intensity"][:, : block.intensity.shape[1]] = block.intensity
+    if "time_s" in names:
+        after_ns = block.first.time_ns - block.first.stamp_ns
+        rows["time_s"][:, :beams] = (np.add.outer(block.stamp_ns - start_ns, after_ns)) / 1e9
+        rows["time_s"][:, beams:] = np.nan
+    if "joint_rad" in names:
+        rows["joint_rad"][:, :beams] = placed.joint_rad
+        rows["joint_rad"][:, beams:] = np.nan
+    if "ring" in names:
+        rows["ring"] = np.arange(width)
+    return rows
+
+
+def _left_out(counts: Counter[int]) -> dict[str, int]:
+    return {reason.name.lower(): counts[reason] for reason in Verdict if reason and counts[reason]}
+
+
+def _about_poses(poses: Trajectory | None) -> Iterator[str]:
+    if poses is None:
+        return
+    gap_s = np.diff(poses.time_ns) / 1e9
+    error_m, error_rad = poses.error()
+    off = "" if math.isnan(error_m) else f", going straight between them is off by {error_m * 1000:.2g} mm and "
+    off += f"{math.degrees(error_rad):.2g} deg at most" if off else ""
+    yield f"poses: {poses.time_ns.size:,}, usually {np.median(gap_s):.3g} s apart{off}"
+    if gap_s.max() > 10 * np.median(gap_s):
+        yield f"warning: between two poses lie up to {gap_s.max():.2f} s: the platform goes straight across"
+    if np.abs(poses.position_m).max() > _FLOAT32_LIMIT_M:
+        far_km = np.abs(poses.position_m).max() / 1000
+        yield f"warning: poses lie {far_km:.0f} km from 0, where float32 steps by 1 mm or more: subtract an offset"
+
+
+def _about_own_body(own_body: OwnBody | None, source: Recording) -> Iterator[str]:
+    if own_body is None:
+        return
+    bearing_rad = next(iter(source.scans())).bearing_rad
+    if unknown := own_body.unknown(bearing_rad):
+        yield f"warning: {unknown} of {bearing_rad.size} beams have no bearing in the own-body mask: not masked"
+
+
+def _comments(source: Recording, angles: AngleSet, width: int, scans: int, lag_s: float, on_map: bool) -> list[str]:
+    organised = [f"width {width}", f"height {scans}"] if width else []
+    return [
+        *organised,
+        f"task {angles.task}, angles from {angles.source}, frame {'of the poses' if on_map else 'world'}",
+        "x y z in m, joint_rad in rad, ring is the beam",
+        f"time_s 0 is {source.start_ns} ns",
+        *([f"joint log taken as {lag_s} s late"] if lag_s else []),
+    ]

@@ -1,0 +1,48 @@
+"""What becomes of a beam: a point, or the reason why not."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.samples import Floats, Scan
+
+Bytes = NDArray[np.uint8]
+
+
+class Verdict(IntEnum):
+    """Why a beam became no point, or that it did. A beam has the first that applies, from top to bottom."""
+
+    POINT = 0
+    NO_RETURN = 1  # NaN, +inf (REP 117), or the 0 of drivers that know neither
+    TOO_NEAR = 2  # below range_min, or -inf (REP 117)
+    TOO_FAR = 3  # above range_max
+    OUTSIDE_JOINT_LOG = 4
+    OWN_BODY = 5
+    OUTSIDE_POSES = 6
+
+
+def judge(scan: Scan, joint_rad: Floats, own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0) -> Bytes:
+    """A `Verdict` for each beam from its range and axis angle, shape (n,).
+
+    `joint_rad` is NaN where nobody knows it; `gamma_rot_rad` is the axis angle at joint position 0, from where the
+    mask of the own body counts.
+    """
+    range_m = scan.range_m
+    verdict = np.select(
+        [
+            np.isnan(range_m) | np.isposinf(range_m) | (range_m == 0),
+            range_m < np.float32(scan.range_min_m),
+            range_m > np.float32(scan.range_max_m),
+            np.isnan(joint_rad),
+        ],
+        [Verdict.NO_RETURN, Verdict.TOO_NEAR, Verdict.TOO_FAR, Verdict.OUTSIDE_JOINT_LOG],
+        Verdict.POINT,
+    ).astype(np.uint8)
+    if own_body is not None:
+        hides = own_body.hides(scan.bearing_rad, joint_rad + gamma_rot_rad)
+        verdict[(verdict == Verdict.POINT) & hides] = Verdict.OWN_BODY
+    return verdict

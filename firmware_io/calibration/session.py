@@ -1,0 +1,108 @@
+"""`scanwright calibrate`: recordings of scenes that stand still, and an angle set, become the calibrated angle set."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from design.angles import AngleSet
+from design.atomic_file import check_place
+from design.errors import RecordingError
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.calibration.entropy import witness
+from firmware_io.calibration.estimate import Estimate, estimate
+from firmware_io.calibration.lag import lag_of
+from firmware_io.calibration.model import Mount, gather, start_vector
+from firmware_io.calibration.report import report
+from firmware_io.calibration.tiles import fan_side
+from firmware_io.files import whole_file
+from firmware_io.recording.recording import Recording, open_recording
+
+
+def calibrate_recordings(
+    recordings: Sequence[Path],
+    angles: AngleSet,
+    out: Path,
+    *,
+    one_place: bool = False,
+    own_body: OwnBody | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Write the calibrated angle set to `out` and what was found to `report_path(out)`; return the latter.
+
+    Args:
+        recordings: of scenes that stand still; each may be of another place.
+        angles: of the scanner that made them; its delta and lever arm are where the search starts.
+        out: the calibrated angle set, `.json`.
+        one_place: the scanner stood still from the first recording to the last.
+        own_body: beams that end on the scanner itself, to be left out.
+        say: told what is going on.
+
+    Raises:
+        RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
+    """
+    if out.suffix != ".json":
+        raise RecordingError(f"{out}: an angle set is JSON; name it {out.with_suffix('.json').name}")
+    check_place(out, RecordingError)
+    for k, recording in enumerate(recordings):
+        if recording.resolve() in [other.resolve() for other in recordings[:k]]:
+            raise RecordingError(f"{recording}: named twice; the same beams twice tell nothing more, but seem to")
+    say(f"reading {len(recordings)} recording{'s'[: len(recordings) > 1]}")
+    gamma_rot_rad = math.radians(angles.angles_deg.gamma_rot)
+    opened = [open_recording(path) for path in recordings]
+    beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
+    mount, start = Mount.of(angles), start_vector(angles)
+    say(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
+    try:
+        found = estimate(beams, mount, start)
+    except RecordingError as refusal:
+        say("asking how late the angles are")
+        raise RecordingError(f"{refusal}{_late(opened)}") from refusal
+    say("asking the entropy")
+    seen = witness(mount, beams, fan_side(beams, mount), start, found.x, found.noise_m)
+    record = {
+        "recordings": [path.name for path in recordings],
+        "left_out": left_out,
+        **report(found, start, mount, beams, seen),
+    }
+    with whole_file(out) as part, whole_file(report_path(out)) as beside:
+        part.write_text(calibrated(angles, found).to_json(), encoding="utf-8")
+        beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return record
+
+
+def _late(opened: Sequence[Recording]) -> str:
+    """What recordings whose mounting errors cannot be found still tell of time; "" where they do not."""
+    for recording in opened:
+        with suppress(RecordingError):
+            lag = lag_of(recording)
+            return (
+                f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
+                f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"
+            )
+    return ""
+
+
+def report_path(out: Path) -> Path:
+    """Where the report of a calibrated angle set lies: angles.calibrated.json, angles.calibrated.report.json."""
+    return out.with_suffix(".report.json")
+
+
+def calibrated(angles: AngleSet, found: Estimate) -> AngleSet:
+    """The angle set with the mounting errors that were found, and their covariance (rad and m)."""
+    x = found.x
+    offset_mm = np.round(x[2:4] * 1e3, 5)
+    return angles.model_copy(
+        update={
+            "source": "calibration",
+            "delta_rotvec_rot_deg": tuple(np.round(np.degrees(x[0:2]), 7).tolist()),
+            "t_rot_laser_mm": (*offset_mm.tolist(), angles.t_rot_laser_mm[2]),
+            "covariance": tuple(tuple(row) for row in found.covariance[:4, :4].tolist()),
+        }
+    )

@@ -1,0 +1,1 @@
+"""Cloud files: PLY, PCD, LAS, E57, NPZ, XYZ."""

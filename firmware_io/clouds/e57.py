@@ -1,0 +1,192 @@
+"""E57 (ASTM E2807): several scans in one file, each with its pose, organised by row and column, invalid points marked.
+
+Written node by node with libe57, as the layer above it knows neither times nor columns of other names, and rounds to
+float32. Ours go under an extension of the format, prefix `sw`, which other software skips.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pye57
+from pye57 import libe57
+
+from design.errors import RecordingError
+from firmware_io.clouds.record import (
+    COLUMN_TYPES,
+    Cloud,
+    Column,
+    colour_bytes,
+    headlines,
+    pose_matrix,
+    pose_numbers,
+    told,
+)
+from firmware_io.files import foreign, whole_file
+
+_PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
+_NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
+_COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
+_OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp", **_COLOURS}
+_AXES = ("cartesianX", "cartesianY", "cartesianZ")
+_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "columnIndex"}
+
+
+def read(path: Path) -> tuple[list[Cloud], list[str]]:
+    """All scans of a file."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: cannot read: No such file or directory")
+    with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+        return [foreign(f"{path}: scan {k}", _read_scan, e57, k) for k in range(e57.scan_count)], []
+
+
+def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
+    """Write one scan for each cloud."""
+    with whole_file(path) as part, pye57.E57(str(part), mode="w") as e57:
+        e57.image_file.extensionsAdd(_PREFIX, _URI)
+        for number, cloud in enumerate(clouds, 1):
+            _write_scan(e57, cloud, f"{path.stem} {number}")
+    return []
+
+
+def _read_scan(e57: pye57.E57, number: int) -> Cloud:
+    header = e57.get_header(number)
+    held = _read_points(e57, header)
+    if all(name in held for name in _AXES):
+        points = np.stack([held.pop(name) for name in _AXES], axis=1)
+    else:
+        r, azimuth, elevation = (held.pop(name) for name in _SPHERICAL)
+        flat = r * np.cos(elevation)
+        points = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), r * np.sin(elevation)], axis=1)
+    for name in ("cartesianInvalidState", "sphericalInvalidState"):
+        if name in held:
+            points[held[name] != 0] = np.nan
+    row, column = held.get("rowIndex"), held.get("columnIndex")
+    back = {own: name for name, own in _OWN_FIELD.items()}
+    columns = {
+        back.get(name, name.removeprefix(f"{_PREFIX}:")): values
+        for name, values in held.items()
+        if name not in _STRUCTURE
+    }
+    columns |= {name: colour_bytes(columns[name]) for name in _COLOURS if name in columns}
+    columns = {name: values.astype(COLUMN_TYPES.get(name, values.dtype)) for name, values in columns.items()}
+    T = np.eye(4)
+    if header.has_pose():
+        w, x, y, z = header.rotation
+        T = pose_matrix([*header.translation, x, y, z, w])
+    text = header["description"].value() if header.node.isDefined("description") else ""
+    start = told(Cloud(points), text.splitlines()).start_ns
+    flat_cloud = Cloud(points, columns, (1, len(points)), T, start)
+    return flat_cloud if row is None or column is None else _organised(flat_cloud, row, column)
+
+
+def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
+    """The cloud with every point in its cell; cells that the file left out are NaN."""
+    row, column = row - row.min(), column - column.min()
+    height, width = int(row.max()) + 1, int(column.max()) + 1
+    cell = row * width + column
+    if len(np.unique(cell)) != len(cell):  # several returns to a cell
+        return cloud
+    points = np.full((height * width, 3), np.nan, cloud.points_m.dtype)
+    points[cell] = cloud.points_m
+    columns = {}
+    for name, values in cloud.columns.items():
+        columns[name] = np.full(height * width, np.nan if values.dtype.kind == "f" else 0, values.dtype)
+        columns[name][cell] = values
+    return Cloud(points, columns, (height, width), cloud.T_world_cloud, cloud.start_ns)
+
+
+def _read_points(e57: pye57.E57, header: Any) -> dict[str, Column]:
+    prototype = libe57.StructureNode(header.points.prototype())
+    held: dict[str, Column] = {}
+    whole = set()
+    buffers = libe57.VectorSourceDestBuffer()
+    for k in range(prototype.childCount()):
+        node = prototype.get(k)
+        name = node.elementName()
+        real = node.type() == libe57.NodeType.E57_FLOAT
+        single = real and libe57.FloatNode(node).precision() == libe57.E57_SINGLE
+        if node.type() == libe57.NodeType.E57_INTEGER:
+            whole.add(name)
+        held[name] = np.empty(header.point_count, np.float32 if single else np.float64)
+        buffers.append(libe57.SourceDestBuffer(e57.image_file, name, held[name], header.point_count, True, True))
+    reader = header.points.reader(buffers)
+    try:
+        reader.read()
+    finally:
+        reader.close()
+    return {name: values.astype(np.int64) if name in whole else values for name, values in held.items()}
+
+
+def _write_scan(e57: pye57.E57, cloud: Cloud, name: str) -> None:
+    file = e57.image_file
+    valid = np.isfinite(cloud.points_m).all(axis=1)
+    fields: dict[str, Column] = {
+        axis: np.where(valid, cloud.points_m[:, k], 0).astype(cloud.points_m.dtype) for k, axis in enumerate(_AXES)
+    }
+    if not valid.all():
+        fields["cartesianInvalidState"] = np.where(valid, 0, _NO_POINT).astype(np.int64)
+    height, width = cloud.shape
+    if cloud.organised:
+        fields["rowIndex"] = np.repeat(np.arange(height), width)
+        fields["columnIndex"] = np.tile(np.arange(width), height)
+    fields |= {_OWN_FIELD.get(column, f"{_PREFIX}:{column}"): values for column, values in cloud.columns.items()}
+    scan = libe57.StructureNode(file)
+    scan.set("guid", libe57.StringNode(file, f"{{{uuid.uuid4()}}}"))
+    scan.set("name", libe57.StringNode(file, name))
+    start = [line for line in headlines(cloud) if line.startswith("time_s")]
+    scan.set("description", libe57.StringNode(file, "\n".join(start)))
+    bounds = {"rowMinimum": 0, "rowMaximum": height - 1, "columnMinimum": 0, "columnMaximum": width - 1}
+    _set(file, scan, "indexBounds", bounds if cloud.organised else {"rowMaximum": 0, "columnMaximum": width - 1})
+    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(cloud.T_world_cloud))
+    pose = libe57.StructureNode(file)
+    scan.set("pose", pose)
+    _set(file, pose, "rotation", {"w": w, "x": i, "y": j, "z": k})
+    _set(file, pose, "translation", {"x": x, "y": y, "z": z})
+    if "intensity" in fields and np.isfinite(fields["intensity"]).any():
+        low, high = float(np.nanmin(fields["intensity"])), float(np.nanmax(fields["intensity"]))
+        _set(file, scan, "intensityLimits", {"intensityMinimum": low, "intensityMaximum": high})
+    if set(_COLOURS) <= set(cloud.columns):
+        limits = {
+            f"{name}{end}": value for name in _COLOURS.values() for end, value in (("Minimum", 0), ("Maximum", 255))
+        }
+        _set(file, scan, "colorLimits", limits)
+    prototype = libe57.StructureNode(file)
+    buffers = libe57.VectorSourceDestBuffer()
+    held = []
+    for field, values in fields.items():
+        prototype.set(field, _node(file, values))
+        # The bindings take int64 for int32, and libe57 refuses an infinity on its way from double to single
+        single = values.dtype == np.float32
+        held.append(np.ascontiguousarray(values, np.float32 if single else np.float64))
+        buffers.append(libe57.SourceDestBuffer(file, field, held[-1], len(values), True, True))
+    points = libe57.CompressedVectorNode(file, prototype, libe57.VectorNode(file, True))
+    scan.set("points", points)
+    e57.data3d.append(scan)
+    writer = points.writer(buffers)
+    try:
+        writer.write(len(cloud.points_m))
+    finally:
+        writer.close()  # one that outlives its file takes the process with it
+
+
+def _node(file: Any, values: Column) -> Any:
+    """What says how one field is stored."""
+    if values.dtype.kind == "f":
+        precision = libe57.E57_SINGLE if values.dtype.itemsize == 4 else libe57.E57_DOUBLE
+        return libe57.FloatNode(file, 0.0, precision)
+    low, high = int(values.min(initial=0)), int(values.max(initial=0))
+    return libe57.IntegerNode(file, low, low, high)
+
+
+def _set(file: Any, parent: Any, name: str, values: dict[str, int] | dict[str, float]) -> None:
+    node = libe57.StructureNode(file)
+    for key, value in values.items():
+        kind = libe57.IntegerNode if isinstance(value, int) else libe57.FloatNode
+        node.set(key, kind(file, value))
+    parent.set(name, node)

@@ -1,0 +1,103 @@
+"""LAS and LAZ 1.4: points of a map in its world, whole numbers of a tenth of a millimetre.
+
+The pose, the start of the times and the rows of an organised cloud stand in a record of our own (a VLR), which other
+software ignores: it sees the points where they belong, in the world.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from design import frames
+from design.errors import RecordingError
+from firmware_io.clouds.record import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
+from firmware_io.files import foreign, whole_file
+
+_STEP_M = 1e-4
+_OURS = "scanwright"
+_EXACT = "intensity_exact"
+_OWN_FIELD = {"intensity": "intensity", "time_s": "gps_time"}
+_COLOURS = ("red", "green", "blue")  # 16 bits; ours are bytes
+_HELD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
+
+
+def read(path: Path) -> tuple[list[Cloud], list[str]]:
+    """The cloud of a file, in the frame of its scanner where the file tells it, else in the world."""
+    las = foreign(f"{path}: not a LAS file", laspy.read, path)
+    if not len(las.points):
+        raise RecordingError(f"{path}: no point")
+    lines = [
+        line
+        for vlr in las.header.vlrs
+        if vlr.user_id == _OURS
+        for line in vlr.record_data_bytes().decode("utf-8", "replace").splitlines()
+    ]
+    extra = list(las.point_format.extra_dimension_names)
+    columns: dict[str, Column] = {name: np.array(las[name]) for name in extra if name != _EXACT}
+    intensity = np.array(las[_EXACT] if _EXACT in extra else las.intensity)
+    if _EXACT in extra or intensity.any():
+        columns["intensity"] = intensity.astype(COLUMN_TYPES["intensity"])
+    if "gps_time" in las.point_format.dimension_names and np.any(las.gps_time):
+        columns["time_s"] = np.array(las.gps_time, float)
+    for name in _COLOURS if "red" in las.point_format.dimension_names else ():
+        columns[name] = colour_bytes(np.array(las[name]))
+    unread = [
+        name
+        for name in las.point_format.standard_dimension_names
+        if name not in _HELD and np.ptp(np.asarray(las[name]).astype(float)) > 0
+    ]
+    world = np.stack([las.x, las.y, las.z], axis=1).astype(float)
+    cloud = told(Cloud(world, columns), lines)
+    points_m = frames.apply(np.linalg.inv(cloud.T_world_cloud), world) if cloud.placed else world
+    said = [f"left out of {path}: {', '.join(unread)}"] if unread else []
+    return [Cloud(points_m, columns, (1, len(world)), cloud.T_world_cloud, cloud.start_ns)], said
+
+
+def write(path: Path, cloud: Cloud) -> list[str]:
+    """Write a cloud; lines about what the file does not hold."""
+    valid = np.isfinite(cloud.points_m).all(axis=1)
+    if not valid.any():
+        raise RecordingError(f"{path}: no row of the cloud is a point, and LAS holds nothing else")
+    world = frames.apply(cloud.T_world_cloud, cloud.points_m[valid].astype(float))
+    header = laspy.LasHeader(version="1.4", point_format=7 if "red" in cloud.columns else 6)
+    header.scales = np.full(3, _STEP_M)
+    header.offsets = np.floor(world.min(axis=0))
+    lines = [line for line in headlines(cloud) if not line.startswith(("width", "height"))]
+    if lines:
+        header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
+    columns = {name: column[valid] for name, column in cloud.columns.items()}
+    columns |= {name: columns[name].astype(np.uint16) * 257 for name in _COLOURS if name in columns}
+    said = ["LAS rounds coordinates to 0.1 mm"]
+    if cloud.placed:
+        said.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
+    if "intensity" in columns and not _whole(columns["intensity"]):
+        columns[_EXACT] = columns["intensity"]
+        columns["intensity"] = np.clip(np.nan_to_num(columns["intensity"]).round(), 0, 65535)
+        said.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
+    if "time_s" in columns:
+        said.append("gps_time is seconds since the first beam, not the time of GPS")
+    if cloud.organised or not valid.all():
+        height, width = cloud.shape
+        shape = f"the shape {height} x {width} is lost, " if cloud.organised else ""
+        said.append(f"LAS holds points only: {shape}{np.count_nonzero(~valid):,} rows without a point are left out")
+    header.add_extra_dims(
+        [
+            laspy.ExtraBytesParams(name, column.dtype)
+            for name, column in columns.items()
+            if name not in _HELD | set(_OWN_FIELD)
+        ]
+    )
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = world.T
+    for name, column in columns.items():
+        las[_OWN_FIELD.get(name, name)] = column
+    with whole_file(path) as part, part.open("wb") as stream:
+        las.write(stream, do_compress=path.suffix.lower() == ".laz")
+    return said
+
+
+def _whole(intensity: Column) -> bool:
+    return bool(np.all((intensity == np.round(intensity)) & (intensity >= 0) & (intensity <= 65535)))

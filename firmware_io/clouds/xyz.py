@@ -1,0 +1,48 @@
+"""XYZ: numbers as text, one point in a line; names, types, shape, pose and start as comments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from design.errors import RecordingError
+from firmware_io.clouds.record import Cloud, cloud_of, headlines, rows_of
+from firmware_io.files import foreign, whole_file
+
+_DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
+
+
+def read(path: Path) -> tuple[list[Cloud], list[str]]:
+    """The cloud of a file of three or more numbers in a line; columns that the file does not name are numbered."""
+    text = foreign(f"{path}: cannot read", path.read_text, encoding="utf-8")
+    lines = text.replace(",", " ").splitlines()
+    comments = [line.lstrip("#/ ") for line in lines if line.startswith(("#", "//"))]
+    numbers = [line for line in lines if line.strip() and not line.startswith(("#", "//"))]
+    if not numbers:
+        raise RecordingError(f"{path}: no line of numbers")
+    values = foreign(f"{path}: not lines of numbers", np.loadtxt, numbers, ndmin=2)
+    count = values.shape[1]
+    if count < 3:
+        raise RecordingError(f"{path}: {count} numbers in a line; a cloud has x y z at least")
+    named = [words for line in comments if len(words := line.lower().split()) == count and words[:3] == ["x", "y", "z"]]
+    typed = [words[1:] for line in comments if len(words := line.split()) == count + 1 and words[0] == "types"]
+    names = named[0] if named else ["x", "y", "z", *(f"column_{k}" for k in range(4, count + 1))]
+    kinds = foreign(
+        f"{path}: types {typed}", np.dtype, list(zip(names, typed[0] if typed else ["<f8"] * count, strict=True))
+    )
+    rows = np.empty(len(values), kinds)
+    for k, name in enumerate(names):
+        rows[name] = values[:, k]
+    return [cloud_of(rows, comments)], [] if named or count == 3 else [f"columns 4 to {count} have no name in {path}"]
+
+
+def write(path: Path, cloud: Cloud) -> list[str]:
+    """Write a cloud."""
+    rows = rows_of(cloud)
+    names = rows.dtype.names or ()
+    kinds = [rows.dtype[name].str for name in names]
+    header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
+    with whole_file(path) as part:
+        np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
+    return []

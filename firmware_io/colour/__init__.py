@@ -1,0 +1,1 @@
+"""Colours for a cloud from the images of a camera."""

@@ -1,0 +1,133 @@
+"""The images of a camera, and where each was taken from."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from design.angles import AngleSet
+from design.camera import Camera
+from design.errors import RecordingError
+from firmware_io.assembly.axis_curve import axis_curve
+from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.recording.recording import Recording
+from firmware_io.samples import AxisCurve, Floats, straight
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One image and where it was taken from.
+
+    Attributes:
+        file: of the image.
+        T_cloud_camera: shape (4, 4).
+    """
+
+    file: Path
+    T_cloud_camera: Floats
+
+
+def views_of(
+    camera: Camera,
+    folder: Path,
+    angles: AngleSet,
+    recording: Recording,
+    poses: Trajectory | None = None,
+    lag_s: float = 0.0,
+) -> list[View]:
+    """The images of a camera with their poses.
+
+    Args:
+        camera: `camera.images` is an image, or a CSV file with the columns file and time_ns (since 1970, on the clock
+            of the recording) or joint_deg; what moves needs one of them for every image.
+        folder: that the names of files start from, the task's.
+        angles: angle set of the scanner.
+        recording: for the servo's angle at the time of an image.
+        poses: of the platform, where the cloud is on a map.
+        lag_s: how late the joint log's stamps are.
+
+    Raises:
+        RecordingError: no such image, or nobody knows where it was taken.
+    """
+    listed = folder / camera.images
+    shots = list(_listed(listed)) if listed.suffix.lower() == ".csv" else [_Shot(listed)]
+    if not shots:
+        raise RecordingError(f"{listed}: no image in it")
+    curve = straight(recording.joint_log) if recording.held else axis_curve(recording.joint_log, held=False)[0]
+    found = []
+    for shot in shots:
+        with opened(shot.file, camera):  # what is wrong with an image is said before the work, not after
+            pass
+        T_cloud_world = np.eye(4)
+        if poses is not None:
+            if shot.time_ns is None:
+                raise RecordingError(f"{listed}: {shot.file.name}: on a moving platform every image needs a time_ns")
+            T_cloud_world = poses.T_map_world(np.array([shot.time_ns]))[0]
+        T = T_cloud_world @ _T_world_frame(camera, angles, shot, curve, lag_s) @ camera.T_frame_camera()
+        if not np.isfinite(T).all():
+            raise RecordingError(f"{listed}: {shot.file.name}: its time_ns lies outside of the recording")
+        found.append(View(shot.file, T))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    file: Path
+    time_ns: int | None = None
+    joint_rad: float | None = None
+
+
+def _listed(path: Path) -> Iterator[_Shot]:
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            table = csv.DictReader(stream, skipinitialspace=True)
+            names = table.fieldnames or []
+            if "file" not in names or not {"time_ns", "joint_deg"} & set(names):
+                told = ", ".join(names) or "nothing"
+                raise RecordingError(f"{path}: columns {told}: one is `file`, another `time_ns` or `joint_deg`")
+            for number, row in enumerate(table, 2):
+                time_ns = int(row["time_ns"]) if "time_ns" in names else None
+                joint_rad = float(np.radians(float(row["joint_deg"]))) if "joint_deg" in names else None
+                if not row["file"]:
+                    raise RecordingError(f"{path}:{number}: no file named")
+                yield _Shot(path.parent / row["file"], time_ns, joint_rad)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot read: {error.strerror}") from error
+    except (ValueError, TypeError) as error:
+        raise RecordingError(f"{path}: not a number: {error}; time_ns is whole nanoseconds since 1970") from error
+
+
+def _T_world_frame(camera: Camera, angles: AngleSet, shot: _Shot, curve: AxisCurve, lag_s: float) -> Floats:
+    if camera.frame == "world":
+        return np.eye(4)
+    joint_rad = shot.joint_rad
+    if joint_rad is None:
+        if shot.time_ns is None:
+            raise RecordingError(
+                f"{shot.file}: camera.frame = '{camera.frame}' turns: list the images in a CSV file, each with its "
+                "time_ns or joint_deg"
+            )
+        joint_rad = float(curve.angle_at(np.array([shot.time_ns + round(lag_s * 1e9)], np.int64))[0])
+    return angles.T_world_rot(joint_rad) if camera.frame == "rot" else angles.T_world_laser(joint_rad)
+
+
+@contextmanager
+def opened(path: Path, camera: Camera) -> Iterator[Image.Image]:
+    """An image of the camera's size; its pixels are read later."""
+    try:
+        with Image.open(path) as image:
+            if image.size != camera.size_px:
+                width, height = image.size
+                raise RecordingError(
+                    f"{path}: {width} x {height} pixels, camera.size_px = {list(camera.size_px)}: a calibration fits "
+                    "one size"
+                )
+            yield image
+    except (OSError, ValueError) as error:  # pillow's own are OSErrors
+        raise RecordingError(f"{path}: cannot read the image: {error}") from error

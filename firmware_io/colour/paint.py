@@ -1,0 +1,233 @@
+"""Colours for clouds, from images of a camera whose lens and place the task file gives.
+
+A point gets the colour of its pixel in the image whose optical axis it lies nearest to, of those in which it is seen.
+Whether it is seen the cloud itself tells: every point is a disc that reaches to its neighbours; the discs nearest to
+the camera are drawn into a depth image, and what lies behind them stays without colour. What the scanner has not seen
+hides nothing. Discs face the camera, so those of a slanted surface cover each other: a point may lie as much deeper as
+its surface recedes over a disc, and 5 cm. A disc also covers a little of what is beside it: along the edges of near
+things points are left without colour rather than given a wrong one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from design import frames
+from design.angles import AngleSet
+from design.camera import Camera
+from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.clouds.point_file import PlyWriter, ply_comments, read_ply
+from firmware_io.colour.camera_views import View, opened
+from firmware_io.recording.recording import Recording
+from firmware_io.samples import Floats, Times
+
+COLOURS = ("red", "green", "blue", "alpha")
+"""Columns of a coloured cloud, bytes; alpha is 255 where there is a colour and 0 where not."""
+_AT_ONCE = 1 << 18
+_NOISE_M = 0.05
+_SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: at least, where it is unknown, at most
+_BASE_RAD = np.radians(2.0)  # between the points that tell how a surface lies: noise must not decide it
+_STEEP = 6.0  # times as far apart as at normal incidence; beyond it they lie on two surfaces
+_WIDEST_PX = 50
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class ColourSummary:
+    """What became of the points of one cloud: `points == coloured + hidden + outside`."""
+
+    points: int
+    coloured: int
+    hidden: int
+    outside: int
+    images: int
+
+
+def colour_cloud(path: Path, camera: Camera, views: list[View], spacing: Spacing, from_m: Floats) -> ColourSummary:
+    """Colour a PLY cloud in place, in constant memory but for seven bytes a point and one depth image.
+
+    Args:
+        path: cloud such as `assemble` writes.
+        camera: that took all images.
+        views: the images.
+        spacing: of beams and scan lines.
+        from_m: where the scanner stood in the cloud, shape (3,): the farther from it, the sparser the points.
+
+    Raises:
+        RecordingError: an image cannot be read or has another size, or the cloud cannot be written.
+    """
+    rows, width = read_ply(path), _width(path)
+    rgb = np.zeros((rows.size, 3), np.uint8)
+    nearest_rad = np.full(rows.size, np.inf, np.float32)
+    inside = np.zeros(rows.size, np.bool_)
+    for view in views:
+        picture = _picture(view.file, camera)
+        depth = np.full(picture.shape[:2], np.inf, np.float32)
+        for _, seen in _seen(rows, width, camera, view, spacing, from_m):
+            _draw(seen.column, seen.row, seen.depth_m, seen.radius_px, depth)
+        for begin, seen in _seen(rows, width, camera, view, spacing, from_m):
+            which = begin + seen.which
+            inside[which] = True
+            behind_m = seen.depth_m - depth[seen.row, seen.column]
+            better = (behind_m <= _NOISE_M + seen.recedes_m) & (seen.aside_rad < nearest_rad[which])
+            which = which[better]
+            nearest_rad[which] = seen.aside_rad[better]
+            rgb[which] = picture[seen.row[better], seen.column[better]]
+    coloured = np.isfinite(nearest_rad)
+    _write(path, rows, rgb, coloured)
+    points = int(np.isfinite(rows["x"]).sum())
+    count = int(coloured.sum())
+    return ColourSummary(points, count, int(np.sum(inside & ~coloured)), points - int(inside.sum()), len(views))
+
+
+@dataclass(frozen=True, slots=True)
+class Spacing:
+    """How far apart neighbouring beams and neighbouring scan lines lie [rad]."""
+
+    beam_rad: float
+    line_rad: float
+
+
+def spacing_of(recording: Recording) -> Spacing:
+    """Beams as the sensor says, lines as the axis usually turned from scan to scan."""
+    scan = next(islice(recording.scans(), 1))
+    joint_rad = recording.joint_log.angle_at(recording.stamp_ns)
+    turned = np.abs(np.diff(joint_rad[np.isfinite(joint_rad)]))
+    return Spacing(abs(scan.angle_increment_rad), float(np.median(turned)) if turned.size else 0.0)
+
+
+def _picture(path: Path, camera: Camera) -> Bytes:
+    with opened(path, camera) as image:
+        return np.array(image.convert("RGB"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """Points inside an image, all of shape (k,)."""
+
+    which: NDArray[np.int64]
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    depth_m: NDArray[np.float32]
+    recedes_m: Floats
+    radius_px: NDArray[np.int64]
+    aside_rad: NDArray[np.float32]
+
+
+def _seen(
+    rows: NDArray[np.void], width: int, camera: Camera, view: View, spacing: Spacing, from_m: Floats
+) -> Iterator[tuple[int, _Seen]]:
+    """The points that lie in an image, hidden or not, some at a time, and where their rows begin."""
+    T_camera_cloud = np.linalg.inv(view.T_cloud_camera)
+    at_once = max(_AT_ONCE // width, 1) * width if width else _AT_ONCE
+    for begin in range(0, rows.size, at_once):
+        part = rows[begin : begin + at_once]
+        points_m = np.stack([part[axis] for axis in "xyz"], axis=1).astype(float)
+        in_camera = frames.apply(T_camera_cloud, points_m)
+        pixels = camera.pixels(in_camera)
+        which = np.flatnonzero(np.isfinite(pixels).all(axis=1))
+        place = np.rint(pixels[which]).astype(np.int64)
+        depth_m = np.linalg.norm(in_camera[which], axis=1)
+        range_m = np.linalg.norm(points_m - from_m, axis=1)
+        slant, radius_m = (values[which] for values in _discs(in_camera, range_m, width, spacing))
+        wide = np.ceil(max(camera.focal_px) * radius_m / depth_m.clip(1e-3)).clip(0, _WIDEST_PX)
+        drawn_m = (wide + 1) * depth_m / min(camera.focal_px)  # pixels are whole, at both ends
+        aside_rad = np.arctan2(np.hypot(in_camera[which, 0], in_camera[which, 1]), in_camera[which, 2])
+        seen = _Seen(
+            which=which,
+            row=place[:, 1],
+            column=place[:, 0],
+            depth_m=depth_m.astype(np.float32),
+            recedes_m=slant * drawn_m,
+            radius_px=wide.astype(np.int64),
+            aside_rad=aside_rad.astype(np.float32),
+        )
+        yield begin, seen
+
+
+def _discs(in_camera: Floats, range_m: Floats, width: int, spacing: Spacing) -> tuple[Floats, Floats]:
+    """Tangent of each point's surface to the camera's view of it, and the radius of its disc [m], each (n,).
+
+    Both come from neighbours in an organised cloud; where there are none, surfaces are taken to face the scanner.
+    """
+    least, unknown, most = _SLANTS
+    facing_m = np.hypot(spacing.beam_rad, spacing.line_rad) / 2 * range_m
+    if not width or len(in_camera) < 2 * width:
+        return np.full(len(in_camera), unknown), facing_m
+    grid, far_m = in_camera.reshape(-1, width, 3), range_m.reshape(-1, width)
+    along, along_m = _tangent(grid, far_m, spacing.beam_rad, axis=1)
+    across, across_m = _tangent(grid, far_m, spacing.line_rad, axis=0)
+    normal = np.cross(along, across).reshape(-1, 3)
+    toward = np.abs(np.einsum("ij,ij->i", normal, in_camera))
+    aside = np.linalg.norm(np.cross(normal, in_camera), axis=1)
+    slant = np.divide(aside, toward, out=np.full(len(in_camera), most), where=toward > 0)
+    known = np.isfinite(aside)
+    radius_m = np.where(known, np.hypot(along_m, across_m).ravel() / 2, facing_m)
+    return np.where(known, slant.clip(least, most), unknown), radius_m
+
+
+def _tangent(grid: Floats, far_m: Floats, step_rad: float, axis: int) -> tuple[Floats, Floats]:
+    """From a point to one some steps on (or before, at the end), NaN where they lie on two surfaces; per step [m]."""
+    steps = int(np.clip(round(_BASE_RAD / step_rad) if step_rad else 1, 1, grid.shape[axis] // 2))
+    ahead = np.roll(grid, -steps, axis) - grid
+    end = [slice(None)] * 2
+    end[axis] = slice(grid.shape[axis] - steps, None)
+    ahead[tuple(end)] = (grid - np.roll(grid, steps, axis))[tuple(end)]
+    apart_m = np.linalg.norm(ahead, axis=2)
+    ahead[apart_m > _STEEP * max(steps * step_rad, _BASE_RAD) * far_m] = np.nan
+    return ahead, apart_m / steps
+
+
+def _width(path: Path) -> int:
+    """Points to a scan of an organised cloud, 0 of a flat one."""
+    widths = [words[1] for comment in ply_comments(path) if (words := comment.split())[:1] == ["width"]]
+    return int(widths[0]) if widths and widths[0].isdigit() else 0
+
+
+@njit(cache=True)
+def _draw(
+    column: NDArray[np.int64],
+    row: NDArray[np.int64],
+    depth_m: NDArray[np.float32],
+    radius_px: NDArray[np.int64],
+    depth: NDArray[np.float32],
+) -> None:
+    """Draw discs into a depth image."""
+    height, width = depth.shape
+    for i in range(column.size):
+        r = radius_px[i]
+        for v in range(max(row[i] - r, 0), min(row[i] + r + 1, height)):
+            for u in range(max(column[i] - r, 0), min(column[i] + r + 1, width)):
+                if (u - column[i]) ** 2 + (v - row[i]) ** 2 <= r * r and depth_m[i] < depth[v, u]:
+                    depth[v, u] = depth_m[i]
+
+
+def _write(path: Path, rows: NDArray[np.void], rgb: Bytes, coloured: NDArray[np.bool_]) -> None:
+    kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
+    fields = np.dtype([*kept, *((name, "|u1") for name in COLOURS)])
+    with PlyWriter(path, fields, ply_comments(path)) as cloud:
+        for begin in range(0, rows.size, _AT_ONCE):
+            part = slice(begin, begin + _AT_ONCE)
+            out = np.empty(rows[part].size, fields)
+            for name, _ in kept:
+                out[name] = rows[part][name]
+            for channel, name in enumerate(COLOURS[:3]):
+                out[name] = rgb[part, channel]
+            out["alpha"] = np.where(coloured[part], 255, 0)
+            cloud.write(out)
+
+
+def stands_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Floats:
+    """Where the scanner stood in its cloud [m], in the middle of the recording, shape (3,)."""
+    stood = np.array(angles.t_world_rot_mm) / 1000
+    if poses is None:
+        return stood
+    middle: Times = recording.stamp_ns[[recording.stamp_ns.size // 2]]
+    return frames.apply(poses.T_map_world(middle)[0], stood[None])[0]

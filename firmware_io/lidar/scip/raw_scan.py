@@ -1,0 +1,56 @@
+"""One scan as a sensor sent it, and the LaserScan that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from firmware_io.lidar.scip.parameters import Parameters
+from firmware_io.samples import Float32s, Scan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RawScan:
+    """One scan as it came.
+
+    Attributes:
+        stamp_ms: sensor time, unwrapped.
+        restarts: how often the sensor's clock began anew since the lidar was opened: stamps compare within one only.
+        arrival_ns: time.monotonic_ns() when the last byte came.
+        first_step: step of the first value.
+        cluster: steps per value.
+        range_m: shape (n,), NaN where nothing was measured.
+        intensity: shape (n,), or (0,) where none was asked for.
+        codes: error code -> how many values had it.
+    """
+
+    stamp_ms: int
+    restarts: int
+    arrival_ns: int
+    first_step: int
+    cluster: int
+    range_m: Float32s
+    intensity: Float32s
+    codes: Mapping[int, int]
+
+
+def scan_of(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
+    """The LaserScan of a raw one.
+
+    Args:
+        raw: as it came; where steps share a value, its bearing and time are those of their middle.
+        of: the sensor's parameters.
+        stamp_ns: time of step `raw.first_step`.
+    """
+    middle = (raw.cluster - 1) / 2
+    return Scan(
+        stamp_ns=stamp_ns + round(middle * of.step_s * 1e9),
+        angle_min_rad=(raw.first_step + middle - of.front_step) * of.step_rad,
+        angle_increment_rad=raw.cluster * of.step_rad,
+        time_increment_s=raw.cluster * of.step_s,
+        scan_time_s=of.scan_period_s,
+        range_min_m=of.range_min_mm / 1e3,
+        range_max_m=of.range_max_mm / 1e3,
+        range_m=raw.range_m,
+        intensity=raw.intensity,
+    )

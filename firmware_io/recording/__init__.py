@@ -1,0 +1,1 @@
+"""Recordings: MCAP, bags in and out, repair."""

@@ -1,0 +1,155 @@
+"""Recordings for those who use ROS: a ROS 1 bag, or a ROS 2 bag in sqlite3. MCAP is what ROS 2 reads as it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from design.atomic_file import check_place
+from design.errors import RecordingError
+from firmware_io.files import foreign, whole_file
+from firmware_io.recording.bags import Bag, Message, open_bag
+from firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
+
+_VERSION: Final = 8  # of the metadata of ROS 2 bags: Humble and later read it
+_FOREVER: Final = QosTime(9223372036, 854775807)
+_LATCHED: Final = Qos(
+    history=QosHistory.KEEP_LAST,
+    depth=1,
+    reliability=QosReliability.RELIABLE,
+    durability=QosDurability.TRANSIENT_LOCAL,
+    deadline=_FOREVER,
+    lifespan=_FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=_FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Exported:
+    """What became of a recording's messages: topic -> how many were written, topic -> type that ROS does not know."""
+
+    written: dict[str, int]
+    unknown: dict[str, str]
+
+
+def export_bag(recording: Path, out: Path) -> Exported:
+    """Write all messages of a recording as a bag, each at the time at which it was recorded, and its note as a topic.
+
+    Args:
+        recording: MCAP.
+        out: `.bag` for ROS 1 (Noetic's types), else the name of a folder for ROS 2 (Humble's types, sqlite3).
+
+    Raises:
+        RecordingError: the recording is unreadable, or the bag cannot be written. Nothing is left then.
+    """
+    if out.suffix not in ("", ".bag"):
+        raise RecordingError(
+            f"{out}: a recording becomes a ROS 1 bag (name it {out.with_suffix('.bag').name}) or a ROS 2 bag, which is "
+            f"a folder ({out.stem})"
+        )
+    if out.suffix == ".bag":
+        with whole_file(out) as part:
+            return _ros1(recording, part)
+    if out.exists():
+        raise RecordingError(f"{out}: exists; a ROS 2 bag is a new folder")
+    check_place(out, RecordingError)
+    try:
+        return _ros2(recording, out)
+    except BaseException:
+        shutil.rmtree(out, ignore_errors=True)
+        raise
+
+
+def _ros1(recording: Path, part: Path) -> Exported:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with open_bag(recording) as bag, foreign(f"{part}: cannot write", Writer1, part) as writer:
+        known, unknown = _known(bag.topics, store)
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=store, latching=int(topic == NOTE_TOPIC))
+            for topic, kind in (_note_topic(bag) | known).items()
+        }
+        written = _copied(
+            _noted(bag, set(known), store),
+            lambda message: writer.write(
+                connections[message.topic],
+                message.receive_ns,
+                store.serialize_ros1(_of_store(message.body, store), connections[message.topic].msgtype),
+            ),
+        )
+    return Exported(written, unknown)
+
+
+def _ros2(recording: Path, out: Path) -> Exported:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    bag_out = foreign(f"{out}: cannot write", Writer2, out, version=_VERSION, storage_plugin=StoragePlugin.SQLITE3)
+    with open_bag(recording) as bag, bag_out as writer:
+        known, unknown = _known(bag.topics, store)
+        connections = {
+            topic: writer.add_connection(
+                topic, kind, typestore=store, offered_qos_profiles=[_LATCHED] * (topic == NOTE_TOPIC)
+            )
+            for topic, kind in (_note_topic(bag) | known).items()
+        }
+        written = _copied(
+            _noted(bag, set(known), store),
+            lambda message: writer.write(
+                connections[message.topic],
+                message.receive_ns,
+                store.serialize_cdr(_of_store(message.body, store), connections[message.topic].msgtype),
+            ),
+        )
+    return Exported(written, unknown)
+
+
+def _note_topic(bag: Bag) -> dict[str, str]:
+    return {NOTE_TOPIC: NOTE_TYPE} if note_in(bag) else {}
+
+
+def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
+    """The messages, and before them, at the time of the first one, the note where it is none of them yet."""
+    note = {} if NOTE_TOPIC in topics else note_in(bag)
+    for k, message in enumerate(bag.messages(topics)):
+        if note and k == 0:
+            text: Any = store.types[NOTE_TYPE]
+            yield Message(NOTE_TOPIC, message.receive_ns, text(data=json.dumps(note, sort_keys=True)))
+        yield message
+
+
+def _copied(messages: Iterable[Message], write: Callable[[Message], None]) -> dict[str, int]:
+    written: Counter[str] = Counter()
+    for message in messages:
+        write(message)
+        written[message.topic] += 1
+    return dict(written)
+
+
+def _known(topics: Mapping[str, str], store: Typestore) -> tuple[dict[str, str], dict[str, str]]:
+    """Topics whose type the store has, and those whose type it has not."""
+    known = {topic: kind for topic, kind in topics.items() if kind in store.types}
+    return known, {topic: kind for topic, kind in topics.items() if topic not in known}
+
+
+def _of_store(value: Any, store: Typestore) -> Any:
+    """The same message in the store's own classes; what only they have (`seq` of ROS 1) is 0."""
+    if dataclasses.is_dataclass(value):
+        message: Any = value
+        kind: Any = store.types[message.__msgtype__]
+        names = [field.name for field in dataclasses.fields(kind) if field.name != "__msgtype__"]
+        return kind(**{name: _of_store(getattr(value, name, 0), store) for name in names})
+    if isinstance(value, list):
+        return [_of_store(one, store) for one in value]
+    return value

@@ -1,0 +1,210 @@
+"""Other people's bags: ROS 1, ROS 2 sqlite3 and ROS 2 MCAP, custom message types included.
+
+A value inside a bag is named `TOPIC[:FIELD]`, FIELD being a dotted path such as `laserScan` or `position[0]`.
+ROS 1 and MCAP bags carry their message definitions; sqlite3 bags of older ROS 2 releases do not, and then only the
+types that come with ROS 2 can be read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from design.errors import RecordingError, suggest
+from firmware_io.files import foreign, foreign_items
+from firmware_io.recording import ros_messages
+
+_STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
+_SEQUENCES = (list, tuple, np.ndarray)
+_SUFFIXES = (".bag", ".mcap", ".db3")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A value in a bag: its topic, and the path inside the message ("" is the message itself)."""
+
+    topic: str
+    field: str
+
+    def __str__(self) -> str:
+        return f"{self.topic}:{self.field}" if self.field else self.topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """One decoded message and the time [ns] at which it was recorded."""
+
+    topic: str
+    receive_ns: int
+    body: Any
+
+
+def parse_source(text: str) -> Source:
+    """Read `TOPIC[:FIELD]`.
+
+    Raises:
+        RecordingError: the topic is empty or the field is not a dotted path.
+    """
+    topic, _, field = text.partition(":")
+    if not topic:
+        raise RecordingError(f"'{text}': write TOPIC or TOPIC:FIELD, for example /slice:laserScan")
+    if field and not all(_STEP.fullmatch(step) for step in field.split(".")):
+        raise RecordingError(f"'{text}': '{field}' is not a path of fields such as state.position[0]")
+    return Source(topic, field)
+
+
+class Bag:
+    """An open bag; made by `open_bag`."""
+
+    def __init__(self, path: Path, reader: AnyReader) -> None:
+        """Wrap a reader that is open already."""
+        self.path = path
+        self._reader = reader
+
+    @property
+    def topics(self) -> Mapping[str, str]:
+        """Message type of each topic."""
+        return {connection.topic: connection.msgtype for connection in self._reader.connections}
+
+    def messages(self, topics: set[str]) -> Iterator[Message]:
+        """The messages of these topics, decoded, in the order of their recording.
+
+        Raises:
+            RecordingError: a topic is missing, its type unknown, or the bag damaged.
+        """
+        for topic in sorted(topics):
+            if topic not in self.topics:
+                raise RecordingError(f"{self.path}: no topic '{topic}'{suggest(topic, self.topics)}")
+            if self.topics[topic] not in self._reader.typestore.types:
+                raise RecordingError(
+                    f"{self.path}: {topic}: the bag does not hold the definition of {self.topics[topic]}, and ROS 2 "
+                    "does not come with it; record it again as MCAP, which holds definitions"
+                )
+        wanted = [connection for connection in self._reader.connections if connection.topic in topics]
+        raw_messages = self._reader.messages(connections=wanted)
+        for connection, receive_ns, raw in foreign_items(f"{self.path}: damaged bag", raw_messages):
+            what = f"{self.path}: {connection.topic}: a message that is not a {connection.msgtype}"
+            body = foreign(what, self._reader.deserialize, raw, connection.msgtype)
+            yield Message(connection.topic, receive_ns, body)
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Bag]:
+    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder with a `metadata.yaml`.
+
+    Raises:
+        RecordingError: there is no such bag, or it cannot be read.
+    """
+    if not path.exists():
+        raise RecordingError(f"{path}: no such bag")
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        raise RecordingError(f"{path}: a ROS 2 bag folder has a metadata.yaml, this one has none")
+    if path.is_file() and path.suffix not in _SUFFIXES:
+        raise RecordingError(f"{path}: not a bag: '{path.suffix}' is none of {', '.join(_SUFFIXES)}")
+    if path.is_file() and path.stat().st_size == 0:
+        raise RecordingError(f"{path}: the file is empty")
+    what = f"{path}: unreadable bag"
+    if path.suffix == ".bag":
+        with foreign(what, path.open, "rb") as stream:
+            if stream.read(7) != b"#ROSBAG":
+                raise RecordingError(f"{path}: not a ROS 1 bag: it does not begin with #ROSBAG")
+        what += " (`rosbag reindex` restores one that was cut off)"
+    if path.suffix == ".mcap":
+        what += " (`scanwright repair` saves what is whole of one that was cut off)"
+    reader = foreign(what, AnyReader, [path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+    foreign(what, reader.open)
+    try:
+        yield Bag(path, reader)
+    finally:
+        reader.close()
+
+
+def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
+    """What `source` names inside a message, and the stamp [ns] of the nearest header around it (0: there is none).
+
+    Raises:
+        RecordingError: a field or an index is not there.
+    """
+    value, stamp_ns = body, _stamp(body)
+    for step in source.field.split(".") if source.field else []:
+        name, index = _STEP.fullmatch(step).groups()  # type: ignore[union-attr]  # parse_source has checked it
+        known = _fields(value)
+        if name not in known:
+            raise RecordingError(f"{bag}: {source.topic}: no field '{name}' in {_kind(value)}{suggest(name, known)}")
+        value = getattr(value, name)
+        if index is not None:
+            if not isinstance(value, _SEQUENCES):
+                raise RecordingError(f"{bag}: {source.topic}: no {name}[{index}]: '{name}' is {_kind(value)}")
+            if int(index) >= len(value):
+                raise RecordingError(f"{bag}: {source.topic}: no {name}[{index}]: '{name}' holds {len(value)} values")
+            value = value[int(index)]
+        stamp_ns = _stamp(value) or stamp_ns
+    return value, stamp_ns
+
+
+def laser_scan_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
+    """The LaserScan that `source` names, and its stamp [ns] (0: none).
+
+    Raises:
+        RecordingError: it is something else; the line says what, and where LaserScans are.
+    """
+    value, stamp_ns = value_at(body, source, bag)
+    if _kind(value) != ros_messages.LASER_SCAN:
+        scans = [
+            f"{source.topic}:{name}" for name in _fields(body) if _kind(getattr(body, name)) == ros_messages.LASER_SCAN
+        ]
+        hint = f"; did you mean '{scans[0]}'?" if scans else ""
+        raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a LaserScan{hint}")
+    return value, stamp_ns
+
+
+def number_at(body: Any, source: Source, bag: Path) -> tuple[float, int]:
+    """The number that `source` names, and its stamp [ns] (0: none).
+
+    Without a field: `position[0]` of a JointState, `data` of a std_msgs message.
+
+    Raises:
+        RecordingError: it is not a number; the line says what it is, and what is there instead.
+    """
+    if not source.field:
+        default = (
+            "position[0]" if _kind(body) == ros_messages.JOINT_STATE else "data" if "data" in _fields(body) else ""
+        )
+        source = Source(source.topic, default)
+    value, stamp_ns = value_at(body, source, bag)
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        numbers = [f"{source.topic}:{name}" for name in _fields(value) if isinstance(getattr(value, name), int | float)]
+        hint = f"; did you mean '{numbers[0]}'?" if numbers else "; name one number in it, for example position[0]"
+        raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a number{hint}")
+    return float(value), stamp_ns
+
+
+def _fields(value: Any) -> list[str]:
+    if not dataclasses.is_dataclass(value):
+        return []
+    return [field.name for field in dataclasses.fields(value) if field.name != "__msgtype__"]
+
+
+def _kind(value: Any) -> str:
+    """Name of the type, as a person who knows ROS would say it."""
+    if dataclasses.is_dataclass(value):
+        message: Any = value  # every message class of rosbags has a __msgtype__
+        return str(message.__msgtype__)
+    if isinstance(value, _SEQUENCES):
+        return f"a sequence of {len(value)}"
+    return f"a {type(value).__name__}"
+
+
+def _stamp(value: Any) -> int:
+    if "header" not in _fields(value) or "stamp" not in _fields(value.header):
+        return 0
+    return ros_messages.stamp_ns(value.header.stamp)

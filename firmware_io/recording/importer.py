@@ -1,0 +1,245 @@
+"""`scanwright import`: somebody else's bag becomes the project's recording.
+
+Two passes over the bag. The first reads every time and every angle (small), the second copies the scans one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import RecordingError
+from firmware_io.recording import ros_messages
+from firmware_io.recording.bag_clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
+from firmware_io.recording.bags import Bag, Source, laser_scan_at, number_at, open_bag, parse_source
+from firmware_io.recording.metadata import held_by, note_in
+from firmware_io.recording.recording import MessageWriter, RecordingWriter
+from firmware_io.samples import Floats, JointLog, Times
+
+AngleUnit = Literal["deg", "rad"]
+_LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
+
+
+@dataclass(frozen=True, slots=True)
+class ImportSummary:
+    """What an import wrote, what it left out and why, and what a person should know.
+
+    Attributes:
+        out: the recording.
+        scans: scans written.
+        beams: beams in them, returns or not.
+        joint_samples: samples of the spin joint written.
+        duration_s: from the first to the last scan.
+        angle_deg: smallest and largest angle of the joint log.
+        left_out: reason -> number of scans or angles.
+        warnings: one sentence each.
+    """
+
+    out: Path
+    scans: int
+    beams: int
+    joint_samples: int
+    duration_s: float
+    angle_deg: tuple[float, float]
+    left_out: dict[str, int]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Survey:
+    """First pass. Scan arrays have one entry per usable scan, angle arrays one per usable angle."""
+
+    scan_stamps: Stamps
+    arc_ns: Times
+    beams: NDArray[np.int64]
+    endless: int
+    angle_stamps: Stamps
+    angle: Floats
+    left_out: Counter[str]
+
+
+def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: AngleUnit, hold: bool) -> ImportSummary:
+    """Write the scans and angles of a bag as a recording.
+
+    Args:
+        bag: ROS 1 or ROS 2 bag.
+        out: the recording to write, `.mcap`.
+        scan: TOPIC[:FIELD] of a LaserScan.
+        angle: TOPIC[:FIELD] of the axis angle; it may lie in the same message as the scan.
+        angle_unit: unit of the angle in the bag.
+        hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
+            the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
+            so itself, and its log stays as it is.
+
+    Raises:
+        RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
+            have no time in common. Nothing is written then.
+    """
+    if out.suffix != ".mcap":
+        raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
+    if angle_unit not in ("deg", "rad"):
+        raise RecordingError(f"angle unit '{angle_unit}': write deg or rad")
+    if out.resolve() == bag.resolve():
+        raise RecordingError(f"{out}: this is the bag itself; name another file")
+    scan_source, angle_source = parse_source(scan), parse_source(angle)
+    with open_bag(bag) as opened:
+        survey = _survey(opened, scan_source, angle_source)
+        clock = one_clock(survey.scan_stamps, survey.angle_stamps)
+        in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
+        if not in_time.any():
+            spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
+            raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
+        log = unwrapped_log(clock.angle_ns, np.radians(survey.angle) if angle_unit == "deg" else survey.angle)
+        doubled = clock.angle_ns.size - log.time_ns.size
+        left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
+        warnings = [clock.said] if clock.said else []
+        warnings += [*_angle_warnings(survey, angle_unit), *_scan_warnings(survey, clock)]
+        if not in_time.all():
+            warnings.append(
+                f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
+            )
+        if hold:
+            log, cut = held_log(log, clock.scan_ns, survey.arc_ns)
+            if cut:
+                warnings.append(f"{cut} scans end after the next one begins: their last beams take its angle")
+        still = hold or held_by(note_in(opened))
+        if not still:
+            warnings += _gap_warnings(log)
+        note = {
+            "schema": "scanwright/recording/1",
+            "source": bag.name,
+            "scan": str(scan_source),
+            "angle": str(angle_source),
+            "angle_unit": angle_unit,
+            "hold": str(still).lower(),
+            "warnings": "\n".join(warnings),
+        }
+        with RecordingWriter(out, note) as writer:
+            _write(opened, scan_source, clock, log, writer)
+    return ImportSummary(
+        out=out,
+        scans=clock.scan_ns.size,
+        beams=int(survey.beams.sum()),
+        joint_samples=log.time_ns.size,
+        duration_s=float(np.ptp(clock.scan_ns)) / 1e9,
+        angle_deg=(math.degrees(log.position_rad.min()), math.degrees(log.position_rad.max())),
+        left_out=dict(left_out),
+        warnings=tuple(warnings),
+    )
+
+
+def _survey(bag: Bag, scan_source: Source, angle_source: Source) -> _Survey:
+    left_out: Counter[str] = Counter()
+    scans: list[tuple[int, int, int, int, bool]] = []
+    angles: list[tuple[int, int, float]] = []
+    for message in bag.messages({scan_source.topic, angle_source.topic}):
+        scan_stamp_ns = 0
+        if message.topic == scan_source.topic:
+            laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path)
+            fault = _fault(laser_scan)
+            if fault:
+                left_out[fault] += 1
+            else:
+                arc_ns = round(1e9 * float(laser_scan.time_increment) * (len(laser_scan.ranges) - 1))
+                beams = len(laser_scan.ranges)
+                scans.append((scan_stamp_ns, message.receive_ns, arc_ns, beams, _endless(laser_scan)))
+        if message.topic == angle_source.topic:
+            angle, angle_stamp_ns = number_at(message.body, angle_source, bag.path)
+            if math.isfinite(angle):
+                angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, angle))
+            else:
+                left_out["angle_not_a_number"] += 1
+    for source, found in ((scan_source, scans), (angle_source, angles)):
+        if not found:
+            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "the topic has no message"
+            raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
+    stamps, receives, arcs, widths, endless = zip(*scans, strict=True)
+    angle_stamps, angle_receives, values = zip(*angles, strict=True)
+    return _Survey(
+        scan_stamps=Stamps(times(stamps), times(receives)),
+        arc_ns=times(arcs),
+        beams=np.array(widths),
+        endless=sum(endless),
+        angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
+        angle=np.array(values),
+        left_out=left_out,
+    )
+
+
+def _fault(laser_scan: Any) -> str:
+    """Why a scan cannot be used, or ""."""
+    if not len(laser_scan.ranges):
+        return "empty_scan"
+    if not (math.isfinite(laser_scan.angle_min) and math.isfinite(laser_scan.angle_increment)):
+        return "scan_without_bearings"
+    if not 0 <= laser_scan.time_increment < 1:
+        return "scan_with_impossible_time_increment"
+    return ""
+
+
+def _endless(laser_scan: Any) -> bool:
+    """Whether the longest range is not told: some drivers leave it 0."""
+    return not laser_scan.range_max > laser_scan.range_min
+
+
+def _angle_warnings(survey: _Survey, angle_unit: AngleUnit) -> Iterator[str]:
+    if np.any(survey.angle != np.round(survey.angle)):
+        return
+    if angle_unit == "rad":
+        yield "every angle is a whole number of radians: is the unit deg?"
+    else:
+        yield (
+            "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
+            "to 9 mm per metre of range, the way from command to motion comes on top"
+        )
+
+
+def _gap_warnings(log: JointLog) -> Iterator[str]:
+    gaps_s = np.diff(log.time_ns) / 1e9
+    if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
+        usual = f"usually {np.median(gaps_s):.3f} s"
+        yield f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across"
+
+
+def _scan_warnings(survey: _Survey, clock: OneClock) -> Iterator[str]:
+    if not survey.arc_ns.any():
+        yield "time_increment is 0: every beam takes the time of its scan's stamp, not its own"
+    if survey.left_out["empty_scan"]:
+        yield f"{survey.left_out['empty_scan']} scans have no beam and are left out"
+    if np.ptp(survey.beams):
+        yield f"scans have {survey.beams.min()} to {survey.beams.max()} beams: beam i is not the same direction in each"
+    if np.any(np.diff(clock.scan_ns) <= 0):
+        yield f"{int(np.sum(np.diff(clock.scan_ns) <= 0))} scans are not later than the one before them"
+    if survey.endless:
+        yield f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
+
+
+def _write(bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: MessageWriter) -> None:
+    """Second pass: copy the scans, with the joint samples between them by time."""
+    samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
+    written = 0
+    scan_times = iter(clock.scan_ns.tolist())
+    for message in bag.messages({source.topic}):
+        laser_scan, _ = laser_scan_at(message.body, source, bag.path)
+        if _fault(laser_scan):
+            continue
+        scan = ros_messages.scan_of(laser_scan, next(scan_times))
+        if _endless(laser_scan):
+            scan = replace(scan, range_max_m=math.inf)
+        while written < len(samples) and samples[written][0] <= scan.stamp_ns:
+            writer.joint(*samples[written])
+            written += 1
+        writer.scan(scan)
+    for time_ns, position_rad in samples[written:]:
+        writer.joint(time_ns, position_rad)
+
+
+def _span(time_ns: Times) -> str:
+    return f"{time_ns.min() / 1e9:.3f} to {time_ns.max() / 1e9:.3f} s"

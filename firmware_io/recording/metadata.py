@@ -1,0 +1,43 @@
+"""What is known of a recording beside its messages, and how that gets through bags, which hold messages only.
+
+In MCAP it is a metadata record. In a bag it is a latched message of text, JSON of the same names and values, so that
+`import` of such a bag knows what the recording knew: above all whether the motor stood still during each scan.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Final
+
+from design.errors import RecordingError
+from firmware_io.files import foreign
+from firmware_io.recording.bags import Bag
+from firmware_io.recording.mcap_chunks import note_of
+
+NOTE: Final = "scanwright"
+NOTE_TOPIC: Final = "/scanwright/note"
+NOTE_TYPE: Final = "std_msgs/msg/String"
+
+
+def held_by(note: dict[str, str]) -> bool:
+    """Whether the motor stood still during each scan."""
+    return note.get("hold") == "true"
+
+
+def note_in(bag: Bag) -> dict[str, str]:
+    """The note of a recording of ours, or of a bag that was made from one; empty for others.
+
+    Raises:
+        RecordingError: the bag has our topic, and what is in it is no note.
+    """
+    if bag.path.suffix == ".mcap" and bag.path.is_file() and (note := note_of(bag.path, NOTE)):
+        return note
+    if bag.topics.get(NOTE_TOPIC) != NOTE_TYPE:
+        return {}
+    what = f"{bag.path}: {NOTE_TOPIC}: not the note of a recording"
+    for message in bag.messages({NOTE_TOPIC}):
+        found = foreign(what, json.loads, message.body.data)
+        if not isinstance(found, dict):
+            raise RecordingError(f"{what}: {message.body.data[:40]}")
+        return found
+    return {}

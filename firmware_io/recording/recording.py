@@ -1,0 +1,216 @@
+"""The project's recording: an MCAP file of ROS 2 messages that Foxglove and every ROS 2 reader opens.
+
+    /scan          sensor_msgs/msg/LaserScan    stamp = first beam; the rest as the sensor gave it
+    /joint_states  sensor_msgs/msg/JointState   `spin_joint`, radians, unwrapped
+
+`log_time` is the stamp. A metadata record named `scanwright` says where the recording comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, cast
+
+import numpy as np
+from mcap.writer import Writer
+from numpy.typing import NDArray
+
+from design.errors import RecordingError, suggest
+from firmware_io.files import foreign, whole_file
+from firmware_io.recording import ros_messages
+from firmware_io.recording.mcap_chunks import note_of, read_messages, topics_of
+from firmware_io.recording.metadata import NOTE, held_by
+from firmware_io.samples import JointLog, Scan, Times
+
+SCAN_TOPIC = "/scan"
+JOINT_TOPIC = "/joint_states"
+_TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
+
+
+class Sink(Protocol):
+    """What a recording is written to; files are."""
+
+    def write(self, data: bytes, /) -> int: ...  # noqa: D102
+
+    def tell(self) -> int: ...  # noqa: D102
+
+    def flush(self) -> None: ...  # noqa: D102
+
+
+class MessageWriter:
+    """Scans and joint samples as messages on an open stream; `finish` closes the format, not the stream.
+
+    Write scans and joint samples in the order of their times, so that replaying needs no sorting.
+
+    Raises:
+        RecordingError: a time is one that ROS cannot hold (before 1970, after 2038).
+    """
+
+    def __init__(self, stream: Sink, path: Path, note: Mapping[str, str], attached: Mapping[str, str]) -> None:
+        """Args as for `RecordingWriter`; `attached` holds files (name -> text) that explain the messages."""
+        self._path = path
+        self._writer = Writer(cast(Any, stream))  # it asks for no more than a Sink
+        self._writer.start(profile="ros2", library="scanwright")
+        self._writer.add_metadata(NOTE, dict(note))
+        for name, text in attached.items():
+            self._writer.add_attachment(0, 0, name, f"text/{Path(name).suffix[1:]}", text.encode())
+        self._channels = {topic: self._channel(topic) for topic in _TYPES}
+
+    def scan(self, scan: Scan) -> None:
+        """Append one scan."""
+        self._check(scan.stamp_ns)
+        self._add(SCAN_TOPIC, scan.stamp_ns, ros_messages.encode_scan(scan))
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Append one sample of the spin joint."""
+        self._check(time_ns)
+        self._add(JOINT_TOPIC, time_ns, ros_messages.encode_joint(time_ns, position_rad))
+
+    def flush(self) -> None:
+        """Hand everything so far to the stream, in whole chunks."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self) -> None:
+        """Write the index: without it the recording counts as cut off."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _channel(self, topic: str) -> int:
+        schema = self._writer.register_schema(_TYPES[topic], "ros2msg", ros_messages.definition(_TYPES[topic]).encode())
+        return self._writer.register_channel(topic, "cdr", schema)
+
+    def _check(self, time_ns: int) -> None:
+        if not 0 <= time_ns < 2**31 * 1_000_000_000:
+            raise RecordingError(f"{self._path}: time {time_ns} ns does not fit a ROS time (1970 to 2038)")
+
+    def _add(self, topic: str, time_ns: int, data: bytes) -> None:
+        self._writer.add_message(self._channels[topic], log_time=time_ns, publish_time=time_ns, data=data)
+
+
+class RecordingWriter:
+    """Writes a recording; use it in a `with` statement. The file appears under its name only when that ends well.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, note: Mapping[str, str]) -> None:
+        """`note` is kept with the recording: where it comes from, in words."""
+        self._path = path
+        self._note = note
+        self._stack = ExitStack()
+
+    def __enter__(self) -> MessageWriter:
+        with ExitStack() as stack:
+            part = stack.enter_context(whole_file(self._path))
+            stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
+            self._messages = MessageWriter(stream, self._path, self._note, {})
+            stack.push(self._finish)
+            self._stack = stack.pop_all()
+        return self._messages
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    def _finish(
+        self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self._messages.finish()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """What one pass over a recording tells; the scans themselves stay in the file.
+
+    Attributes:
+        path: the file.
+        joint_log: every sample of the spin joint.
+        beams: shape (scans,), number of beams in each scan.
+        stamp_ns: shape (scans,), time of the first beam of each scan.
+        has_intensity: whether any scan carries intensities.
+        held: whether the motor stood still during each scan (`scanwright import --hold`).
+    """
+
+    path: Path
+    joint_log: JointLog
+    beams: NDArray[np.int64]
+    stamp_ns: Times
+    has_intensity: bool
+    held: bool
+
+    @property
+    def start_ns(self) -> int:
+        """Time of the first beam of the first scan."""
+        return int(self.stamp_ns[0])
+
+    def scans(self) -> Iterator[Scan]:
+        """The scans in the order of their times, one at a time."""
+        for _, data in read_messages(self.path, {SCAN_TOPIC}):
+            yield _decoded_scan(self.path, data)
+
+
+def open_recording(path: Path) -> Recording:
+    """Read the joint log and the outline of the scans.
+
+    Raises:
+        RecordingError: the file is missing, cut off, not MCAP, not of our topics and types, or empty.
+    """
+    _check_topics(path)
+    times: list[int] = []
+    positions: list[float] = []
+    stamps: list[int] = []
+    beams: list[int] = []
+    has_intensity = False
+    for topic, data in read_messages(path, set(_TYPES)):
+        if topic == JOINT_TOPIC:
+            time_ns, position_rad = foreign(f"{path}: a message of {JOINT_TOPIC}", ros_messages.decode_joint, data)
+            if np.isnan(position_rad):
+                raise RecordingError(
+                    f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'"
+                )
+            times.append(time_ns)
+            positions.append(position_rad)
+        else:
+            scan = _decoded_scan(path, data)
+            has_intensity |= bool(scan.intensity.size)
+            stamps.append(scan.stamp_ns)
+            beams.append(scan.range_m.size)
+    if not times:
+        raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
+    if not beams:
+        raise RecordingError(f"{path}: {SCAN_TOPIC} has no message: there is nothing to assemble")
+    return Recording(
+        path=path,
+        joint_log=_sorted_log(path, times, positions),
+        beams=np.array(beams),
+        stamp_ns=np.array(stamps, np.int64),
+        has_intensity=has_intensity,
+        held=held_by(note_of(path, NOTE)),
+    )
+
+
+def _sorted_log(path: Path, times: list[int], positions: list[float]) -> JointLog:
+    order = np.argsort(np.array(times, np.int64), kind="stable")
+    try:
+        return JointLog(np.array(times, np.int64)[order], np.array(positions)[order])
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {JOINT_TOPIC}: {error}") from error
+
+
+def _check_topics(path: Path) -> None:
+    found = topics_of(path)
+    for topic, message_type in _TYPES.items():
+        if topic not in found:
+            raise RecordingError(f"{path}: no topic {topic}{suggest(topic, found)} (`scanwright import` converts bags)")
+        if found[topic] != message_type:
+            raise RecordingError(f"{path}: {topic} is {found[topic]}, not {message_type}")
+
+
+def _decoded_scan(path: Path, data: bytes) -> Scan:
+    return foreign(f"{path}: a message of {SCAN_TOPIC}", ros_messages.decode_scan, data)

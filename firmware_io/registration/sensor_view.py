@@ -1,0 +1,89 @@
+"""A cloud made ready to be registered: thinned at two scales, with normals, and what its scanner saw where."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import small_gicp
+
+from design.errors import RecordingError
+from firmware_io.registration.cube_map import DepthMap, depth_map
+from firmware_io.registration.thin import thin, voxel_means
+from firmware_io.samples import Floats
+
+THREADS = os.cpu_count() or 1
+_NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py
+_COARSE = 4  # times the spacing
+_MIN_POINTS = 200
+_DEPTH_SIDE = 30  # cells of 3 deg: finer ones take mixed pixels at edges, and gaps between lines, for contradictions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """Points at one scale, as small_gicp takes them.
+
+    Attributes:
+        points_m: shape (n, 3).
+        normals: unit, towards the scanner, shape (n, 3); zero where the neighbours told none.
+        cloud: the same with the covariances of the neighbourhoods.
+        tree: nearest-neighbour search in it.
+    """
+
+    points_m: Floats
+    normals: Floats
+    cloud: small_gicp.PointCloud
+    tree: small_gicp.KdTree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What one stand saw, in the frame of its scanner, whose optical centre is the origin.
+
+    Attributes:
+        name: for messages.
+        spacing_m: edge of the finest voxels.
+        fine: points about `spacing_m` apart.
+        coarse: points about four times as far apart.
+        depth: how far the scanner saw in each direction.
+    """
+
+    name: str
+    spacing_m: float
+    fine: Level
+    coarse: Level
+    depth: DepthMap
+
+
+def view_of(name: str, points_m: Floats, spacing_m: float) -> View:
+    """Make a cloud ready.
+
+    Args:
+        name: for messages.
+        points_m: shape (n, 3), in the order in which they were measured; rows with NaN are left out.
+        spacing_m: edge of the finest voxels.
+
+    Raises:
+        RecordingError: too few points to be registered.
+    """
+    points_m = np.ascontiguousarray(points_m, float)
+    finite = np.isfinite(points_m).all(axis=1)
+    points_m = points_m if finite.all() else points_m[finite]
+    thinned = thin(points_m, spacing_m) if len(points_m) > 1 else points_m
+    if len(thinned) < _MIN_POINTS:
+        raise RecordingError(
+            f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
+        )
+    coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m, np.zeros(len(thinned), np.uint8))
+    return View(name, spacing_m, level_of(thinned), level_of(coarse), depth_map(thinned, _DEPTH_SIDE))
+
+
+def level_of(points_m: Floats) -> Level:
+    """Points of one view with their normals."""
+    cloud = small_gicp.PointCloud(points_m)
+    tree = small_gicp.KdTree(cloud, num_threads=THREADS)
+    small_gicp.estimate_normals_covariances(cloud, tree, _NEIGHBOURS, THREADS)
+    normals = np.asarray(cloud.normals())[:, :3]
+    away = np.einsum("ij,ij->i", normals, points_m) > 0
+    return Level(points_m, np.where(away[:, None], -normals, normals), cloud, tree)

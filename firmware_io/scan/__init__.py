@@ -1,0 +1,1 @@
+"""One scan: its plan, the devices at work, the recorder, the doctor."""

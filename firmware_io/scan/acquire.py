@@ -1,0 +1,285 @@
+"""`scanwright scan`: turn the lidar, record what both devices say, and stop them whatever happens.
+
+The order of a run: open and check both devices; the laser on, until the sensor's clock is known on the host's; the
+servo turns, until it turns steadily; then, and only then, the recording begins, and lasts for the turns that were asked
+for. Two threads: one asks the servo for its angle a hundred times a second, the other reads the scans as they come.
+
+A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. When the sensor is back (ten
+seconds are granted) it turns on, and the full scan in which the lidar was lost is taken again, whole.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from design.angles import AngleSet
+from design.errors import DeviceError
+from design.motion import Motion, Spin, StopAndGo
+from firmware_io.lidar.scip.driver import Lidar, clock_of, open_lidar
+from firmware_io.lidar.scip.parameters import StampAt
+from firmware_io.lidar.scip.raw_scan import RawScan, scan_of
+from firmware_io.recording import ros_messages
+from firmware_io.samples import Scan
+from firmware_io.scan.axis_thread import Axis, turning_servo
+from firmware_io.scan.live_feed import NOBODY, Watch
+from firmware_io.scan.plan import Plan
+from firmware_io.scan.recorder import Recorder
+from firmware_io.servo.dynamixel.driver import ServoState, open_servo
+
+Say = Callable[[str], None]
+
+CLOCK_GOOD_NS = 500_000
+
+_CLOCK_LEAST_S = 3.0
+_CLOCK_PATIENCE_S = 10.0
+_STEADY_PATIENCE_S = 15.0
+_AWAY_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSummary:
+    """What was recorded, and what was not.
+
+    Attributes:
+        recording: the file.
+        scans: in it.
+        joint_samples: in it.
+        duration_s: from the first to the last scan.
+        speed_deg_s: mean speed of the servo while it was recorded, 0 for motions to and fro.
+        ripple_deg: root mean square of the deviation from even turning, over half a second.
+        clock_ns: standard uncertainty of the beams' times at the end.
+        reconnects: how often the lidar was away and came back.
+        left_out: what was not recorded, reason -> count.
+    """
+
+    recording: Path
+    scans: int
+    joint_samples: int
+    duration_s: float
+    speed_deg_s: float
+    ripple_deg: float
+    clock_ns: int
+    reconnects: int
+    left_out: dict[str, int]
+
+
+def acquire(plan: Plan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
+    """Do it. Both devices are stopped and the recording is closed on every way out.
+
+    Raises:
+        DeviceError: a device is absent, another one than the angle set names, or fails.
+        RecordingError: the recording cannot be written.
+    """
+
+    def tell(line: str) -> None:
+        say(line)
+        watch.told(line)
+
+    ros_messages.definition(
+        ros_messages.LASER_SCAN
+    )  # loads the message types: half a second that must not fall into the recording
+    with ExitStack() as stack:
+        lidar = stack.enter_context(open_lidar(plan.ports.lidar))
+        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo))
+        check(plan.angles, lidar)
+        tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
+        for warning in servo.warnings():
+            tell(f"warning: {servo.model}: {warning}")
+        scans = _Scans(lidar, plan.stamp_at, tell)
+        lidar.start(intensity=plan.intensity)
+        _settle_clock(scans, tell)
+        axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
+        tell("starting the servo")
+        _wait_until_steady(scans, axis, plan.motion, tell)
+        return _record(plan, scans, axis, tell, watch)
+
+
+def check(angles: AngleSet, lidar: Lidar) -> None:
+    """Refuse a lidar that is not the one of the angle set.
+
+    Raises:
+        DeviceError: it is another model.
+    """
+    if lidar.model != angles.sensor:
+        raise DeviceError(f"{lidar.address}: this is a {lidar.model}, but the angle set is for a {angles.sensor}")
+
+
+class _Scans:
+    """Scans with the host's times, as they come; goes on after the sensor was away for a while.
+
+    Attributes:
+        axis: what stands still while the sensor is away; None before it turns.
+        clock_ns: standard uncertainty of the last scan's time.
+        away: how often the sensor was.
+    """
+
+    def __init__(self, lidar: Lidar, stamp_at: StampAt, say: Say) -> None:
+        self.lidar = lidar
+        self.axis: Axis | None = None
+        self.clock_ns = 0
+        self.away = 0
+        self._stamp_at = stamp_at
+        self._clock = clock_of(lidar, stamp_at)
+        self._say = say
+
+    def next(self) -> Scan:
+        try:
+            raw = self.lidar.read()
+        except DeviceError as error:
+            if self.axis is not None:
+                self.axis.stop()
+            self._say(f"{error}; the servo stands, waiting {_AWAY_S:g} s for the lidar to come back")
+            self.away += 1
+            raw = self._found_again()
+            if self.axis is not None:
+                self.axis.go()
+        moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
+        self.clock_ns = moment.uncertainty_ns
+        return scan_of(raw, self.lidar.parameters, moment.time_ns)
+
+    def _found_again(self) -> RawScan:
+        deadline_s = time.monotonic() + _AWAY_S
+        while True:
+            self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
+            self._clock = clock_of(self.lidar, self._stamp_at)
+            try:
+                return self.lidar.read()
+            except DeviceError:  # a sensor that just got its power answers before it measures
+                if time.monotonic() > deadline_s:
+                    raise
+
+
+def _settle_clock(scans: _Scans, say: Say) -> None:
+    """Read scans until the sensor's clock is known."""
+    say("learning the sensor's clock")
+    began_s = time.monotonic()
+    while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:
+        scans.next()
+        if waited_s > _CLOCK_PATIENCE_S:
+            say(f"warning: the sensor's clock is known to {scans.clock_ns / 1e6:.1f} ms only: is this computer busy?")
+            return
+
+
+def _wait_until_steady(
+    scans: _Scans, axis: Axis, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
+) -> int:
+    """Read scans until the servo is where the motion begins, and a spin turns evenly at its speed; how many it read.
+
+    `keep` gets the angles meanwhile.
+    """
+    read = 0
+
+    def patience_s() -> float:  # begins anew with the motion, where the lidar is lost meanwhile
+        return axis.begins_ns / 1e9 + _STEADY_PATIENCE_S
+
+    def wait() -> None:
+        nonlocal read
+        scans.next()
+        read += 1
+        for state in axis.hear():
+            keep(state)
+
+    while time.monotonic_ns() < axis.begins_ns or math.isnan(axis.turning()[0]):
+        if time.monotonic() > patience_s():
+            raise DeviceError("the servo tells no angle: is it in its dead sector all the time?")
+        wait()
+    if not isinstance(motion, Spin):
+        return read
+    goal = 360 / motion.period_s
+    while True:
+        speed, ripple = axis.turning()
+        reached = abs(speed - goal) < max(0.1 * goal, 0.5) and axis.window[0].time_ns > axis.begins_ns
+        if reached and ripple < max(0.002 * goal, 0.2):
+            return read
+        if time.monotonic() > patience_s():
+            break
+        wait()
+    said = f"the servo turns at {speed:.1f} deg/s with a ripple of {ripple:.2f} deg, asked for were {goal:.1f} deg/s"
+    if not reached:
+        raise DeviceError(f"{said}: look at its supply, and at the friction of the head")
+    say(f"warning: {said}: look at the balance of the head")
+    return read
+
+
+def _record(plan: Plan, scans: _Scans, axis: Axis, say: Say, watch: Watch) -> ScanSummary:
+    """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
+    say(f"recording {plan.duration_s:g} s")
+    lidar, dropped, bad = scans.lidar, scans.lidar.dropped, scans.lidar.bad_packets
+    axis.left_out.clear()
+    recorded_s = said_s = time.monotonic()
+    whole, taken, away = 0, 0.0, scans.away  # full scans: before the lidar was lost last, until now; its losses
+    begin_s, from_rad = recorded_s, axis.window[-1].position_rad
+    turned = [axis.turning()]
+    stamps_ns: list[int] = []
+    waiting: deque[Scan] = deque()
+    angles, last_ns = 0, 0
+    plan.recording.parent.mkdir(exist_ok=True)
+    note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
+    with Recorder(plan.recording, note, plan.attached) as recorder:
+
+        def keep(state: ServoState) -> None:
+            nonlocal angles
+            recorder.joint(state.time_ns, state.position_rad)
+            watch.joint(state.time_ns, state.position_rad)
+            angles += 1
+
+        for state in axis.window:
+            keep(state)
+        while taken < plan.turns or waiting:
+            scan = scans.next()
+            if scans.away > away:
+                resting = 1 + _wait_until_steady(scans, axis, plan.motion, say, keep)
+                axis.left_out["scans until the servo turned again"] += resting
+                whole, away = math.floor(taken), scans.away
+                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
+                continue
+            if taken < plan.turns:
+                waiting.append(scan)
+            for state in axis.hear():
+                keep(state)
+            while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
+                ready = waiting.popleft()
+                if isinstance(plan.motion, StopAndGo) and axis.moved(ready):
+                    axis.left_out["scans taken on the way"] += 1
+                    continue
+                recorder.scan(ready)
+                watch.scan(ready)
+                stamps_ns.append(ready.stamp_ns)
+                last_ns = int(ready.time_ns[-1])
+            if isinstance(plan.motion, Spin):
+                turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
+                taken = whole + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)
+            else:
+                taken = whole + (time.monotonic() - begin_s) / plan.motion.duration_s
+            if time.monotonic() - said_s > 1:
+                said_s = time.monotonic()
+                turned.append(axis.turning())
+                rate_hz = len(stamps_ns) / (said_s - recorded_s)
+                even = f", {turned[-1][0]:.1f} deg/s, ripple {turned[-1][1]:.2f} deg"
+                say(
+                    f"{min(taken / plan.turns, 1):4.0%}  {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
+                    f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else "")
+                )
+    if not stamps_ns:
+        raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
+    lost = {"scans the sensor dropped": lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
+    even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
+    return ScanSummary(
+        recording=plan.recording,
+        scans=len(stamps_ns),
+        joint_samples=angles,
+        duration_s=(last_ns - stamps_ns[0]) / 1e9,
+        speed_deg_s=float(even_turning[:, 0].mean()),
+        ripple_deg=float(even_turning[:, 1].max()),
+        clock_ns=scans.clock_ns,
+        reconnects=scans.away,
+        left_out={reason: number for reason, number in {**lost, **axis.left_out}.items() if number},
+    )

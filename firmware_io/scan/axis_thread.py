@@ -1,0 +1,175 @@
+"""The servo's side of a scan: a thread that gives its orders and asks, a hundred times a second, where it is.
+
+It asks at uneven times. At even ones an axis may pass very nearly a whole step of its encoder from one question to the
+next (an AX-12A at 30 deg/s does): all answers of a while are then rounded by the same part of a step, which no
+smoothing can find. At uneven times the rounding differs from sample to sample, and averages out.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections import Counter, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from queue import SimpleQueue
+from threading import Event, Thread
+
+import numpy as np
+
+from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from design.motion import Motion
+from firmware_io.samples import Scan
+from firmware_io.scan.setpoints import Move, course
+from firmware_io.servo.dynamixel.driver import Servo, ServoState
+
+SERVO_HZ = 100.0
+
+_DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
+_WINDOW = 50  # samples: half a second
+_STILL_RAD = math.radians(0.2)  # two steps of the encoder
+_DOUBT_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
+_GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
+
+
+class Axis:
+    """What the servo's thread is told and tells, and what is made of it here.
+
+    Attributes:
+        begins_ns: when the motion proper begins; before it the axis is on its way to the start.
+        orders: courses for the thread, None where the axis shall stand.
+        told: states and errors from the thread.
+        window: the good angles of the last half second.
+        left_out: angles that are not recorded, reason -> count.
+    """
+
+    def __init__(self, motion: Motion, stands_rad: float, step_rad: float) -> None:
+        self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()
+        self.told: SimpleQueue[ServoState | Exception] = SimpleQueue()
+        self.window: deque[ServoState] = deque(maxlen=_WINDOW)
+        self.left_out: Counter[str] = Counter()
+        self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
+        self._kept: list[ServoState] = []  # heard by `go`, for the next who hears
+        self._motion = motion
+        self._doubt_rad = _DOUBT_STEPS * step_rad
+        self._order(stands_rad)
+
+    def stop(self) -> None:
+        """Stand, with torque on, until `go`."""
+        self.orders.put(None)
+
+    def go(self) -> None:
+        """Make the motion anew from where the axis stands; `begins_ns` tells when it begins.
+
+        Raises:
+            DeviceError: the servo failed meanwhile.
+        """
+        self._kept = self.hear()
+        self._order(self.window[-1].position_rad if self.window else 0.0)
+
+    def _order(self, from_rad: float) -> None:
+        lead_s, moves = course(self._motion, from_rad)
+        self.begins_ns = time.monotonic_ns() + round(lead_s * 1e9)
+        self.orders.put(moves)
+
+    def hear(self) -> list[ServoState]:
+        """What is new and fit to be recorded.
+
+        Raises:
+            DeviceError: the servo failed.
+        """
+        good, self._kept = self._kept, []
+        while not self.told.empty():
+            state = self.told.get()
+            if isinstance(state, Exception):
+                raise state
+            self._bounds_ns.append(state.time_bound_ns)
+            if math.isnan(state.position_rad):
+                self.left_out["servo angles in the dead sector"] += 1
+            elif (  # where the axis turns back it is slow, and no angle is in doubt
+                state.time_bound_ns > 2 * sorted(self._bounds_ns)[len(self._bounds_ns) // 10]
+                and abs(state.velocity_rad_s) * state.time_bound_ns > self._doubt_rad * 1e9
+                and self.window
+                and state.time_ns - self.window[-1].time_ns < _GAP_NS
+            ):
+                self.left_out["servo angles of uncertain time"] += 1  # the host was busy during the transaction
+            else:
+                self.window.append(state)
+                good.append(state)
+        return good
+
+    def moved(self, scan: Scan) -> bool:
+        """Whether the axis turned while a scan was taken, from the angle before it to the angle after it."""
+        first_ns, last_ns = scan.stamp_ns, int(scan.time_ns[-1])
+        before = [state.position_rad for state in self.window if state.time_ns <= first_ns][-1:]
+        during = [state.position_rad for state in self.window if first_ns < state.time_ns < last_ns]
+        after = [state.position_rad for state in self.window if state.time_ns >= last_ns][:1]
+        return not (before and after) or np.ptp(before + during + after) > _STILL_RAD
+
+    def turning(self) -> tuple[float, float]:
+        """Speed [deg/s] over the window, and the rms deviation from even turning [deg]."""
+        if len(self.window) < _WINDOW:
+            return math.nan, math.nan
+        time_s = np.array([state.time_ns - self.window[0].time_ns for state in self.window]) / 1e9
+        angle_deg = np.degrees([state.position_rad for state in self.window])
+        speed, start = np.polyfit(time_s, angle_deg, 1)
+        return float(speed), float(np.std(angle_deg - start - speed * time_s))
+
+
+@contextmanager
+def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
+    """The servo makes its motion, and is asked where it is, while the body runs.
+
+    Raises:
+        DeviceError: it stands where it cannot tell its angle.
+    """
+    stands_rad = servo.read().position_rad
+    if math.isnan(stands_rad):
+        raise DeviceError(
+            f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
+        )
+    axis, done = Axis(motion, stands_rad, servo.step_rad), Event()
+    thread = Thread(target=_follow, args=(servo, axis.orders, axis.told, done), name="servo", daemon=True)
+    thread.start()
+    try:
+        yield axis
+    finally:
+        done.set()
+        thread.join()
+
+
+def _follow(
+    servo: Servo,
+    orders: SimpleQueue[Iterator[Move] | None],
+    told: SimpleQueue[ServoState | Exception],
+    done: Event,
+) -> None:
+    """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
+    began_s = due_s = heard_s = time.monotonic()
+    moves: Iterator[Move] = iter(())
+    move = None
+    try:
+        while not done.wait(max(due_s - time.monotonic(), 0)):
+            now_s = time.monotonic()
+            due_s = max(due_s + random.uniform(0.5, 1.5) / SERVO_HZ, now_s)
+            if not orders.empty():
+                ordered = orders.get()
+                began_s, moves = now_s, iter(()) if ordered is None else ordered
+                move = next(moves, None)
+                if ordered is None:
+                    servo.hold()
+            if move is not None and now_s - began_s >= move.at_s:
+                if math.isinf(move.goal_rad):
+                    servo.spin(move.rate_rad_s)
+                else:
+                    servo.sweep_to(move.goal_rad, move.rate_rad_s)
+                move = next(moves, None)
+            try:
+                told.put(servo.read())
+                heard_s = now_s
+            except (DeviceTimeoutError, ProtocolError):
+                if now_s - heard_s > _DEAF_S:
+                    raise
+    except Exception as error:  # whatever it is, the thread that waits for it raises it
+        told.put(error)

@@ -1,0 +1,195 @@
+"""A scan on its way to somebody who watches: handed over without waiting, placed as `assemble` places it.
+
+The thread that reads the devices only appends to two short queues. Another thread empties them five times a second into
+a pipe; at its other end, in a process of its own, scans meet the servo's angles and become points. A viewer that
+cannot keep up loses the oldest scans of its view, which are counted; the recording loses nothing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from threading import Event, Lock, Thread
+from typing import Protocol
+
+import numpy as np
+
+from design.angles import AngleSet
+from firmware_io.assembly.deskew_kernel import place_block
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.samples import Float32s, Floats, JointLog, Scan, Times, blocks, straight
+
+MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
+MOST_ANGLES = 2000
+EVERY_S = 0.2
+LOG_NS = 10_000_000_000  # of angles are kept where scans are placed
+
+
+class Watch(Protocol):
+    """Who looks on while a recording is made; none of these may wait."""
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """An angle of the servo."""
+
+    def scan(self, scan: Scan) -> None:
+        """A scan whose last beam is not later than the last angle."""
+
+    def told(self, line: str) -> None:
+        """A line of progress."""
+
+    def close(self) -> None:
+        """The recording has ended."""
+
+
+class Nobody:
+    """The `Watch` of a recording that nobody watches."""
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Nothing."""
+
+    def scan(self, scan: Scan) -> None:
+        """Nothing."""
+
+    def told(self, line: str) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+NOBODY = Nobody()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """What came since the last one; `lost` counts the scans that the view left out so far."""
+
+    time_ns: Times
+    position_rad: Floats
+    scans: tuple[Scan, ...]
+    lines: tuple[str, ...]
+    lost: int
+
+
+class Feed:
+    """The `Watch` that sends batches through a pipe."""
+
+    def __init__(self, sending: Connection) -> None:
+        self.lost = 0
+        self._sending = sending
+        self._joints: deque[tuple[int, float]] = deque(maxlen=MOST_ANGLES)
+        self._scans: deque[Scan] = deque(maxlen=MOST_SCANS)
+        self._lines: deque[str] = deque(maxlen=8)
+        self._lock, self._done = Lock(), Event()
+        self._thread = Thread(target=self._send, name="live", daemon=True)
+        self._thread.start()
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """See `Watch`."""
+        with self._lock:
+            self._joints.append((time_ns, position_rad))
+
+    def scan(self, scan: Scan) -> None:
+        """See `Watch`."""
+        with self._lock:
+            self.lost += len(self._scans) == MOST_SCANS
+            self._scans.append(scan)
+
+    def told(self, line: str) -> None:
+        """See `Watch`."""
+        with self._lock:
+            self._lines.append(line)
+
+    def close(self) -> None:
+        """Send what is left, and end; a viewer that does not take it is not waited for."""
+        self._done.set()
+        self._thread.join(timeout=2.0)
+        self._sending.close()
+
+    def _batch(self) -> Batch:
+        with self._lock:
+            joints, scans, lines = list(self._joints), tuple(self._scans), tuple(self._lines)
+            self._joints.clear()
+            self._scans.clear()
+            self._lines.clear()
+        times = np.array([time_ns for time_ns, _ in joints], np.int64)
+        return Batch(times, np.array([angle for _, angle in joints], float), scans, lines, self.lost)
+
+    def _send(self) -> None:
+        last = False
+        while not last:
+            last = self._done.wait(EVERY_S)
+            try:
+                self._sending.send(self._batch())
+            except OSError:  # the viewer has gone: the scan goes on
+                return
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Growth:
+    """By what a cloud has grown.
+
+    Attributes:
+        points_m: in the world, shape (n, 3).
+        intensity: shape (n,), 0 from a sensor that measures none.
+        time_s: of the scan that each belongs to, since the first one, shape (n,).
+        lines: what the scan said meanwhile.
+        lost: scans that the view left out so far.
+    """
+
+    points_m: Float32s
+    intensity: Float32s
+    time_s: Float32s
+    lines: tuple[str, ...]
+    lost: int
+
+
+class Placing:
+    """Batches in, points out; the frame chain is that of `deskew`, the axis straight between its samples."""
+
+    def __init__(self, angles: AngleSet, own_body: OwnBody | None) -> None:
+        self._angles, self._own_body = angles, own_body
+        self._time_ns, self._position_rad = np.empty(0, np.int64), np.empty(0)
+        self._first_ns: int | None = None
+
+    def place(self, batch: Batch) -> Growth:
+        """Points of the scans of a batch; beams without a place are left out of the view."""
+        time_ns = np.concatenate([self._time_ns, batch.time_ns])
+        position_rad = np.concatenate([self._position_rad, batch.position_rad])
+        rising = np.r_[True, np.diff(np.maximum.accumulate(time_ns)) > 0] if time_ns.size else np.zeros(0, bool)
+        time_ns, position_rad = time_ns[rising], position_rad[rising]
+        recent = time_ns > time_ns[-1] - LOG_NS if time_ns.size else np.zeros(0, bool)
+        self._time_ns, self._position_rad = time_ns[recent], position_rad[recent]
+        points, intensity, seconds = (
+            [np.empty((0, 3), np.float32)],
+            [np.empty(0, np.float32)],
+            [np.empty(0, np.float32)],
+        )
+        if time_ns.size < 2:
+            return Growth(points[0], intensity[0], seconds[0], batch.lines, batch.lost)
+        curve = straight(JointLog(time_ns, position_rad))
+        for block in blocks(batch.scans):
+            if self._first_ns is None:
+                self._first_ns = int(block.stamp_ns[0])
+            placed = place_block(block, curve, self._angles, own_body=self._own_body, with_joint=False)
+            there = np.isfinite(placed.points_m[:, :, 0])
+            points.append(placed.points_m[there])
+            told = block.intensity if block.intensity.size else np.zeros_like(block.range_m)
+            intensity.append(told[there])
+            after_s = ((block.stamp_ns - self._first_ns) / 1e9).astype(np.float32)
+            seconds.append(np.broadcast_to(after_s[:, None], there.shape)[there])
+        return Growth(
+            np.concatenate(points), np.concatenate(intensity), np.concatenate(seconds), batch.lines, batch.lost
+        )
+
+
+def growing(receiving: Connection, placing: Placing) -> Iterator[Growth]:
+    """What comes through the pipe, placed, until the other end is closed."""
+    while True:
+        try:
+            batch = receiving.recv()
+        except EOFError:
+            return
+        yield placing.place(batch)

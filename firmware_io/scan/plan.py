@@ -1,0 +1,113 @@
+"""What `scanwright scan` is going to do: read, checked and said before any device is touched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from design.angles import AngleSet, load_angles
+from design.catalogue.catalogue import Servo, load_catalogue
+from design.errors import DeviceError, RecordingError
+from design.motion import Motion, Spin
+from firmware_io.lidar.scip.parameters import StampAt
+from firmware_io.ports import Ports, find_ports
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What one scan is going to do.
+
+    Attributes:
+        angles: angle set of the scanner.
+        motion: of its servo.
+        turns: full scans.
+        intensity: whether the sensor is asked for intensities.
+        stamp_at: which moment of a turn the sensor's stamps mean.
+        ports: where the devices are.
+        recording: file to write.
+        attached: files kept inside it, name -> text.
+    """
+
+    angles: AngleSet
+    motion: Motion
+    turns: int
+    intensity: bool
+    stamp_at: StampAt
+    ports: Ports
+    recording: Path
+    attached: dict[str, str]
+
+    @property
+    def duration_s(self) -> float:
+        """How long the recording lasts."""
+        return self.turns * self.motion.duration_s
+
+    def lines(self) -> list[str]:
+        """The plan in words."""
+        emulated = f" (emulated by process {self.ports.pid})" if self.ports.pid else ""
+        return [
+            f"lidar {self.angles.sensor} at {self.ports.lidar}{emulated}",
+            f"servo {self.angles.servo} at {self.ports.servo}{emulated}",
+            f"{self.turns} x {self.motion.mode} of {self.motion.duration_s:g} s: {self.duration_s:g} s of recording",
+            f"recording {self.recording}",
+        ]
+
+
+def plan_scan(
+    out: Path,
+    *,
+    turns: int = 1,
+    lidar: str | None = None,
+    servo: str | None = None,
+    recording: Path | None = None,
+    intensity: bool = False,
+    stamp_at: StampAt = "step_0",
+) -> Plan:
+    """What a scan with the scanner of a build folder will do; touches no device and writes nothing.
+
+    Args:
+        out: build folder; its `angles.json` is all that is needed.
+        turns: full scans.
+        lidar: address; None for the emulated or the plugged-in one, as for `servo`.
+        servo: port.
+        recording: None for one in `out`, named by date and time.
+        intensity: ask for intensities.
+        stamp_at: which moment of a turn the sensor's stamps mean.
+
+    Raises:
+        ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an unusable file name.
+    """
+    angles = load_angles(out / "angles.json")
+    if turns < 1:
+        raise DeviceError(f"--turns = {turns}: at least 1")
+    if angles.motion is None:
+        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set does not say how the servo moves")
+    product = load_catalogue().products.get(angles.servo)
+    if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
+        raise DeviceError(
+            f"{out / 'angles.json'}: motion.mode = 'spin': {angles.servo} measures its angle in "
+            f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or take a servo such as MX-64R"
+        )
+    if recording is not None:
+        _check_name(recording)
+    kept = [path for name in ("angles.json", "task.toml") if (path := out / name).is_file()]
+    return Plan(
+        angles=angles,
+        motion=angles.motion,
+        turns=turns,
+        intensity=intensity,
+        stamp_at=stamp_at,
+        ports=find_ports(out, lidar, servo),
+        recording=recording or out / "recordings" / f"{datetime.now():%Y%m%d-%H%M%S}.mcap",
+        attached={path.name: path.read_text(encoding="utf-8") for path in kept},
+    )
+
+
+def _check_name(recording: Path) -> None:
+    if recording.suffix != ".mcap":
+        raise RecordingError(f"{recording}: recordings are MCAP files; name it {recording.with_suffix('.mcap').name}")
+    if recording.exists():
+        raise RecordingError(f"{recording}: exists already, and a recording is never written over")
+    if not recording.parent.is_dir():
+        raise RecordingError(f"{recording}: the folder {recording.parent} does not exist")

@@ -1,0 +1,134 @@
+"""Records a live run: the file of `recording`, written as it comes, so that a crash costs no more than a second.
+
+Every quarter of a second all messages so far go to the file as one whole chunk, and on to the disk. A program that
+is killed, a full disk or a pulled plug leave a file without an index, which `scanwright repair` closes.
+
+The devices' times are on the host's monotonic clock, which no clock adjustment ever sets back; ROS wants wall time.
+One difference between the two, taken at the start and kept with the recording, leads from each to the other.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+from design.errors import RecordingError
+from firmware_io.recording.recording import MessageWriter
+from firmware_io.samples import Scan
+
+CHUNK_S = 0.25
+
+
+class Recorder:
+    """Writes a recording while it happens; use it in a `with` statement.
+
+    However that ends, the recording is closed and readable, unless the disk itself refuses. A thread of its own waits
+    for the disk, so that `scan` and `joint` return at once.
+
+    Raises:
+        RecordingError: the file exists or cannot be written; what was written before stays and can be repaired.
+    """
+
+    def __init__(self, path: Path, note: Mapping[str, str], attached: Mapping[str, str]) -> None:
+        """Args: the file; where it comes from, in words; files to keep with it (name -> text), such as angles.json."""
+        self._path = path
+        self._wall_minus_monotonic_ns = time.time_ns() - time.monotonic_ns()
+        self._note = {**note, "wall_minus_monotonic_ns": str(self._wall_minus_monotonic_ns)}
+        self._attached = attached
+        self._lock = threading.Lock()
+        self._done = threading.Event()
+        self._failure: OSError | None = None
+
+    def __enter__(self) -> Recorder:
+        try:
+            self._file = _WholeWrites(self._path)
+        except OSError as error:
+            raise self._error(error, "") from error
+        self._messages = MessageWriter(self._file, self._path, self._note, self._attached)
+        self._thread = threading.Thread(target=self._keep, name="recorder", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done.set()
+        self._thread.join()
+        try:
+            self._check()
+            self._messages.finish()
+            self._file.flush()
+            self._file.sync()
+        except OSError as refused:
+            raise self._lost(refused) from refused
+        finally:
+            self._file.close()
+
+    def scan(self, scan: Scan) -> None:
+        """Append one scan; its stamp is on the monotonic clock."""
+        self._check()
+        with self._lock:
+            self._messages.scan(replace(scan, stamp_ns=scan.stamp_ns + self._wall_minus_monotonic_ns))
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Append one sample of the spin joint; its time is on the monotonic clock."""
+        self._check()
+        with self._lock:
+            self._messages.joint(time_ns + self._wall_minus_monotonic_ns, position_rad)
+
+    def _keep(self) -> None:
+        try:
+            while not self._done.wait(CHUNK_S):
+                with self._lock:
+                    self._messages.flush()
+                self._file.sync()
+        except OSError as error:
+            self._failure = error
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            raise self._lost(self._failure) from self._failure
+
+    def _lost(self, error: OSError) -> RecordingError:
+        return self._error(error, f"; what came before is safe: make room, then `scanwright repair {self._path}`")
+
+    def _error(self, error: OSError, advice: str) -> RecordingError:
+        return RecordingError(f"{self._path}: cannot write: {error.strerror or error}{advice}")
+
+
+class _WholeWrites:
+    """A new file that grows by what was written between two flushes, or not at all."""
+
+    def __init__(self, path: Path) -> None:
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        self._size = 0
+        self._pending = bytearray()
+
+    def write(self, data: bytes) -> int:
+        self._pending += data
+        return len(data)
+
+    def tell(self) -> int:
+        return self._size + len(self._pending)
+
+    def flush(self) -> None:
+        rest = memoryview(bytes(self._pending))
+        try:
+            while rest:
+                rest = rest[os.write(self._descriptor, rest) :]
+        except OSError:
+            os.ftruncate(self._descriptor, self._size)
+            raise
+        self._size += len(self._pending)
+        self._pending.clear()
+
+    def sync(self) -> None:
+        os.fsync(self._descriptor)
+
+    def close(self) -> None:
+        os.close(self._descriptor)

@@ -1,0 +1,1 @@
+"""Dynamixel, protocols 1.0 and 2.0: registers, bus, driver."""

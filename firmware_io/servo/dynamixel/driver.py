@@ -1,0 +1,356 @@
+"""Drive one servo: spin, sweep, hold, read; whatever happens, it stands and its port is closed in the end.
+
+`open_servo` finds speed, protocol and model, and makes the servo ready: torque off, no return delay. While it turns,
+`read` it at least every two seconds: turns are counted from what is read, and a servo that nobody listens to is
+stopped (by the guard process, and by the bus watchdog where the servo has one).
+
+What nobody can help: a servo of protocol 1.0 in wheel mode goes on turning when its bus is cut.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import NoReturn, Self
+
+from design.errors import DeviceError, DeviceFaultError
+from firmware_io.servo.dynamixel.bus import Answer, ServoBus
+from firmware_io.servo.dynamixel.registers import ControlTable, Register, Setting, motor_of
+from firmware_io.servo.dynamixel.setup import find, prepare, set_kept
+from firmware_io.servo.guard import SILENCE_S, Guard
+
+_STALL_S = 0.5
+_STALL_COUNTS = 8  # of the encoder, due at least before a stall can be told from its steps
+_STALL_SHARE = 0.1  # of the way due
+_ARRIVED_RAD = math.radians(5.0)  # a loop without integral stops short of its goal, by friction and weight
+_GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
+
+_ADVICE = {
+    "overload": "free what brakes the axis, balance or lighten the head, then open the servo again",
+    "overheating": "let it cool down; then a lower rate or a lighter head",
+    "voltage": "look at its supply and the cable to it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ServoState:
+    """What the servo was doing at one moment.
+
+    Attributes:
+        time_ns: `time.monotonic_ns()` of the sampling.
+        time_bound_ns: it was sampled within this of `time_ns`.
+        position_rad: turns are counted; counter-clockwise as one looks at the horn, 0 at the encoder's centre.
+            NaN in the AX-12A's dead sector.
+        velocity_rad_s: NaN in the AX-12A's wheel mode, where it measures none.
+        load: fraction of the rated torque, positive counter-clockwise.
+        voltage_V: of the supply.
+        temperature_degC: inside.
+    """
+
+    time_ns: int
+    time_bound_ns: int
+    position_rad: float
+    velocity_rad_s: float
+    load: float
+    voltage_V: float  # noqa: N815 - volts
+    temperature_degC: float  # noqa: N815
+
+    @property
+    def moving(self) -> bool:
+        """Whether a speed is measured that is not 0."""
+        return abs(self.velocity_rad_s) > 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What the servo was told to do, and where it was when it last got on with it."""
+
+    rate_rad_s: float
+    goal_rad: float
+    since_ns: int = 0
+    from_rad: float = math.nan
+
+
+class Servo:
+    """One servo on its port; made by `open_servo`, used as a context manager.
+
+    Attributes:
+        model: name, as in the catalogue.
+        protocol: 1.0 or 2.0.
+        baud: bits per second.
+        id: on the bus.
+        port: name of the port.
+        step_rad: of its encoder.
+    """
+
+    def __init__(self, bus: ServoBus, table: ControlTable, servo_id: int, warnings: tuple[str, ...]) -> None:
+        self.model, self.protocol, self.id = table.model, table.protocol, servo_id
+        self.baud, self.port = bus.baud, bus.port
+        self.step_rad = table.position.unit
+        self._bus, self._table, self._warnings = bus, table, warnings
+        self._fastest_rad_s = motor_of(table.model).no_load_rad_s
+        self._mode: tuple[Setting, ...] = ()
+        self._order: _Order | None = None
+        self._known: ServoState | None = None  # the last state with a position, from which turns are counted
+        acknowledged = b"\xff\xff\xfd\x00%c\x04\x00\x55" if table.protocol == 2.0 else b"\xff\xff%c\x02"
+        off = bus.write_packet(servo_id, table.torque, table.torque.encode(0))
+        self._guard = Guard(bus.fileno(), off, acknowledged % servo_id)
+
+    def __str__(self) -> str:
+        return f"{self.port}: servo {self.id} ({self.model})"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        try:
+            self.close()
+        except DeviceError as unsafe:
+            if error is None:
+                raise
+            error.add_note(str(unsafe))  # the first error tells more
+
+    def close(self) -> None:
+        """Take the torque, close the port. May be called again.
+
+        Raises:
+            DeviceError: the servo does not answer, and may still turn.
+        """
+        stands, trouble = not self._bus.is_open, None
+        try:
+            if not stands:
+                self._stop()
+                stands = True
+        except DeviceError as error:
+            trouble = error
+        finally:
+            self._bus.close()
+            stands = self._guard.dismiss(stands)  # which tries longer
+        if trouble and not stands:
+            raise DeviceError(f"{self}: could not be stopped: take its power ({trouble})") from trouble
+
+    def warnings(self) -> tuple[str, ...]:
+        """What was not as it should be when the servo was opened, and what to do about it."""
+        return self._warnings
+
+    def spin(self, rate_rad_s: float) -> None:
+        """Turn continuously; positive is counter-clockwise.
+
+        An AX-12A has no speed loop: it gets that share of its voltage which would give this rate without load.
+
+        Raises:
+            DeviceError: the rate is beyond the motor.
+        """
+        self._check_rate(rate_rad_s)
+        self._enter(self._table.wheel)
+        self._observe()  # turns are counted from here
+        self._watch()
+        self._write(self._table.wheel_speed, rate_rad_s)
+        self._order = _Order(rate_rad_s, math.copysign(math.inf, rate_rad_s))
+
+    def sweep_to(self, angle_rad: float, rate_rad_s: float) -> None:
+        """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
+
+        Raises:
+            DeviceError: the servo has no such angle, or the rate is beyond the motor.
+        """
+        table = self._table
+        zero_rad = table.centre * table.goal.unit
+        if not -zero_rad <= angle_rad <= table.last * table.goal.unit - zero_rad:
+            span = f"{-math.degrees(zero_rad):.1f} .. {math.degrees(table.last * table.goal.unit - zero_rad):.1f}"
+            raise DeviceError(f"{self}: sweep to {math.degrees(angle_rad):.1f} deg: it reaches {span} deg")
+        if not rate_rad_s > 0:
+            raise DeviceError(f"{self}: sweep at {math.degrees(rate_rad_s):.1f} deg/s: choose a rate above 0")
+        self._check_rate(rate_rad_s)
+        self._enter(table.joint)
+        self._observe()
+        self._watch()
+        self._write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
+        self._write(table.goal, angle_rad + zero_rad)
+        self._order = _Order(rate_rad_s, angle_rad)
+
+    def hold(self) -> None:
+        """Stand where it is, with torque on. An AX-12A that spins only loses its drive, for want of a speed loop."""
+        self._observe()
+        if self._mode == self._table.joint:
+            self._write(self._table.goal, self._here())
+        elif self._mode == self._table.wheel:
+            self._write(self._table.wheel_speed, 0.0)
+        else:
+            self._enter(self._table.joint)
+        self._rest()
+
+    def read(self) -> ServoState:
+        """Position, velocity, load, voltage and temperature of one moment, in one transaction.
+
+        Raises:
+            DeviceFaultError: overload, overheating, voltage, or no motion where there should be; it is stopped.
+            DeviceTimeoutError: it does not answer.
+            ProtocolError: it answers nonsense.
+            DeviceError: the guard stopped it, as it was not read for two seconds.
+        """
+        if self._order and not self._guard.beat():
+            self._neglected()
+        state = self._observe()
+        if self._order:
+            self._order = self._follow(self._order, state)
+        return state
+
+    def _observe(self) -> ServoState:
+        answer = self._bus.read(self.id, self._table.block)
+        if answer.conditions:
+            self._fault(self._conditions(answer))
+        state = self._state(answer)
+        if not math.isnan(state.position_rad):
+            self._known = state
+        return state
+
+    def _state(self, answer: Answer) -> ServoState:
+        table, data = self._table, answer.data
+        count = round(table.pick(table.position, data) / table.position.unit)
+        angle_rad = (count - table.centre) * table.position.unit
+        velocity_rad_s = table.pick(table.velocity, data)
+        if not table.speed_loop and self._mode == table.wheel:
+            velocity_rad_s = math.nan  # there the register holds the torque
+        if not table.measures_turn and not 0 < count < table.last:
+            angle_rad = math.nan  # at one end, or in the dead sector between both: the potentiometer cannot tell
+        elif known := self._known:
+            angle_rad = nearest_turn(angle_rad, known.position_rad + self._due_rad(known, velocity_rad_s, answer))
+        else:
+            angle_rad = nearest_turn(angle_rad, 0.0)  # servos of protocol 2.0 count turns of their own
+        return ServoState(
+            time_ns=answer.sampled_ns,
+            time_bound_ns=answer.bound_ns,
+            position_rad=angle_rad,
+            velocity_rad_s=velocity_rad_s,
+            load=table.pick(table.load, data),
+            voltage_V=table.pick(table.voltage, data),
+            temperature_degC=table.pick(table.temperature, data),
+        )
+
+    def _due_rad(self, known: ServoState, velocity_rad_s: float, answer: Answer) -> float:
+        """How far it will have turned since it was known where it is; next to nothing without an order to turn."""
+        if not self._order:
+            return 0.0
+        measured = [rate for rate in (known.velocity_rad_s, velocity_rad_s) if not math.isnan(rate)]
+        rate_rad_s = sum(measured) / len(measured) if measured else self._order.rate_rad_s
+        return rate_rad_s * (answer.sampled_ns - known.time_ns) / 1e9
+
+    def _follow(self, order: _Order, state: ServoState) -> _Order | None:
+        """The order with the progress made; None when the goal is reached."""
+        here_rad = state.position_rad
+        if abs(order.goal_rad - here_rad) < _ARRIVED_RAD:
+            self._rest()
+            return None
+        if not order.since_ns or math.isnan(order.from_rad) > math.isnan(here_rad):
+            return replace(order, since_ns=state.time_ns, from_rad=here_rad)
+        elapsed_s = (state.time_ns - order.since_ns) / 1e9
+        due_rad, moved_rad = abs(order.rate_rad_s) * elapsed_s, abs(here_rad - order.from_rad)
+        enough_rad = math.pi if math.isnan(here_rad) else _STALL_COUNTS * self._table.position.unit
+        if elapsed_s < _STALL_S or due_rad < enough_rad:
+            return order
+        if not moved_rad >= _STALL_SHARE * due_rad:
+            if self._value(self._table.torque) == 0:
+                self._fault(f"it has restarted by itself, {state.voltage_V:.1f} V now: {_ADVICE['voltage']}")
+            moved = "stuck in the dead sector" if math.isnan(moved_rad) else f"moved {math.degrees(moved_rad):.1f} deg"
+            due = f"where {math.degrees(due_rad):.1f} were due, load {state.load:.0%}"
+            self._fault(f"stall: {moved} {due}: {_ADVICE['overload']}")
+        return replace(order, since_ns=state.time_ns, from_rad=here_rad)
+
+    def _conditions(self, answer: Answer) -> str:
+        table = self._table
+        code = answer.conditions if table.hardware_error is None else round(self._value(table.hardware_error))
+        names, volts = table.names(code), table.pick(table.voltage, answer.data)
+        broken = "switch its power off and on; if it comes again, the servo is broken"
+        advice = next((text for name, text in _ADVICE.items() if name in names), broken)
+        return f"{names} at {volts:.1f} V, {table.pick(table.temperature, answer.data):.0f} degC: {advice}"
+
+    def _fault(self, what: str) -> NoReturn:
+        error = DeviceFaultError(f"{self}: {what}")
+        try:
+            self._stop()
+        except DeviceError as unsafe:
+            error.add_note(str(unsafe))
+        raise error
+
+    def _neglected(self) -> NoReturn:
+        self._order, self._mode = None, ()
+        stopped = f"not read for {SILENCE_S:g} s while it turned, so it was stopped"
+        raise DeviceError(f"{self}: {stopped}: read it more often, open it again")
+
+    def _check_rate(self, rate_rad_s: float) -> None:
+        if not abs(rate_rad_s) <= self._fastest_rad_s:
+            fastest = f"at most {math.degrees(self._fastest_rad_s):.0f} deg/s"
+            raise DeviceError(f"{self}: rate {math.degrees(rate_rad_s):.1f} deg/s: {fastest}, at 12 V and without load")
+
+    def _enter(self, mode: tuple[Setting, ...]) -> None:
+        """Wheel or joint mode, standing, torque on."""
+        table = self._table
+        if mode == self._mode:
+            return
+        self._stop()
+        for register, count in mode:
+            set_kept(self._bus, self.id, register, count)
+        if mode == table.wheel:
+            self._write(table.wheel_speed, 0.0)
+        else:
+            self._write(table.joint_speed, _GENTLE_RAD_S)
+            self._write(table.goal, self._here())
+            self._known = None
+        self._write(table.torque, 1)
+        self._mode = mode
+
+    def _watch(self) -> None:
+        """From here on, silence stops it."""
+        if not self._guard.turning():
+            self._neglected()
+        if self._table.watchdog:
+            self._write(self._table.watchdog, SILENCE_S)
+
+    def _rest(self) -> None:
+        """It stands, or will by itself: silence is fine."""
+        self._order = None
+        self._guard.resting()
+        if self._table.watchdog:
+            self._write(self._table.watchdog, 0.0)
+
+    def _stop(self) -> None:
+        self._mode, self._order = (), None
+        self._write(self._table.torque, 0)
+        self._rest()
+
+    def _here(self) -> float:
+        """The goal that is the present position; in protocol 2.0 that one may count turns, which a goal must not."""
+        return self._value(self._table.position) % ((self._table.last + 1) * self._table.goal.unit)
+
+    def _value(self, register: Register) -> float:
+        return register.decode(self._bus.read(self.id, register).data)
+
+    def _write(self, register: Register, value: float) -> None:
+        self._bus.write(self.id, register, register.encode(value))
+
+
+def nearest_turn(angle_rad: float, expected_rad: float) -> float:
+    """The angle, whole turns added so that it comes nearest to the expected one."""
+    return angle_rad + 2 * math.pi * round((expected_rad - angle_rad) / (2 * math.pi))
+
+
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> Servo:
+    """Find the servo on a port, whatever its speed and protocol, and make it ready; it stands, without torque.
+
+    Args:
+        port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
+        model: what it must be; None for any that is known.
+        servo_id: its number on the bus; None if it is alone there.
+
+    Raises:
+        DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
+    """
+    bus = ServoBus(port)
+    try:
+        table, found_id = find(bus, model, servo_id)
+        return Servo(bus, table, found_id, prepare(bus, table, found_id))
+    except BaseException:
+        bus.close()
+        raise

@@ -1,0 +1,115 @@
+"""The cloud while it grows: what a scan has measured so far, coloured by height, intensity or time."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from scanwright.studio.panel.panel_html import note_html
+from scanwright.studio.view.sphere import Colours, ramp
+
+Float32s = NDArray[np.float32]
+ColourBy = Literal["height", "intensity", "time"]
+COLOUR_BY: tuple[ColourBy, ...] = ("height", "intensity", "time")
+CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
+MOST_POINTS = 3_000_000  # the page drops the oldest beyond, and says so
+POINT_M = 0.012
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Points of one node."""
+
+    values: dict[ColourBy, Float32s]
+    points_m: Float32s
+    handle: viser.PointCloudHandle
+
+
+class LiveView:
+    """The page of one scan."""
+
+    def __init__(self, server: viser.ViserServer, title: str) -> None:
+        self._server = server
+        self.chunks: deque[_Chunk] = deque()
+        self._number = 0
+        self._spans: dict[ColourBy, tuple[float, float]] = {}
+        self.points, self.forgotten, self.lost = 0, 0, 0
+        server.initial_camera.position = (-4.0, -3.0, 3.0)
+        server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        server.scene.add_frame("/scanner", axes_length=0.3, axes_radius=0.01)
+        server.gui.add_html(note_html(title))
+        self.facts = server.gui.add_html("")
+        self._line = server.gui.add_html(note_html("waiting for the first scan"))
+        self.by = server.gui.add_dropdown("colour by", COLOUR_BY, initial_value="height")
+        self._size = server.gui.add_slider("point size [mm]", 2.0, 50.0, 1.0, 1000 * POINT_M)
+        self.by.on_update(lambda _: self._recolour())
+        self._size.on_update(lambda _: self._resize())
+
+    def add(self, points_m: Float32s, intensity: Float32s, time_s: Float32s) -> None:
+        """Points that are new: (n, 3), (n,), (n,)."""
+        if len(points_m):
+            self._spread({"height": points_m[:, 2], "intensity": intensity, "time": time_s})
+            self._append(points_m, {"height": points_m[:, 2], "intensity": intensity, "time": time_s})
+            self.points += len(points_m)
+            while sum(len(chunk.points_m) for chunk in self.chunks) > MOST_POINTS:
+                oldest = self.chunks.popleft()
+                self.forgotten += len(oldest.points_m)
+                oldest.handle.remove()
+        left = f"; the view forgot the oldest {self.forgotten:,}" if self.forgotten else ""
+        left += f"; it left out {self.lost:,} scans, the recording none" if self.lost else ""
+        self.facts.content = note_html(f"{self.points:,} points{left}")
+
+    def tell(self, line: str) -> None:
+        """Speed, rates, dropped and bad packets, as the scan says them."""
+        self._line.content = note_html(line)
+
+    def _append(self, points_m: Float32s, values: dict[ColourBy, Float32s]) -> None:
+        if self.chunks and len(self.chunks[-1].points_m) < CHUNK_POINTS:
+            chunk = self.chunks[-1]
+            chunk.points_m = np.concatenate([chunk.points_m, points_m])
+            chunk.values = {by: np.concatenate([chunk.values[by], values[by]]) for by in COLOUR_BY}
+            name = chunk.handle.name
+        else:
+            self._number += 1
+            name = f"/cloud/{self._number}"
+            self.chunks.append(_Chunk(values, points_m, None))  # type: ignore[arg-type]
+            chunk = self.chunks[-1]
+        chunk.handle = self._server.scene.add_point_cloud(
+            name,
+            chunk.points_m,
+            self._colours(chunk),
+            point_size=self._size.value / 1000,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def _spread(self, values: dict[ColourBy, Float32s]) -> None:
+        """Widen the scales; when one has grown by much, what is there takes the new colours."""
+        grown = False
+        for by, new in values.items():
+            low, high = (float(x) for x in np.percentile(new, [1, 99]))
+            before = self._spans.get(by, (low, high))
+            after = min(low, before[0]), max(high, before[1])
+            self._spans[by] = after
+            grown |= by == self.by.value and after[1] - after[0] > 1.2 * (before[1] - before[0])
+        if grown:
+            self._recolour()
+
+    def _colours(self, chunk: _Chunk) -> Colours:
+        by = self.by.value if self.by.value in COLOUR_BY else "height"
+        low, high = self._spans[by]
+        return ramp((chunk.values[by] - low) / max(high - low, 1e-6))
+
+    def _recolour(self) -> None:
+        for chunk in list(self.chunks):
+            chunk.handle.colors = self._colours(chunk)
+
+    def _resize(self) -> None:
+        for chunk in list(self.chunks):
+            chunk.handle.point_size = float(np.clip(self._size.value, 1.0, 200.0)) / 1000

@@ -1,0 +1,142 @@
+"""The scanner in 3D for the report: the bodies of `assembly.glb`, their places in `exploded.glb`, axis and fan.
+
+The page draws what it finds here and knows nothing of files: matrices are column by column, arrays little-endian in
+base64, all in the world frame in metres.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from design.angles import AngleSet
+from design.frames import Array, apply
+from design.motion import Sweep
+from design.shadow import AXIS_STEPS, Shadow
+from scanwright.report.answer import as_built
+from scanwright.report.where import Body
+
+LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
+FULL_TURN_DEG = (0.0, 360.0)
+A_TURN_S = 10.0  # shown where the motion is not known
+FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
+Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
+FRAMES = ("rot", "laser")
+
+
+def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | None) -> dict[str, Any]:
+    """What the page draws, ready for JSON.
+
+    Args:
+        folder: build folder with `assembly.glb`; without `exploded.glb` nothing explodes.
+        angles: for the motion.
+        own_body: what the parts hide, and the bearings of the beams [rad]; without it there is no fan.
+
+    Raises:
+        BuildError: a file is not as a build writes it.
+    """
+    assembly, exploded = _load(folder / "assembly.glb"), folder / "exploded.glb"
+    apart = _load(exploded) if exploded.is_file() else None
+    turning = assembly.graph.transforms.successors("rot")
+    bodies, together, spread = [], [], []
+    for node in sorted(assembly.graph.nodes_geometry):
+        T_world_body, mesh = _pose(assembly, node), assembly.geometry[assembly.graph.get(node)[1]]
+        T_apart = T_world_body if apart is None else _pose(apart, node)
+        together.append(apply(T_world_body, mesh.vertices))
+        spread.append(apply(T_apart, mesh.vertices))
+        vertices, number = np.unique(mesh.vertices, axis=0, return_inverse=True)  # they differ in their normals
+        wide = len(vertices) > 2**16 - 1
+        bodies.append(
+            {
+                "name": node,
+                "turns": node in turning,
+                "colour": _srgb(mesh.visual.material.baseColorFactor),
+                "matrix": _columns(T_world_body),
+                "apart": _columns(T_apart),
+                "vertices": _packed(vertices, "<f4"),
+                "faces": _packed(number.reshape(-1)[mesh.faces], "<u4" if wide else "<u2"),
+                "wide": wide,
+            }
+        )
+    T_world_rot, T_world_laser = _pose(assembly, "rot"), _pose(assembly, "laser")
+    reach = FAN_REACH * _fit(together)["radius"]
+    if own_body is not None:  # the fan comes round everywhere within its reach of the axis
+        together.append(T_world_laser[:3, 3] + reach * np.concatenate([np.eye(3), -np.eye(3)]))
+    return {
+        "bodies": bodies,
+        "fit": _fit(together),
+        "fit_apart": _fit(spread),
+        "explodes": apart is not None,
+        "axis": _columns(T_world_rot),
+        "axis_inverse": _columns(np.linalg.inv(T_world_rot)),
+        "reach": round(reach, 6),
+        "limits_deg": list(angles.motion.limits_deg if isinstance(angles.motion, Sweep) else FULL_TURN_DEG),
+        "period_s": A_TURN_S if angles.motion is None else angles.motion.duration_s,
+        "to_and_fro": isinstance(angles.motion, Sweep),
+        "laser": _columns(T_world_laser),
+        "fan": None if own_body is None else _fan(*own_body),
+    }
+
+
+def bodies_of(path: Path) -> dict[str, Body]:
+    """The bodies of `assembly.glb` as they stand in the world.
+
+    Raises:
+        BuildError: the file is not as a build writes it.
+    """
+    assembly = _load(path)
+    turning = assembly.graph.transforms.successors("rot")
+    bodies = {}
+    for node in sorted(assembly.graph.nodes_geometry):
+        mesh = assembly.geometry[assembly.graph.get(node)[1]]
+        bodies[node] = Body(apply(_pose(assembly, node), mesh.vertices)[mesh.faces], node in turning)
+    return bodies
+
+
+def _load(path: Path) -> Any:
+    import trimesh
+
+    with as_built(path):
+        scene = trimesh.load_scene(path, process=False)
+        if missing := set(FRAMES) - set(scene.graph.nodes):
+            raise ValueError(f"no frame {' and '.join(sorted(missing))}")
+    return scene
+
+
+def _pose(scene: Any, node: str) -> Array:
+    """T_world_node, z up [m]."""
+    return Y_TO_Z @ scene.graph.get(node)[0]
+
+
+def _fan(shadow: Shadow, bearings_rad: Array) -> dict[str, Any]:
+    """Bearings, and for every beam that is ever hidden one bit an axis step, 1 where it is."""
+    stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
+    hidden = stator | shadow.beams[:, None]
+    rows = {str(beam): _packed(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
+    return {"bearings": _packed(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
+
+
+def _fit(points: list[Array]) -> dict[str, Any]:
+    """A sphere about the middle of the box of all points."""
+    every = np.concatenate(points)
+    middle = (every.min(axis=0) + every.max(axis=0)) / 2
+    radius = float(np.linalg.norm(every - middle, axis=1).max())
+    return {"centre": np.round(middle, 6).tolist(), "radius": round(radius, 6)}
+
+
+def _srgb(linear: ArrayLike) -> list[float]:
+    """Colours of glTF are linear, 0 to 255 in trimesh; those of a page are sRGB, 0 to 1."""
+    c = np.asarray(linear, dtype=float)[:3] / 255
+    return np.round(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055), 3).tolist()
+
+
+def _columns(matrix: Array) -> list[float]:
+    return (np.round(matrix, 9).T.ravel() + 0.0).tolist()
+
+
+def _packed(values: ArrayLike, kind: str) -> str:
+    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,0 +1,188 @@
+"""The sphere of the report: densities and J over the axis directions, each one picture to be wrapped about a ball.
+
+A picture is unrolled: theta from up to down, phi from -180 to 180 deg, so that its middle is ahead; the density maps of
+a build have the same colours.
+"""
+
+from __future__ import annotations
+
+import io
+from base64 import b64encode
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import LogNorm, Normalize
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.spatial import cKDTree
+
+from design.angles import AngleSet, standard_settings
+from design.evaluation.coverage import mean_density_at
+from design.frames import Array, R_world_rot
+from design.objective.problem import Problem
+from design.task.task import LoadedTask
+from scanwright.report.answer import problem_as_built, setting_of
+
+STEP_DEG = 0.5
+DARKEST = 300  # times fewer beams than the most: the same as in density.png
+WORST = 0.9  # of the axes: the useless ones would take all shades for themselves
+# the palette: shades of the map, then what is no shade
+SHADES = 250
+OUTLINE, HALO, MASKED, HATCH, NOTHING = range(SHADES, SHADES + 5)
+PLAIN = [(17, 17, 17), (255, 255, 255), (221, 221, 221), (119, 119, 119), (255, 255, 255)]
+HATCH_CELLS = 12
+MOST_LEVELS = 8
+BESIDE_DEG, STEEPEST_DEG = 25.0, 50.0  # of the camera: a ball looks round from beside
+UPRIGHT = 0.05  # a middle less far from the vertical, or from nowhere, has no yaw
+
+Indices = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One picture of the sphere.
+
+    Attributes:
+        title: what it shows.
+        low: of its scale, the dark end, in words.
+        high: the bright end.
+        picture: PNG as a data address.
+    """
+
+    title: str
+    low: str
+    high: str
+    picture: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """The pictures of one build.
+
+    Attributes:
+        views: at least one.
+        axis_world: direction of the rotation axis.
+        look_deg: yaw and pitch of the camera at the start, somewhat beside the middle of what counts.
+    """
+
+    views: tuple[View, ...]
+    axis_world: tuple[float, ...]
+    look_deg: tuple[float, float]
+
+    def data(self) -> dict[str, Any]:
+        """What the page needs beside the pictures, ready for JSON."""
+        views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.views]
+        return {"axis": list(self.axis_world), "look_deg": list(self.look_deg), "views": views}
+
+
+def sphere_of(loaded: LoadedTask, angles: AngleSet, axes: Array | None) -> Sphere:
+    """Density of the scanner and of the standard alignments on one scale, J over the axes, and where the axis points.
+
+    Args:
+        loaded: the task.
+        angles: what was built.
+        axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
+
+    Raises:
+        TaskError: no direction of the task has a weight.
+    """
+    problem, setting = problem_as_built(loaded, angles), setting_of(angles)
+    directions, shape = _directions()
+    weight = problem.field.weight_at(directions).reshape(shape)
+    masked = problem.field.masked_at(directions).reshape(shape)
+    views = _densities(problem, {"this scanner": setting} | standard_settings(), directions, weight, masked)
+    if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
+        views.append(_over_axes(axes, loaded.task.angles.step_deg, directions, shape))
+    axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
+    solid_angle = np.sqrt(1 - directions[:, 2] ** 2)
+    return Sphere(tuple(views), axis, _look((weight.ravel() * solid_angle) @ directions))
+
+
+def _look(middle: Array) -> tuple[float, float]:
+    """Where the camera stands for what is about a direction, of any length: yaw and pitch [deg]."""
+    x, y, z = middle / max(float(np.linalg.norm(middle)), 1e-12)
+    across = float(np.hypot(x, y))
+    yaw = np.degrees(np.arctan2(y, x)) if across > UPRIGHT else 0.0
+    pitch = np.clip(np.degrees(np.arctan2(z, across)), -STEEPEST_DEG, STEEPEST_DEG) if across + abs(z) > UPRIGHT else 0
+    return round(float(yaw)) + BESIDE_DEG, float(round(float(pitch)))
+
+
+def _directions() -> tuple[Array, tuple[int, int]]:
+    """Unit vectors of the cells of a picture, shape (n, 3), and its rows and columns."""
+    theta = np.radians(np.arange(STEP_DEG / 2, 180, STEP_DEG))
+    phi = np.radians(np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG))
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3), t.shape
+
+
+def _densities(
+    problem: Problem, settings: dict[str, Array], directions: Array, weight: Array, masked: NDArray[np.bool_]
+) -> list[View]:
+    maps = {
+        name: mean_density_at(problem, angles, directions).reshape(weight.shape) for name, angles in settings.items()
+    }
+    highest = max(float(density.max()) for density in maps.values())
+    scale = LogNorm(max(1.0, highest / DARKEST), max(highest, 2.0), clip=True)
+    words = f"{scale.vmin:,.0f} beams or fewer", f"{scale.vmax:,.0f}"
+    return [
+        View(f"density of {name}", *words, _png(_framed(_shades(density, scale, density < 1e-9), weight, masked)))
+        for name, density in maps.items()
+    ]
+
+
+def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int, int]) -> View:
+    """Lowest J about the nearest axis of the grid; nothing where none is near."""
+    known = axes[np.isfinite(axes[:, 2])]
+    known = known[np.argsort(known[:, 2], kind="stable")]
+    points = np.round(R_world_rot(*np.radians(known[:, :2].T))[:, :, 2], 9)
+    _, first = np.unique(points, axis=0, return_index=True)  # the lowest J of several ways to name an axis
+    distance, nearest = cKDTree(points[first]).query(directions)
+    J = known[first, 2][nearest].reshape(shape)
+    best, worst = float(known[0, 2]), float(np.quantile(known[:, 2], WORST))
+    scale = Normalize(-max(worst, best + 1e-9), -best, clip=True)
+    far = (distance > 0.75 * np.radians(step_deg)).reshape(shape)
+    return View(
+        "J over the direction of the axis", f"J {worst:.3f} or more", f"{best:.3f}", _png(_shades(-J, scale, far))
+    )
+
+
+def _shades(values: Array, scale: Normalize, nothing: NDArray[np.bool_]) -> Indices:
+    """Palette entries of values, the brightest shade for the highest."""
+    shade = np.minimum(SHADES - 1, np.asarray(scale(values)) * SHADES)
+    return np.where(nothing, NOTHING, shade).astype(np.uint8)
+
+
+def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indices:
+    """Masked directions hatched, a dark line on a bright one where the weight changes."""
+    row, column = np.indices(shades.shape)
+    hatch = (row + column) % HATCH_CELLS < HATCH_CELLS // 4
+    out = np.where(masked, np.where(hatch, HATCH, MASKED), shades).astype(np.uint8)
+    if len(np.unique(weight)) > MOST_LEVELS:  # a map of many: its outline
+        weight = weight > 0
+    edge = (weight != np.roll(weight, 1, axis=1)) | (weight != np.vstack([weight[:1], weight[:-1]]))
+    out[_wider(_wider(edge)) & ~masked] = HALO
+    out[_wider(edge) & ~masked] = OUTLINE
+    return out
+
+
+def _wider(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """By one cell to every side; phi wraps."""
+    mask = mask | np.roll(mask, 1, axis=1) | np.roll(mask, -1, axis=1)
+    above, below = np.zeros_like(mask), np.zeros_like(mask)
+    above[1:], below[:-1] = mask[:-1], mask[1:]
+    return np.asarray(mask | above | below)
+
+
+def _png(indices: Indices) -> str:
+    image = Image.fromarray(indices)
+    image.putpalette(_palette())
+    stream = io.BytesIO()
+    image.save(stream, format="PNG", optimize=True)
+    return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
+
+
+def _palette() -> list[int]:
+    shades = colormaps["cividis"](np.linspace(0, 1, SHADES))[:, :3]
+    return [int(value) for value in (shades * 255).round().ravel()] + [value for colour in PLAIN for value in colour]

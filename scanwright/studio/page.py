@@ -1,0 +1,285 @@
+"""The studio: a person drags the angles or paints what matters, and sees at once what it comes to.
+
+Three threads follow the hand, each doing only the newest wish: one judges the setting (J, gaps, the colours of the
+sphere), one takes paint into the task, the makers' have parts and scans made in other processes. The search and a build
+run beside them. Everybody who has the page sees and moves the same setting.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import viser
+
+from design.angles import standard_settings
+from design.errors import ScanwrightError, TaskError
+from design.frames import Array
+from design.objective.problem import problem_of
+from design.search.optimum import optimum_of
+from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.studio.panel import panel_html
+from scanwright.studio.panel.controls import BRUSHES, NO_SCENE, TASK_SCENE, Controls, lay_out, put, scenes_of
+from scanwright.studio.panel.facts import Facts, Judge, judge_of
+from scanwright.studio.panel.kept_settings import Kept
+from scanwright.studio.panel.saving import Saving
+from scanwright.studio.state import Dab, Setting, painted, setting_of
+from scanwright.studio.view.latest_only import Newest
+from scanwright.studio.view.makers import Makers, Order, Shows
+from scanwright.studio.view.sphere import direction_hit, highest_density
+from scanwright.studio.view.stage import SIDES, Stage
+from scanwright.studio.view.workbench import Body, Workbench
+
+SEARCH_STEPS = 9  # lines that a search says
+STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
+
+
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """What is being judged: a task, and the paint on it."""
+
+    base: LoadedTask
+    dabs: tuple[Dab, ...]
+
+
+class Studio:
+    """One page. `saved_to` is the only folder it writes task files to, `out` holds the builds."""
+
+    def __init__(
+        self, server: viser.ViserServer, loaded: LoadedTask, bench: Workbench, saved_to: Path, out: Path
+    ) -> None:
+        self._server, self._first = server, loaded
+        self._canvas = Canvas(loaded, ())
+        self.judge: Judge = judge_of(loaded, problem_of(loaded))
+        self.facts: Facts | None = None
+        start = setting_of(np.degrees(standard_settings()["rolling"]))
+        self.stage = Stage(server)
+        names = shipped_tasks()
+        own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
+        self._tasks = [own, *(name for name in names if name != own)]
+        self.controls: Controls = lay_out(server.gui, loaded, self._tasks, start)
+        self.kept = Kept(self.controls, self.move)
+        self.saving = Saving(self.controls, saved_to, out)
+        self.judging: Newest[Setting] = Newest("judge", self._follow, self._rest)
+        self.painting: Newest[Canvas] = Newest("paint", self._take, self._rejudge)
+        self.makers = Makers(bench, Shows(self._show_bodies, self._show_points, self._show_making))
+        self._connect()
+        self._taken()
+        self._rejudge(self._canvas)
+
+    def close(self) -> None:
+        """End the threads, the processes and a build that runs."""
+        self.saving.close()
+        for worker in (self.painting, self.judging, self.makers):
+            worker.close()
+
+    @property
+    def setting(self) -> Setting:
+        """Where the sliders stand."""
+        return setting_of([slider.value for slider in self.controls.angles])
+
+    def say(self, text: str, bad: bool = False) -> None:
+        """One line under the facts."""
+        self.controls.note.content = panel_html.note_html(text, bad=bad) if text else ""
+
+    def move(self, setting: Setting) -> None:
+        """Move the sliders."""
+        for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
+            put(slider, angle)
+        self.judging.wish(setting)
+
+    def dab(self, ray_origin: Any, ray_direction: Any) -> None:
+        """Touch the sphere with the brush where a ray from the camera meets it."""
+        c = self.controls
+        hit = direction_hit(ray_origin, ray_direction, inside=self.stage.inside)
+        if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
+            return
+        radius_deg = float(np.clip(c.radius.value, 1, 60))
+        dabs = self._canvas.dabs
+        if dabs and np.dot(dabs[-1].direction, hit) > np.cos(np.radians(STROKE * radius_deg)):
+            return
+        x, y, z = (float(value) for value in hit)
+        value = float(np.clip(c.weight.value, 0.01, 1000.0))
+        self._repaint((*dabs, Dab((x, y, z), radius_deg, c.brush.value, value)))  # type: ignore[arg-type]
+
+    def _painted(self) -> LoadedTask:
+        return painted(self._canvas.base, self._canvas.dabs)
+
+    def _keep(self) -> None:
+        self.say(f"kept as {self.kept.keep(self.judge, self.setting)}: see Compare")
+
+    def _connect(self) -> None:
+        c = self.controls
+
+        async def moved(_: Any) -> None:
+            self.judging.wish(self.setting)
+
+        for slider in c.angles:
+            slider.on_update(moved)
+        c.task.on_update(self._told(self._change_task))
+        c.painting.on_update(self._told(self._arm))
+        c.look.on_update(self._told(self._look))
+        c.scanner.on_update(self._told(self._show_scanner))
+        c.scene.on_update(self._told(self._change_scene))
+        for button, act in (
+            (c.optimise, self._optimise),
+            (c.keep, self._keep),
+            (c.undo, lambda: self._repaint(self._canvas.dabs[:-1])),
+            (c.clear, lambda: self._repaint(())),
+            (c.restore, self.kept.restore),
+            (c.remove, self.kept.remove),
+            (c.save, lambda: self.saving.save(self._painted(), self.setting)),
+            (c.build, lambda: self.saving.build(self._painted(), self.setting)),
+        ):
+            button.on_click(self._told(act))
+
+    def _told(self, act: Callable[[], Any]) -> Callable[[Any], None]:
+        """What goes wrong is said on the page."""
+
+        @functools.wraps(act)
+        def guarded(_: Any) -> None:
+            try:
+                act()
+            except ScanwrightError as error:
+                self.say(str(error), bad=True)
+
+        return guarded
+
+    # The setting
+
+    def _follow(self, setting: Setting) -> None:
+        judge = self.judge
+        self._tell(judge.quick(setting))
+        self.stage.colour(judge.problem, setting, self._highest)
+
+    def _rest(self, setting: Setting) -> None:
+        self._order()
+        exact = self.judge.exact(setting)
+        self._tell(exact)
+        self._tell(self.judge.settled(exact))
+
+    def _tell(self, facts: Facts) -> None:
+        self.facts = facts
+        self.controls.facts.content = panel_html.facts_html(facts, self.judge.problem.objective.name == "log")
+        self._server.flush()
+
+    # The task and the paint on it
+
+    def _change_task(self) -> None:
+        name = self.controls.task.value
+        if name not in self._tasks:  # a page could ask for any file of this computer
+            raise TaskError(f"task '{name}': none of those that can be chosen")
+        loaded = self._first if name in (str(self._first.source), self._first.task.name) else load_task(Path(name))
+        self._canvas = Canvas(loaded, ())
+        self.kept.clear()
+        self.controls.scene.options = scenes_of(loaded)
+        put(self.controls.name, f"{loaded.task.name}_mine"[:64])
+        self.painting.wish(self._canvas)
+
+    def _repaint(self, dabs: tuple[Dab, ...]) -> None:
+        painted(self._canvas.base, dabs)  # refuses what no task could hold
+        self._canvas = replace(self._canvas, dabs=dabs)
+        self.painting.wish(self._canvas)
+
+    def _take(self, canvas: Canvas) -> None:
+        try:
+            loaded = painted(canvas.base, canvas.dabs)
+            judge = judge_of(loaded, problem_of(loaded))
+        except ScanwrightError as error:
+            self.say(str(error), bad=True)
+            return
+        self.judge = judge
+        self._taken()
+
+    def _taken(self) -> None:
+        settings = [*standard_settings().values(), self.setting.angles_rad]
+        self._highest = max(highest_density(self.judge.problem, angles) for angles in settings)
+        self.controls.scale.content = panel_html.scale_html(self._highest)
+        self.stage.outline(self.judge.problem)
+        masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
+        count = len(self._canvas.dabs)
+        self.controls.painted.content = panel_html.note_html(f"{count} dabs on the task, {masks} of them hide")
+        self.judging.wish(self.setting)
+
+    def _rejudge(self, _: Canvas) -> None:
+        """The settings that were kept, by the task as it is now."""
+        self.kept.judge(self.judge)
+
+    def _arm(self) -> None:
+        """Take the brush in hand, or put it away so that dragging turns the view again."""
+        sphere = self.stage.sphere
+        sphere.remove_click_callback()
+        sphere.remove_drag_callback()
+        if not self.controls.painting.value:
+            return
+
+        @sphere.on_click
+        async def _(event: Any) -> None:
+            self._told(lambda: self.dab(event.ray_origin, event.ray_direction))(event)
+
+        @sphere.on_drag
+        async def _(event: Any) -> None:
+            eye = np.asarray(event.client.camera.position)
+            self._told(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
+
+    def _look(self) -> None:
+        if self.controls.look.value in SIDES:
+            self.stage.look(self.controls.look.value)
+
+    # Other processes and long work
+
+    def _order(self) -> None:
+        scene = {NO_SCENE: "", TASK_SCENE: "task"}.get(self.controls.scene.value, "room")
+        loaded, problem = self.judge.loaded, self.judge.problem
+        self.makers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
+
+    def _show_bodies(self, setting: Setting, turning: bool, bodies: tuple[Body, ...]) -> None:
+        self.stage.show_bodies(setting, turning, bodies)
+
+    def _show_points(self, _: Setting, points_m: Array) -> None:
+        self.stage.show_points(points_m)
+
+    def _show_making(self, text: str, bad: bool) -> None:
+        self.controls.making.content = panel_html.note_html(text, bad=bad) if text else ""
+
+    def _show_scanner(self) -> None:
+        self.stage.show_scanner(self.controls.scanner.value)
+        self._order()
+
+    def _change_scene(self) -> None:
+        if self.controls.scene.value == NO_SCENE:
+            self.stage.show_points(np.empty((0, 3)))
+        self._order()
+
+    def _optimise(self) -> None:
+        c, canvas, judge = self.controls, self._canvas, self.judge
+        if c.optimise.disabled:
+            return
+        c.optimise.disabled = True
+        c.progress.visible, c.progress.animated = True, True
+        said = 0
+
+        def told(line: str) -> None:
+            nonlocal said
+            said += 1
+            put(c.progress, min(100.0 * said / SEARCH_STEPS, 95.0))
+            self.say(line)
+
+        def run() -> None:
+            try:
+                optimum = optimum_of(painted(canvas.base, canvas.dabs), told)
+                if canvas == self._canvas:
+                    self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
+                    self.move(setting_of(optimum.search.best[0].angles_deg))
+                    self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}")
+            except TaskError as error:
+                self.say(str(error), bad=True)
+            finally:
+                c.optimise.disabled, c.progress.visible = False, False
+
+        Thread(target=run, name="optimise", daemon=True).start()

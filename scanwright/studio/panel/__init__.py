@@ -1,0 +1,1 @@
+"""The studio's panel: sliders, facts, kept settings, saving and building."""

@@ -1,0 +1,115 @@
+"""What the studio tells of a setting, fast enough to follow a hand.
+
+While an angle is dragged J is the real one, mean of g over true counts, on fewer nodes: it carries a larger error, and
+that is shown. When the hand rests it is `design.objective.score.score`, the number that `scanwright evaluate` prints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from design.angles import standard_settings
+from design.errors import TaskError
+from design.evaluation.gaps import shortest_period_s
+from design.objective.problem import NODES, Problem
+from design.objective.score import Score, score, score_on
+from design.search.limits import blind_cones_deg, line_gaps_deg
+from design.task.task import LoadedTask
+from scanwright.studio.state import Setting
+
+DRAG_NODES = 2187
+DRAG_PERIOD_NODES = 243
+WALL_M = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """A setting judged.
+
+    Attributes:
+        setting: the angles.
+        J: and its error.
+        exact: whether J is the one that `evaluate` prints; else it stands on fewer nodes.
+        blind_cone_deg: half angle of the wider one about the axis.
+        gap_deg: widest distance between neighbouring scan lines.
+        blind_weight: share of the weight that is never seen.
+        period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
+        density: beams per ball that the period is for.
+        standard: J of rolling and pitching for the same task.
+    """
+
+    setting: Setting
+    J: float
+    J_error: float
+    exact: bool
+    blind_cone_deg: float
+    gap_deg: float
+    blind_weight: float
+    period_s: float
+    density: int
+    standard: dict[str, float]
+
+    @property
+    def gap_mm(self) -> float:
+        """The widest gap on a wall that faces the scanner at `WALL_M`."""
+        return math.radians(self.gap_deg) * WALL_M * 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """A task ready to judge settings: its numbers, and J of the standard alignments."""
+
+    loaded: LoadedTask
+    problem: Problem
+    standard: dict[str, float]
+
+    def quick(self, setting: Setting) -> Facts:
+        """While the hand moves."""
+        return self._facts(setting, score_on(self.problem, setting.angles_rad, DRAG_NODES), exact=False)
+
+    def exact(self, setting: Setting) -> Facts:
+        """When it rests; the period is still the quick one."""
+        return self._facts(setting, score(self.problem, setting.angles_rad), exact=True)
+
+    def settled(self, facts: Facts) -> Facts:
+        """The same with the period looked for as closely as everywhere else."""
+        if math.isnan(facts.period_s):
+            return facts
+        return replace(facts, period_s=self._period_s(facts.setting, NODES))
+
+    def _facts(self, setting: Setting, found: Score, *, exact: bool) -> Facts:
+        plane = setting.angles_rad[None, 2:]
+        turns = self.loaded.task.motion.mode in ("spin", "shortest")
+        within_reach = found.blind_weight == 0 and turns
+        return Facts(
+            setting=setting,
+            J=found.J,
+            J_error=found.J_error,
+            exact=exact,
+            blind_cone_deg=float(blind_cones_deg(self.problem, plane)[0]),
+            gap_deg=float(line_gaps_deg(self.problem, plane)[0]),
+            blind_weight=found.blind_weight,
+            period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
+            density=self._least,
+            standard=self.standard,
+        )
+
+    @property
+    def _least(self) -> int:
+        return math.ceil(self.loaded.task.limits.min_density or 1)
+
+    def _period_s(self, setting: Setting, nodes: int) -> float:
+        rate_hz = self.loaded.lidar.scan_rate_hz
+        try:
+            return shortest_period_s(self.problem, setting.angles_rad, rate_hz, self._least, nodes)
+        except TaskError:  # part of the region is out of reach at any speed
+            return math.nan
+
+
+def judge_of(loaded: LoadedTask, problem: Problem) -> Judge:
+    """Judge the standard alignments once; they stay while the task does."""
+    standard = {name: score(problem, np.asarray(angles)).J for name, angles in standard_settings().items()}
+    return Judge(loaded, problem, standard)

@@ -1,0 +1,64 @@
+"""Save: the task file of what is on the page, and the build of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from design.errors import TaskError
+from design.task.task import LoadedTask
+from scanwright.studio.panel.building import Building, build_command
+from scanwright.studio.panel.controls import Controls, put
+from scanwright.studio.panel.panel_html import note_html
+from scanwright.studio.state import Setting, save_task, task_text
+
+
+class Saving:
+    """The controls under Save. `folder` is the only one that it writes to, `out` holds the builds."""
+
+    def __init__(self, controls: Controls, folder: Path, out: Path) -> None:
+        self._controls, self._folder, self._out = controls, folder, out
+        self._building: Building | None = None
+
+    def save(self, loaded: LoadedTask, setting: Setting) -> Path:
+        """Write the task file, with the angles fixed at the setting where that is ticked.
+
+        Raises:
+            TaskError: as `save_task`; a file that says the same already is as good as written.
+        """
+        c = self._controls
+        name, fixed = c.name.value, setting if c.fixed.value else None
+        text = task_text(loaded, self._folder, name, fixed)  # refuses a name that is a path
+        path = self._folder / f"{name}.toml"
+        if not (path.is_file() and path.read_text(encoding="utf-8") == text):
+            save_task(loaded, self._folder, name, fixed, overwrite=c.overwrite.value)
+        c.built.content = note_html(f"saved {path.name}")
+        return path
+
+    def build(self, loaded: LoadedTask, setting: Setting) -> None:
+        """Save, and build the file in a process of its own.
+
+        Raises:
+            TaskError: as `save`, or one is being built.
+        """
+        c = self._controls
+        if self._building is not None and self._building.runs:
+            raise TaskError("build: one runs already")
+        path = self.save(loaded, setting)
+        put(c.building, 0.0)
+        c.building.visible = True
+
+        def told(share: float, line: str) -> None:
+            put(c.building, 100 * share)
+            c.built.content = note_html(line)
+
+        def done(code: int, line: str) -> None:
+            c.building.visible = False
+            end = f"built {self._out / path.stem}: open its report.html" if code == 0 else f"build ended: {line}"
+            c.built.content = note_html(end, bad=code != 0)
+
+        self._building = Building(build_command(path, self._out), told, done)
+
+    def close(self) -> None:
+        """End a build that runs."""
+        if self._building is not None:
+            self._building.stop()

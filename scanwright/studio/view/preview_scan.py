@@ -1,0 +1,48 @@
+"""A scan of a scene without its devices: what the studio shows while the angles are still being chosen."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design import frames
+from design.catalogue.catalogue import Lidar, load_catalogue
+from design.frames import Rx, Ry, Rz
+from design.scene.ray_caster import Scene, load_scene, scene_of
+from design.task.shapes import Placed
+from firmware_io.twins.world import furnished_room, measure, range_model, see
+from scanwright.studio.view.workbench import View
+
+SEED = 0
+
+
+def glimpse(view: View) -> NDArray[np.float32]:
+    """Points of one full scan with the noise of the data sheet, in the world [m], shape (n, 3).
+
+    Raises:
+        SceneError: the scene cannot be read.
+        TaskError: the lidar is not in the catalogue.
+    """
+    lidar = load_catalogue().get(view.angles.sensor, Lidar)
+    bearing_rad = lidar.bearings_rad()[:: view.every]
+    beams = np.tile(bearing_rad, len(view.joint_rad))
+    joint_rad = np.repeat(view.joint_rad, len(bearing_rad))
+    hits = see(_scene(view.scene, view.folder), view.angles, beams, joint_rad)
+    range_m = measure(hits, range_model(lidar), np.random.default_rng(SEED)).range_m
+    back = np.isfinite(range_m)
+    in_plane = np.stack([np.cos(beams), np.sin(beams)], axis=-1)[back]
+    T = view.angles.T_world_laser(joint_rad[back])
+    return (range_m[back, None] * np.einsum("nij,nj->ni", T[:, :3, :2], in_plane) + T[:, :3, 3]).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _scene(placed: Placed | None, folder: Path) -> Scene:
+    if placed is None:
+        return scene_of(furnished_room())
+    roll, pitch, yaw = np.radians(placed.rpy_deg)
+    R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
+    T_world_mesh = frames.rigid(R_mesh_world.T, -R_mesh_world.T @ np.array(placed.sensor_m))
+    return load_scene(folder / placed.file, placed.unit_m, T_world_mesh)

@@ -1,0 +1,131 @@
+"""The sphere about the scanner: tiles coloured by density, and the edges of what matters and of what is hidden."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import contourpy
+import numpy as np
+from numpy.typing import NDArray
+
+from design.evaluation.coverage import mean_density_at
+from design.frames import Array
+from design.objective.problem import Problem
+from design.sphere.directions import spiral
+from design.sphere.regions import Field
+
+TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second
+RADIUS_M = 0.5
+OVERLAP = 1.25  # of the hexagons, so that no seam shows
+BLIND = (236, 236, 240)
+LEAST_OF_HIGHEST = 300  # the scale of `density.png`
+COLOUR_STOPS = (  # dark to light, readable in grey and for the colour-blind: a few stops of cividis
+    (0, 34, 78),
+    (50, 69, 108),
+    (102, 105, 112),
+    (150, 144, 119),
+    (205, 189, 104),
+    (253, 231, 55),
+)
+EDGE_STEP_DEG = 1.0
+EDGE_LIFT = 0.996  # of the radius: edges are drawn just inside the tiles, and just outside
+
+Colours = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Tiles:
+    """Hexagons of equal area.
+
+    Attributes:
+        directions: their middles, shape (n, 3).
+        corners_m: of the one at +z, about its middle, shape (6, 3).
+        faces: its triangles, shape (4, 3).
+        wxyz: what turns +z to each direction, shape (n, 4).
+    """
+
+    directions: Array
+    corners_m: Array
+    faces: NDArray[np.uint32]
+    wxyz: Array
+
+
+def tiles() -> Tiles:
+    """The sphere of `RADIUS_M` in tiles."""
+    directions = spiral(TILES)
+    side = OVERLAP * RADIUS_M * np.sqrt(4 * np.pi / TILES / (1.5 * 3**0.5))
+    around = np.arange(6) * np.pi / 3
+    rim = side * np.stack([np.cos(around), np.sin(around), np.zeros(6)], axis=1)
+    faces = [[0, i, i + 1] for i in range(1, 5)]
+    x, y, z = directions.T  # the spiral never reaches -z, where this has no value
+    w = np.sqrt((1 + z) / 2)
+    wxyz = np.stack([w, -y / (2 * w), x / (2 * w), np.zeros(TILES)], axis=1)
+    return Tiles(directions, rim, np.array(faces, np.uint32), wxyz)
+
+
+def highest_density(problem: Problem, angles_rad: Array) -> float:
+    """Highest mean beams per ball of a setting on the tiles: the top of a colour scale."""
+    return float(mean_density_at(problem, angles_rad, spiral(TILES)).max())
+
+
+def density_colours(problem: Problem, angles_rad: Array, directions: Array, highest: float) -> Colours:
+    """Colour of the mean density at directions (n, 3) on a logarithmic scale that ends at `highest`, shape (n, 3).
+
+    What no beam reaches is pale, what the robot hides is hatched by its edge only.
+    """
+    density = mean_density_at(problem, angles_rad, directions)
+    lowest = max(1.0, highest / LEAST_OF_HIGHEST)
+    level = np.log(np.clip(density, lowest, highest) / lowest) / max(np.log(highest / lowest), 1e-9)
+    return np.where(density[:, None] > 1e-9, ramp(level), np.array(BLIND, np.uint8))
+
+
+def ramp(level: Array) -> Colours:
+    """Colours of levels 0 .. 1, shape (n, 3); NaN counts as 0."""
+    stops = np.array(COLOUR_STOPS, dtype=float)
+    at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
+    columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
+    return np.stack(columns, axis=1).astype(np.uint8)
+
+
+def edges(field: Field) -> tuple[Array, Array]:
+    """Edges of the weighted regions and of the masks as line segments on the unit sphere, (n, 2, 3) each."""
+    theta = np.radians(np.arange(0, 180 + EDGE_STEP_DEG / 2, EDGE_STEP_DEG))
+    phi = np.radians(np.arange(-180, 180 + EDGE_STEP_DEG / 2, EDGE_STEP_DEG))
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    grid = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3)
+    weight = field.weight_at(grid).reshape(t.shape)
+    masked = field.masked_at(grid).reshape(t.shape).astype(float)
+    return _segments(weight, theta, phi), _segments(masked, theta, phi)
+
+
+def _segments(table: Array, theta: Array, phi: Array) -> Array:
+    levels = np.unique(table)
+    generator = contourpy.contour_generator(phi, theta, table, line_type=contourpy.LineType.Separate)
+    found = [np.empty((0, 2, 3))]
+    for level in (levels[:-1] + levels[1:])[:8] / 2:  # a map has many: a few tell its shape
+        for line in generator.lines(float(level)):
+            p, t = np.asarray(line).T
+            points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=1)
+            found.append(np.stack([points[:-1], points[1:]], axis=1))
+    return np.concatenate(found)
+
+
+def direction_hit(origin_m: Array, direction: Array, *, inside: bool) -> Array | None:
+    """Where on the sphere a ray from the camera meets it, as a unit vector; None where it passes by.
+
+    `inside`: the far wall, seen from within, and not the near one.
+    """
+    origin, along = np.asarray(origin_m, float), np.asarray(direction, float)
+    length = float(np.linalg.norm(along))
+    if not (np.isfinite(origin).all() and np.isfinite(length)) or length == 0:
+        return None
+    along = along / length
+    middle = -float(origin @ along)
+    square = RADIUS_M**2 - float(origin @ origin) + middle**2
+    if square < 0:
+        return None
+    distance = middle + np.sqrt(square) * (1 if inside else -1)
+    if distance <= 0:
+        distance = middle + np.sqrt(square)
+    point = origin + distance * along
+    return None if distance <= 0 else point / RADIUS_M

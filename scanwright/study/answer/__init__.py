@@ -1,0 +1,1 @@
+"""What a study answers: columns, the trade-off, tables and pictures."""

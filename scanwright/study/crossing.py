@@ -1,0 +1,179 @@
+"""All combinations of a study, one task record each, made when they are asked for: there may be millions."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from design.catalogue.catalogue import Catalogue, SlipRing
+from design.errors import TaskError
+from design.motion import Spin, Sweep
+from design.record import explain
+from design.task.task import LoadedTask, Task, check_products
+from scanwright.study.study import NO_RING, LoadedStudy, Mounting
+
+LONGEST_NAME = 64  # of a task
+AXES = ("task", "mounting", "sensor", "servo", "slip_ring", "printer", "period")
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """One candidate before any work.
+
+    Attributes:
+        number: its place in the study.
+        name: of the task record, and of its build folder.
+        group: the number of its task: only candidates of one task compete.
+        choice: what was chosen on each axis, empty where the task decides.
+        loaded: the task, None where it is refused.
+        refused: why these products can never do this task.
+    """
+
+    number: int
+    name: str
+    group: int
+    choice: dict[str, str]
+    loaded: LoadedTask | None
+    refused: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """The product of the axes of a study, the last one changing fastest."""
+
+    loaded: LoadedStudy
+
+    @property
+    def axes(self) -> dict[str, tuple[Any, ...]]:
+        """What each axis offers; (None,) leaves the task as it is."""
+        study = self.loaded.study
+        lists: tuple[tuple[Any, ...], ...] = (
+            self.loaded.tasks,
+            study.mounting,
+            study.sensors,
+            study.servos,
+            study.slip_rings,
+            study.printers,
+            study.periods_s,
+        )
+        return {axis: values or (None,) for axis, values in zip(AXES, lists, strict=True)}
+
+    def __len__(self) -> int:
+        return math.prod(len(values) for values in self.axes.values())
+
+    def __iter__(self) -> Iterator[Combination]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, number: int) -> Combination:
+        axes = self.axes
+        places = np.unravel_index(number, [len(values) for values in axes.values()])
+        chosen = {axis: values[int(place)] for (axis, values), place in zip(axes.items(), places, strict=True)}
+        words = {axis: _word(value) for axis, value in chosen.items()}
+        varied = [words[axis] for axis, values in axes.items() if len(values) > 1 or axis == "task"]
+        base: LoadedTask = chosen["task"]
+        name = _named(varied)
+        task: Task | None = None
+        refused = ""
+        try:
+            task = _merged(base.task, chosen, name, self._own_files())
+            products = Catalogue(base.products.products | self._own_products())
+            check_products(task, products, base.source)
+            _check_motion(replace(base, task=task, products=products))
+        except ValidationError as error:
+            refused = explain(error, name, Task)
+        except TaskError as error:
+            refused = str(error).removeprefix(f"{base.source}: ")
+        loaded = None if refused or task is None else _trimmed(replace(base, task=task, products=products))
+        return Combination(number, name, int(places[0]), words, loaded, refused)
+
+    def _own_products(self) -> dict[str, Any]:
+        return self.loaded.products.products if self.loaded.study.catalogue else {}
+
+    def _own_files(self) -> tuple[str, ...]:
+        """The catalogue files of the study, as a task names them that may lie anywhere."""
+        return tuple(str((self.loaded.source.parent / file).resolve()) for file in self.loaded.study.catalogue)
+
+
+def _merged(task: Task, chosen: dict[str, Any], name: str, catalogue: tuple[str, ...]) -> Task:
+    """The task with what a combination puts in place of its own.
+
+    Raises:
+        ValidationError: the result is no task.
+        TaskError: its motion has no period.
+    """
+    table = task.model_dump(exclude_none=True) | {"name": name, "catalogue": (*task.catalogue, *catalogue)}
+    for axis in ("sensor", "servo", "slip_ring", "printer"):
+        if chosen[axis] is not None:
+            table[axis] = chosen[axis]
+    if table.get("slip_ring") == NO_RING or task.motion.mode == "sweep":  # a ring would lie in a drawer
+        table.pop("slip_ring", None)
+    mounting: Mounting | None = chosen["mounting"]
+    if mounting is not None:
+        table["angles"] = table["angles"] | mounting.angles.model_dump(exclude_unset=True)
+        table["limits"] = table["limits"] | mounting.limits.model_dump(exclude_unset=True)
+    period = chosen["period"]
+    if period is not None:
+        table["motion"] = _with_period(table["motion"], period)
+    return Task.model_validate(table)
+
+
+def _with_period(motion: dict[str, Any], period: float | str) -> dict[str, Any]:
+    if motion["mode"] == "stop_and_go":
+        raise TaskError(f"periods_s: {period}: a motion of mode 'stop_and_go' has no period")
+    if motion["mode"] == "sweep":
+        if period == "shortest":
+            raise TaskError("periods_s: 'shortest' is found for motion.mode = 'spin' only, this task sweeps")
+        return motion | {"period_s": period}
+    return {"mode": "shortest"} if period == "shortest" else {"mode": "spin", "period_s": period}
+
+
+def _check_motion(loaded: LoadedTask) -> None:
+    """Refuse what turns faster than its servo or its ring can, and what J cannot be told of."""
+    task, servo = loaded.task, loaded.servo
+    if loaded.warnings():
+        raise TaskError(loaded.warnings()[0])
+    if isinstance(task.motion, Spin):
+        rpm = 60 / task.motion.period_s
+        if task.slip_ring is not None:
+            ring = loaded.products.get(task.slip_ring, SlipRing)
+            if ring.max_rpm is not None and rpm > ring.max_rpm:
+                raise TaskError(f"slip_ring = '{ring.name}': turns at {ring.max_rpm:g} rpm at most, asked: {rpm:g}")
+    elif isinstance(task.motion, Sweep):
+        rpm = task.motion.cruise_deg_s / 6
+    else:
+        return
+    if rpm > servo.no_load_rpm:
+        raise TaskError(f"servo = '{servo.name}': turns at {servo.no_load_rpm:g} rpm without a load, asked: {rpm:g}")
+
+
+def _trimmed(loaded: LoadedTask) -> LoadedTask:
+    """With no products but its own, the bearings and the belts: it goes over the wire."""
+    task = loaded.task
+    names = [task.sensor, task.servo, task.slip_ring, task.printer]
+    names += [product.name for product in (*loaded.products.bearings(), *loaded.products.belts())]
+    return replace(loaded, products=Catalogue({name: loaded.products.products[name] for name in names if name}))
+
+
+def _word(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, LoadedTask):
+        return value.task.name
+    if isinstance(value, Mounting):
+        return value.name
+    return f"{value:g}s" if isinstance(value, float) else str(value)
+
+
+def _named(words: list[str]) -> str:
+    """A name for files: the words, their end replaced by a digest where they get too long."""
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", "-".join(filter(None, words)))
+    if len(name) <= LONGEST_NAME:
+        return name
+    return f"{name[: LONGEST_NAME - 9]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"

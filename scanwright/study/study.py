@@ -1,0 +1,131 @@
+"""The study file: what is crossed with what, and what the trade-off is between.
+
+Every list multiplies the candidates; one that is left out leaves each task as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from design.catalogue.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
+from design.errors import TaskError, suggest
+from design.motion import LONGEST_S
+from design.record import Record
+from design.task.named_record import named_record, names_in
+from design.task.task import AngleRanges, Limits, LoadedTask, load_task
+from scanwright.study.answer.columns import COLUMNS
+
+SHIPPED = Path(__file__).parent / "shipped"
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+NO_RING = "none"
+
+Period = Annotated[float, Field(strict=True, gt=0, le=LONGEST_S)] | Literal["shortest"]
+
+
+class Mounting(Record):
+    """How the scanner may be mounted: keys of `[angles]` and `[limits]` that take the place of those of a task."""
+
+    name: str = Field(pattern=NAME)
+    angles: AngleRanges = AngleRanges()
+    limits: Limits = Limits()
+
+
+class Study(Record):
+    """One study file with every default written out."""
+
+    name: str = Field(pattern=NAME)
+    tasks: tuple[str, ...] = Field(min_length=1, description="task files beside the study, or shipped tasks")
+    sensors: tuple[str, ...] = ()
+    servos: tuple[str, ...] = ()
+    slip_rings: tuple[str, ...] = Field(default=(), description="'none' for a scanner that needs none")
+    printers: tuple[str, ...] = ()
+    periods_s: tuple[Period, ...] = ()
+    mounting: tuple[Mounting, ...] = ()
+    catalogue: tuple[str, ...] = ()
+    front: tuple[str, ...] = Field(min_length=1, description="columns that are traded for each other")
+    winners: int = Field(
+        default=1, ge=0, description="built of each task: the first of its front, by its columns in their order"
+    )
+    time_limit_s: float = Field(default=900.0, gt=0, description="that one candidate may take on a worker")
+
+    @field_validator("tasks", "sensors", "servos", "slip_rings", "printers", "periods_s", "front")
+    @classmethod
+    def _each_once(cls, values: tuple[str | float, ...]) -> tuple[str | float, ...]:
+        twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
+        if twice is not None:
+            raise ValueError(f"{twice!r} is named twice")
+        return values
+
+    @field_validator("periods_s", mode="before")
+    @classmethod
+    def _numbers_or_shortest(cls, periods: Any) -> Any:
+        wrong = [p for p in periods if isinstance(p, str) and p != "shortest"] if isinstance(periods, list) else []
+        if wrong:
+            raise ValueError(f"{wrong[0]!r} is no period: seconds, or 'shortest'")
+        return periods
+
+    @field_validator("front")
+    @classmethod
+    def _columns_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = next((name for name in names if name not in COLUMNS), None)
+        if unknown is not None:
+            raise ValueError(f"{unknown!r} is no column{suggest(unknown, COLUMNS)}")
+        return names
+
+    @model_validator(mode="after")
+    def _mountings_differ(self) -> Study:
+        names = [mounting.name for mounting in self.mounting]
+        if len(set(names)) < len(names):
+            raise ValueError("mounting: two of them have the same name")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedStudy:
+    """A study, the file it came from, its tasks, and its products."""
+
+    study: Study
+    source: Path
+    tasks: tuple[LoadedTask, ...]
+    products: Catalogue
+
+
+def load_study(path: Path) -> LoadedStudy:
+    """Read a study file, or a shipped study by its name.
+
+    Raises:
+        TaskError: the file is missing or malformed, a task cannot be read, or a product is unknown.
+    """
+    study, source = named_record(path, Study, SHIPPED, "study")
+    products = load_catalogue(*(source.parent / extra for extra in study.catalogue))
+    for field, kind in (("sensors", Lidar), ("servos", Servo), ("slip_rings", SlipRing), ("printers", Printer)):
+        for name in getattr(study, field):
+            if (field, name) == ("slip_rings", NO_RING):
+                continue
+            try:
+                products.get(name, kind)  # type: ignore[type-var]
+            except TaskError as error:
+                raise TaskError(f"{source}: {field}: {error}") from error
+    tasks = tuple(_task(source, name) for name in study.tasks)
+    names = [loaded.task.name for loaded in tasks]
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise TaskError(f"{source}: tasks: two of them have the name '{twice}': rename one in its file")
+    return LoadedStudy(study, source, tasks, products)
+
+
+def shipped_studies() -> list[str]:
+    """Names of the studies that come with the package."""
+    return names_in(SHIPPED)
+
+
+def _task(source: Path, name: str) -> LoadedTask:
+    beside = source.parent / name
+    try:
+        return load_task(beside if beside.is_file() or beside.suffix == ".toml" else Path(name))
+    except TaskError as error:
+        raise TaskError(f"{source}: tasks: {error}") from error

@@ -1,0 +1,48 @@
+"""Error against run time of the integrator behind the emulated servo (`dynamics.Solver`), over method and tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from design.accuracy.trials import Trial, timed
+from firmware_io.samples import Floats
+from firmware_io.twins.dynamics import Axis, Drive, Load, Plant, Solver
+
+METHODS: tuple[Literal["LSODA", "Radau", "BDF"], ...] = ("LSODA", "Radau", "BDF")
+TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
+REFERENCE = Solver("Radau", 1e-11)
+SECONDS = 2.0  # of motion: spun up from rest with a head that hangs to one side, through the backlash
+RATE_RAD_S = math.pi
+HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
+
+
+def solver_trials(plant: Plant, progress: Callable[[str], None]) -> Iterator[Trial]:
+    """Each method at each tolerance; the error is the farthest that the horn is from where the reference has it."""
+    asked_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
+
+    def run(solver: Solver) -> Floats:
+        axis = Axis(plant, HEAD, 0, solver=solver)
+        axis.drive(0, Drive("velocity", RATE_RAD_S))
+        return axis.angle_rad(asked_ns)
+
+    progress("motion of the servo, reference")
+    true = run(REFERENCE)
+    for method in METHODS:
+        for rtol in TOLERANCES:
+            progress(f"motion of the servo, {method} within {rtol:g}")
+            solver = Solver(method, rtol)
+            angle, seconds = timed(partial(run, solver))
+            yield Trial(
+                choice=f"{SECONDS:g} s of the emulated servo",
+                method=method,
+                setting=f"{rtol:g}",
+                error=float(np.degrees(np.abs(angle - true).max())),
+                unit="deg",
+                seconds=seconds,
+                chosen=solver == Solver(),
+            )

@@ -1,0 +1,64 @@
+"""`assembly.step`: names, colours, and the lidar's pose, read back by the kernel alone."""
+
+import cadquery as cq
+import numpy as np
+import pytest
+
+from cad.files.parts import build_parts
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+CASES = [(0, -90), (60, -45), (0, 0)]
+
+
+@pytest.fixture(scope="module", params=CASES, ids=str)
+def read_back(request, tmp_path_factory):
+    alpha, beta = request.param
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=alpha, beta_laser=beta),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="SNU11-P0210",
+    )
+    folder = tmp_path_factory.mktemp("assembly")
+    build_parts(scanner_of(angles, "sla", load_catalogue()), folder, lambda _: None)
+    a, b = np.radians([alpha, beta])
+    Ry = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+    Rx = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+    tree = cq.Assembly.importStep(str(folder / "assembly.step"))
+    return Ry @ Rx, {child.name: child for child in tree.children}
+
+
+def centre(child):
+    return np.array(cq.Shape.centerOfMass(child.toCompound()).toTuple())
+
+
+def test_names_and_colours(read_back):
+    _, parts = read_back
+    assert {"servo_shaft", "slip_ring_adapter", "alignment_linkage", "servo_case", "servo_horn"} <= parts.keys()
+    assert {"ring_stator", "ring_rotor", "lidar_body", "lidar_window", "lidar_cap", "lidar_cable_1"} <= parts.keys()
+    colours = {name: child.color for name, child in parts.items()}
+    assert all(colour is not None for colour in colours.values())
+    np.testing.assert_allclose(colours["alignment_linkage"].toTuple()[:3], (0.93, 0.45, 0.10), atol=1e-3)
+
+
+def test_the_lidar_faces_the_way_the_angles_say(read_back):
+    R, parts = read_back
+    window, cap = centre(parts["lidar_window"]), centre(parts["lidar_cap"])
+    np.testing.assert_allclose(window, 0, atol=1e-6)  # UTM-30LX: window 41 to 69, optical plane at 55
+    np.testing.assert_allclose((cap - window) / np.linalg.norm(cap - window), R[:, 2], atol=1e-9)
+    cables = (centre(parts["lidar_cable_1"]) + centre(parts["lidar_cable_2"])) / 2
+    rear = cables - (cables @ R[:, 2]) * R[:, 2]
+    np.testing.assert_allclose(rear / np.linalg.norm(rear), -R[:, 0], atol=1e-9)  # cables leave at the rear
+    left = centre(parts["lidar_cable_2"]) - centre(parts["lidar_cable_1"])
+    np.testing.assert_allclose(left / np.linalg.norm(left), R[:, 1], atol=1e-9)
+
+
+def test_the_servo_stands_behind_the_rotor_with_its_long_end_at_minus_y(read_back):
+    _, parts = read_back
+    case = centre(parts["servo_case"])
+    assert case[2] < centre(parts["servo_horn"])[2] < centre(parts["ring_rotor"])[2] < -50
+    assert -20 < case[1] < -15
+    np.testing.assert_allclose(centre(parts["ring_stator"])[:2], 0, atol=1e-6)

@@ -1,0 +1,131 @@
+"""What the parts hide of the fan, against rays cast by other code and against closed forms."""
+
+import io
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cad.assembly.assembly import make_parts, turns
+from cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
+from cad.geometry.mesh import mesh_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+from design.shadow import AXIS_STEPS, Refused, Shadow, Workshop, own_body_bytes
+
+PITCHING = (-90, 0, 90, 0)
+
+
+def scanner_for(alpha_rot, beta_rot, alpha, beta):
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="UH1256-02-0610-06S",
+    )
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+@pytest.fixture(scope="module")
+def pitching():
+    scanner = scanner_for(*PITCHING)
+    assembly = make_parts(scanner)
+    meshes = {name: mesh_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    return scanner, meshes, shadow_of(scanner, triangles_of(meshes))
+
+
+def rays(gamma):
+    """Middle rays of the pitching fan in the rotation frame: R_rot_laser = Rx(90 deg)."""
+    bearing = np.radians(np.arange(-540, 541) * 0.25)
+    fan = np.stack([np.cos(bearing), 0 * bearing, np.sin(bearing)], axis=1)
+    c, s = np.cos(gamma), np.sin(gamma)
+    return fan @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
+def other_caster(meshes):
+    bodies = [trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in meshes]
+    return trimesh.ray.ray_triangle.RayMeshIntersector(trimesh.util.concatenate(bodies))  # rtree and numpy, no embree
+
+
+def test_hidden_beams_are_those_of_another_caster_and_no_more_than_a_beam_is_wide(pitching):
+    _, meshes, shadow = pitching
+    assert shadow.stator.shape == (1081, AXIS_STEPS)
+    some = np.arange(0, 1081, 9)
+    rotor = other_caster([m for name, m in meshes.items() if turns(name) and name != "lidar_window"])
+    hidden = rotor.intersects_any(np.zeros((len(some), 3)), rays(0.0)[some])
+    assert shadow.beams[some][hidden].all()  # whose middle is hidden is hidden
+    grown = np.convolve(hidden, np.ones(5), "same") > 0
+    assert not (shadow.beams[some] & ~grown).any()  # 3 mm of aperture 45 mm away: within 4.5 deg
+    assert 30 < hidden.sum() * 9 * 0.25 < 60
+
+    stator = other_caster([m for name, m in meshes.items() if not turns(name)])
+    near = np.flatnonzero(shadow.stator.any(axis=1))[::12]
+    for k in (0, 131, 500):
+        hit = stator.intersects_any(np.zeros((len(near), 3)), rays(2 * np.pi * k / AXIS_STEPS)[near])
+        assert shadow.stator[near, k][hit].all()
+        assert hit.any()
+
+
+def test_only_beams_that_look_down_meet_what_stands_still(pitching):
+    _, _, shadow = pitching
+    down = rays(0.0)[:, 2] < -0.5
+    assert not shadow.stator[~down].any() and shadow.stator[down].any()
+    assert np.array_equal(shadow.hidden() == 1, shadow.beams | shadow.stator.all(axis=1))
+
+
+def test_a_part_in_the_way_is_seen_and_only_while_it_is_there(pitching):
+    scanner, meshes, before = pitching
+    post = trimesh.creation.box((10, 10, 10))
+    post.apply_translation([200, 0, 0])  # in the fan when gamma = 0, 2.9 deg wide from here
+    more = dict(triangles_of(meshes)) | {"a_post": post.triangles / 1000}
+    after = shadow_of(scanner, more)
+    added = after.stator & ~before.stator
+    ahead = np.abs(np.degrees(scanner.lidar.bearings_rad())) < 1.2
+    assert added[ahead][:, [0, 1, AXIS_STEPS - 1]].all()
+    assert not added[:, 12:-12].any()
+    assert np.array_equal(after.beams, before.beams)
+
+
+def test_the_bound_hides_nothing_that_the_parts_do_not(pitching):
+    scanner, _, shadow = pitching
+    workshop: Workshop = PartsWorkshop(scanner)
+    bound = workshop.bound(np.radians(PITCHING))
+    assert bound.stator is None and 100 < bound.beams.sum()
+    assert (shadow.hidden()[bound.beams] == 1).all()
+
+
+@settings(deadline=None, max_examples=60)
+@given(alpha=st.floats(-90, 90), beta=st.floats(-90, 90))
+def test_the_bound_is_a_cone_about_the_axis(alpha, beta):
+    scanner = scanner_for(0, 90, 0, 0)
+    found = PartsWorkshop(scanner).bound(np.radians([0, 90, alpha, beta]))
+    a, b = np.radians(np.round([alpha, beta], 2))
+    bearing = scanner.lidar.bearings_rad()
+    down = np.sin(b) * np.cos(bearing) - np.cos(b) * np.sin(a) * np.sin(bearing)
+    if found.beams.any():
+        assert down[found.beams].min() > down[~found.beams].max()
+        assert 15 < np.degrees(np.arccos(down[found.beams].min())) < 25
+    else:
+        assert down.max() < np.cos(np.radians(15))
+
+
+def test_what_cannot_be_built_is_refused_with_the_reason():
+    workshop = PartsWorkshop(scanner_for(*PITCHING))
+    for answer in (workshop.bound(np.radians([0, 0, 120, 0])), workshop.shadow(np.radians([0, 0, 120, 0]))):
+        assert isinstance(answer, Refused) and "upside down" in answer.reason
+
+
+def test_own_body_is_the_same_bytes_and_reads_back(pitching):
+    scanner, _, shadow = pitching
+    bearings = scanner.lidar.bearings_rad()
+    data = own_body_bytes(shadow, bearings)
+    assert data == own_body_bytes(shadow, bearings)
+    table = np.load(io.BytesIO(data))
+    assert np.array_equal(table["beams"], shadow.beams) and np.array_equal(table["stator"], shadow.stator)
+    np.testing.assert_array_equal(table["bearing_rad"], bearings)
+    bare = np.load(io.BytesIO(own_body_bytes(Shadow(shadow.beams, None), bearings)))
+    assert not bare["stator"].any() and bare["stator"].shape == (1081, AXIS_STEPS)

@@ -1,0 +1,257 @@
+"""The checks: that each sees what it is there for, measured on bodies whose answer is known."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cad.checks.run as room
+from cad.checks.check import at_least, at_most, checks_text
+from cad.checks.clearance import clearance_checks, distance_over_a_turn
+from cad.checks.islands import islands_check, islands_of
+from cad.checks.mechanics import mechanics_checks
+from cad.checks.printing import printing_checks, thin_walls
+from cad.drives.drive import drive_of
+from cad.geometry.inertia import Inertial
+from cad.geometry.mesh import Mesh, mesh_of
+from cad.geometry.print_pose import print_pose
+from cad.layout.direct_stack import stack_of
+from cad.solids import box, location, upright
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+
+def scanner_for(alpha_rot, beta_rot, alpha, beta, lidar="UTM-30LX", servo="MX-64R"):
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
+        sensor=lidar,
+        servo=servo,
+        slip_ring="UH1256-02-0610-06S",
+    )
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+def turned(mesh, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return Mesh(mesh.vertices @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), mesh.faces)
+
+
+def test_the_distance_over_a_turn_of_bodies_known_by_arithmetic():
+    arm = mesh_of(box((10, -2, 0), (30, 2, 4)))  # reaches to hypot(30, 2)
+    post = mesh_of(box((32, -40, -5), (40, 40, 9)))  # its face is 32 from the axis
+    assert distance_over_a_turn(arm, post) == pytest.approx(32 - np.hypot(30, 2), abs=0.011)
+    assert distance_over_a_turn(turned(arm, 2.0), post) == pytest.approx(32 - np.hypot(30, 2), abs=0.011)
+    shelf = mesh_of(box((-50, 12, 5.5), (50, 60, 8)))  # above the arm
+    assert distance_over_a_turn(arm, shelf) == pytest.approx(1.5, abs=1e-3)
+    plate = mesh_of(upright(9.0, -3.0, 7.0))  # inside the arm's circle
+    assert distance_over_a_turn(arm, plate) == pytest.approx(1.0, abs=0.011)
+
+
+def test_a_meeting_that_only_one_position_shows():
+    finger = mesh_of(box((28, -1, 0), (30, 1, 3)))
+    peg = mesh_of(upright(0.5, 1.0, 2.0, 0.0, -29.0))  # a quarter turn away from the finger
+    assert distance_over_a_turn(finger, peg) == 0.0
+    assert distance_over_a_turn(finger, mesh_of(upright(0.5, 1.0, 2.0, 0.0, -32.0))) > 1.4
+
+
+def test_a_body_wholly_inside_another_meets_it():
+    hollow = mesh_of(upright(40.0, -20.0, 20.0))
+    inside = mesh_of(box((5, 5, -2), (7, 7, 2)))
+    assert distance_over_a_turn(hollow, inside) == 0.0 == distance_over_a_turn(inside, hollow)
+
+
+corner = st.floats(-30, 30)
+
+
+@settings(deadline=None, max_examples=25)
+@given(points=st.lists(st.tuples(corner, corner, corner), min_size=8, max_size=8), turn=st.floats(0, 6.28))
+def test_no_position_is_nearer_than_the_distance_over_a_turn(points, turn):
+    points = np.array(points) + np.arange(8)[:, None] * [0.0131, 0.0217, 0.0119]
+    one, other = np.split(points, 2)
+    one = one + np.array([60, 0, 0])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    least = distance_over_a_turn(Mesh(one, faces), Mesh(other, faces))
+    spun = turned(Mesh(one, faces), turn).vertices
+    samples = [w @ body for body in (spun, other) for w in [np.random.default_rng(3).dirichlet(np.ones(4), 300)]]
+    gap = np.linalg.norm(samples[0][:, None] - samples[1][None], axis=2).min()
+    assert gap >= least - 0.02
+
+
+def test_shared_room_is_found_by_name():
+    meshes = {
+        "alignment_linkage": mesh_of(box((0, 0, 0), (10, 10, 10))),
+        "lidar_body": mesh_of(box((9, 0, 0), (20, 10, 10))),
+        "base_mount": mesh_of(box((-30, -30, -30), (30, 30, -20))),
+    }
+    clearance, shared = clearance_checks(meshes)
+    assert clearance.severity == "pass" and shared.severity == "error"
+    assert (shared.value, shared.where) == (pytest.approx(100, rel=1e-3), "alignment_linkage and lidar_body")
+    meshes["lidar_body"] = mesh_of(box((10, 0, -19.9), (20, 10, 10)))
+    clearance, shared = clearance_checks(meshes)
+    assert clearance.severity == "error" and clearance.where == "lidar_body and base_mount"
+    assert clearance.value == pytest.approx(0.1, abs=1e-3)
+    assert shared.severity == "pass"
+
+
+def test_a_thin_wall_is_measured_and_a_wedge_is_none():
+    slab = box((0, 0, 0), (40, 40, 10))
+    fin = slab.fuse(box((0, 0, 9), (0.8, 40, 30))).Solids()[0]
+    walls = thin_walls(mesh_of(fin), 1.2)
+    area = trimesh.Trimesh(*[getattr(mesh_of(fin), k) for k in ("vertices", "faces")]).area
+    assert walls.surface_mm2 == pytest.approx(area)
+    assert walls.area_mm2 == pytest.approx(2 * 40 * 20, rel=0.05)
+    assert walls.thinnest_mm == pytest.approx(0.8) and walls.at == pytest.approx([0.4, 20, 20], abs=1.0)
+    assert walls.at[0] == pytest.approx(0.4)
+    assert thin_walls(mesh_of(fin), 0.7).area_mm2 == 0
+    assert thin_walls(mesh_of(slab), 1.2).area_mm2 == 0
+    wedge = slab.cut(box((0, 0, 0), (80, 80, 80)).rotate((0, 0, 0), (0, 1, 0), 30)).Solids()[0]
+    assert thin_walls(mesh_of(wedge), 1.2).area_mm2 == 0
+
+
+def test_the_thinnest_spot_and_the_hole_beside_it_are_told():
+    printer = load_catalogue().products["fdm-0.4"]
+    drilled = box((0, 0, 0), (40, 30, 20)).cut(upright(5.0, -1, 21, 5.6, 12), upright(2.0, -1, 21, 30, 15)).Solids()[0]
+    (wall,) = [c for c in printing_checks(printer, {"part": drilled}, {"part": mesh_of(drilled)}) if c.kind == "wall"]
+    thickness, *place = map(
+        float, re.search(r"([\d.]+) mm, at \(([-\d.]+), ([-\d.]+), ([-\d.]+)\)", wall.message).groups()
+    )
+    assert wall.message.endswith("beside a hole of 10 mm")
+    assert thickness == pytest.approx(0.6, abs=0.02) and place[:2] == pytest.approx([0.3, 12.0], abs=0.4)
+
+
+def test_printing_tells_bed_wall_and_hole():
+    printer = load_catalogue().products["fdm-0.4"]
+    part = box((0, 0, 0), (260, 30, 20)).cut(upright(0.5, -1, 21, 20, 15)).fuse(box((0, 0, 19), (0.5, 30, 60)))
+    part = part.Solids()[0]
+    checks = {c.kind: c for c in printing_checks(printer, {"part": part}, {"part": mesh_of(part)})}
+    assert (checks["bed"].severity, checks["bed"].value) == ("error", 260)
+    assert checks["wall"].severity == "error" and checks["wall"].value > 2000
+    assert (checks["smallest_hole"].severity, checks["smallest_hole"].value) == ("error", 1.0)
+    assert all(check.where == "part" for check in checks.values())
+
+
+def test_a_layer_that_starts_in_the_air_is_found_where_it_starts():
+    table = box((0, 0, 0), (6, 20, 30)).fuse(box((0, 0, 30), (40, 20, 34)), box((0, 0, 0), (40, 20, 4)))
+    assert islands_of(mesh_of(table.Solids()[0])) == []  # a ledge hangs on its layer
+    gallows = table.fuse(box((34, 5, 12), (40, 15, 30))).Solids()[0]
+    (island,) = islands_of(mesh_of(gallows))
+    assert island.height == pytest.approx(12, abs=0.4) and island.area_mm2 == pytest.approx(60, rel=1e-3)
+    lying = gallows.rotate((0, 0, 0), (1, 0, 0), 90).moved(location(np.eye(3), (100, 0, 0)))  # stands on its y
+    pose = print_pose(mesh_of(lying), (220.0, 220.0, 250.0))
+    pose = replace(pose, T_bed_part=np.array([[1, 0, 0, -100], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]))
+    said = islands_check("part", mesh_of(lying), pose).message
+    assert re.search(r"1 layers .* at \(137, -1[12](\.\d)?, 10\) in the rotation frame, the largest 60 mm2", said)
+    two = gallows.fuse(box((20, 5, 20.3), (24, 15, 30))).Solids()[0]
+    assert sorted(round(i.area_mm2) for i in islands_of(mesh_of(two))) == [40, 60]
+
+
+def bodies(mass, z):
+    inertia = mass * 0.03**2 * np.eye(3)
+    return {
+        "rot": Inertial(mass, np.array([0.012, 0.0, z]), inertia),
+        "laser": Inertial(1e-9, np.zeros(3), inertia * 0),
+    }
+
+
+def test_loads_against_hand_calculation():
+    scanner = scanner_for(0, 90, 30, -30)
+    alone = replace(scanner, bearings=())
+    stack = stack_of(alone)
+    lever = -stack.horn / 1000 - 0.030
+    found = {c.kind: c for c in mechanics_checks(alone, drive_of(alone), bodies(0.5, -0.030))}
+    weight = 0.5 * 9.80665
+    assert found["tilt_moment"].value == pytest.approx(weight * lever, rel=1e-3)
+    assert found["tilt_moment"].severity == "error"
+    assert found["static_torque"].value == pytest.approx(weight * 0.012, rel=1e-3)
+    about_axis = 0.5 * (0.03**2 + 0.012**2)
+    assert found["spin_up_torque"].value == pytest.approx(weight * 0.012 + about_axis * 2 * np.pi / 0.2, rel=1e-3)
+    assert found["axial_load"].value == pytest.approx(0, abs=1e-6)
+    held = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}
+    assert held["tilt_moment"].severity == "pass" and held["bearing_load"].value > weight
+    upright = scanner_for(0, 0, 30, -30)
+    heavy = {c.kind: c.severity for c in mechanics_checks(upright, drive_of(upright), bodies(3.0, -0.030))}
+    assert heavy["axial_load"] == "error"
+
+
+def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
+    scanner = scanner_for(0, 90, 30, -30)
+    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}["flanks"]
+    assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
+    grams, at, azimuth = (
+        float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.message).groups()
+    )
+    assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
+    upright = scanner_for(0, 0, 30, -30)
+    found = {c.kind: c for c in mechanics_checks(upright, drive_of(upright), bodies(0.5, -0.030))}["flanks"]
+    assert found.severity == "pass"
+    exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
+    assert {c.kind: c.severity for c in mechanics_checks(exact, drive_of(exact), bodies(0.5, -0.03))}[
+        "flanks"
+    ] == "note"
+
+
+def test_a_servo_without_a_rating_is_noted_not_passed():
+    scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
+    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.3, -0.03))}
+    for kind in ("tilt_moment", "axial_load"):
+        assert (found[kind].severity, found[kind].limit) == ("note", None)
+        assert "gives no rating" in found[kind].message
+
+
+def test_at_a_limit_is_within_it():
+    assert at_most("k", 2.0, 2.0, "mm", "w", "what").severity == "pass"
+    assert at_least("k", 2.0, 2.0, "mm", "w", "what").severity == "pass"
+    worse = at_most("k", 2.001, 2.0, "mm", "w", "what")
+    assert worse.severity == "error" and worse.message == "w: what: 2 mm, over 2"
+    table = json.loads(checks_text([worse]))
+    assert table["checks"][0] | {"message": ""} == {
+        "kind": "k", "severity": "error", "value": 2.001, "limit": 2.0, "unit": "mm", "where": "w", "message": "",
+    }  # fmt: skip
+
+
+TASK = """name = "small"
+sensor = "URG-04LX"
+servo = "MX-64R"
+slip_ring = "UH1256-02-0610-06S"
+printer = "fdm-0.4"
+[motion]
+mode = "spin"
+period_s = 18.0
+[angles]
+alpha_rot_deg = 0
+beta_rot_deg = 0
+alpha_laser_deg = 25.5
+beta_laser_deg = -21.4
+[density]
+ball_radius_deg = 2.0
+[[weight]]
+shape = "all"
+"""
+
+
+def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, monkeypatch):
+    (tmp_path / "task.toml").write_text(TASK)
+    scanner = scanner_for(0, 0, 25.5, -21.4, "URG-04LX")
+    (tmp_path / "angles.json").write_text(scanner.angles.to_json())
+    code, out, _ = command("check", tmp_path)
+    assert code == 0, out
+    lines = out.splitlines()
+    assert lines[-1].endswith("without a failure") and any(line.startswith("pass") for line in lines)
+    assert any("sub_plate" in line for line in lines)
+    assert sum(" mm at 10 m), " in line and "bend" in line and "+-" in line for line in lines) == 2
+
+    answer = [at_least("clearance", 0.1, 0.4, "mm", "a and b", "gap")]
+    monkeypatch.setattr(room, "check_scanner", lambda _scanner, _say: answer)
+    code, out, _ = command("check", tmp_path, "--json")
+    assert code == 1
+    failed = [entry for entry in json.loads(out)["checks"] if entry["severity"] == "error"]
+    assert [entry["where"] for entry in failed] == ["a and b"]
+    code, _, complaint = command("check", tmp_path / "nowhere")
+    assert (code, len(complaint)) == (2, 1)

@@ -1,0 +1,277 @@
+"""Drawings: what they say against the exported meshes, in three formats, read back by other programs' readers."""
+
+import io
+import itertools
+import re
+import xml.etree.ElementTree as ET
+from types import SimpleNamespace
+
+import ezdxf
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from svglib.svglib import svg2rlg
+
+from cad.drawings.dimensions import spread
+from cad.drawings.marks import Bow, Head, Stroke, Text, box_of
+from cad.drawings.patterns import number, patterns_of
+from cad.drawings.project import Arc, Chain, Line, project
+from cad.drawings.sheet import A2, A3
+from cad.drawings.slots import slot_words, slots_of
+from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.geometry.holes import rounds_of
+from cad.solids import box, cylinder, upright
+
+X, Y, Z = np.eye(3)
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def sheets(made):
+    """Per part: texts of the DXF, of the SVG, and the exported mesh."""
+    out = {}
+    for part in made.result.parts:
+        document = ezdxf.readfile(made.folder / "drawings" / f"{part.name}.dxf")
+        assert not document.audit().errors
+        svg = ET.parse(made.folder / "drawings" / f"{part.name}.svg")
+        out[part.name] = SimpleNamespace(
+            dxf=document,
+            said=[entity.dxf.text.replace("%%c", "Ø").replace("%%d", "°") for entity in document.query("TEXT")],
+            svg=[element.text for element in svg.iter(f"{SVG}text")],
+            mesh=trimesh.load(made.folder / "parts" / f"{part.name}.stl"),
+        )
+    return out
+
+
+def ordinates(sheet):
+    return {float(text) for text in sheet.said if re.fullmatch(r"-?\d+(\.\d+)?", text)}
+
+
+def circles_in(mesh, origin, normal):
+    """Diameters and centres of the round loops of a section."""
+    section, to_3d = mesh.section(plane_origin=origin, plane_normal=normal).to_2D()
+    found = []
+    for loop in section.discrete:
+        centre = (loop.max(axis=0) + loop.min(axis=0)) / 2
+        radii = np.linalg.norm(loop - centre, axis=1)
+        if len(loop) > 20 and np.ptp(radii) < 0.02:
+            found.append((2 * radii.max(), (to_3d @ [*centre, 0, 1])[:3]))
+    return found
+
+
+def test_all_three_formats_say_the_same(sheets):
+    for sheet in sheets.values():
+        assert sheet.said == sheet.svg
+        assert len(sheet.said) > 20
+
+
+def test_every_sheet_has_its_views_lines_and_title(sheets, made):
+    task = made.scanner.angles.task
+    for name, sheet in sheets.items():
+        assert {name, task} <= set(sheet.said)
+        assert sum(text.startswith(("FRONT", "TOP", "FROM THE LEFT")) for text in sheet.said) == 3
+        assert any(re.fullmatch(r"\d+(:\d+)   A[23]", text) for text in sheet.said)
+        assert sum(re.fullmatch(r"[0-9a-f]{12}(-\d)?", text) is not None for text in sheet.said) == 2
+        layers = {entity.dxf.layer for entity in sheet.dxf.modelspace()}
+        assert layers == {"VISIBLE", "HIDDEN", "CENTRE", "DIMENSION", "FRAME"}
+        assert sheet.dxf.layers.get("HIDDEN").dxf.linetype == "HIDDEN"
+
+
+def test_the_envelope_is_that_of_the_mesh(sheets):
+    for sheet in sheets.values():
+        line = next(text for text in sheet.said if text.startswith("Envelope"))
+        said = [float(v) for v in re.findall(r"[\d.]+(?= x| along)", line)]
+        np.testing.assert_allclose(said, sheet.mesh.extents, atol=0.02)
+
+
+def test_shaft_circle_of_holes_and_diameters(sheets):
+    sheet = sheets["servo_shaft"]
+    count, hole, circle = re.search(
+        r"(\d)x Ø([\d.]+) THRU ON Ø([\d.]+)", next(text for text in sheet.said if "THRU ON" in text)
+    ).groups()
+    low = sheet.mesh.bounds[0, 2]
+    found = circles_in(sheet.mesh, [0, 0, low + 2.0], Z)
+    holes = [centre for diameter, centre in found if abs(diameter - float(hole)) < 0.02]
+    assert len(holes) == int(count)
+    np.testing.assert_allclose(2 * np.linalg.norm(np.array(holes)[:, :2], axis=1), float(circle), atol=0.01)
+    top = sheet.mesh.bounds[1, 2]
+    outer = max(diameter for diameter, _ in circles_in(sheet.mesh, [0, 0, top - 25.0], Z))
+    assert f"Ø{number(round(outer, 1))}  0/-0.1" in sheet.said  # turned, half of the fit of fdm-0.4
+    assert any(abs(value - (top - low)) < 0.01 for value in ordinates(sheet))
+
+
+def test_linkage_angle_seat_and_holes(sheets, made):
+    sheet = sheets["alignment_linkage"]
+    # the seat: the plane 55 mm behind the optical centre, found in the mesh by its area
+    mesh = sheet.mesh
+    keys = np.round(np.column_stack([mesh.face_normals, (mesh.face_normals * mesh.triangles_center).sum(axis=1)]), 2)
+    _, index = np.unique(keys, axis=0, return_inverse=True)
+    largest = index == np.bincount(index, weights=mesh.area_faces).argmax()
+    normal = (mesh.face_normals * mesh.area_faces[:, None])[largest].sum(axis=0)
+    normal /= np.linalg.norm(normal)
+    tilt = np.degrees(np.arccos(abs(normal[2])))
+    (said,) = [float(text[:-1]) for text in sheet.said if re.fullmatch(r"[\d.]+°", text)]
+    assert said == pytest.approx(tilt, abs=0.006)
+    a, b = np.radians([made.scanner.angles.angles_deg.alpha_laser, made.scanner.angles.angles_deg.beta_laser])
+    assert said == pytest.approx(np.degrees(np.arccos(np.cos(a) * np.cos(b))), abs=0.005)
+    note = next(text for text in sheet.said if text.startswith("The largest face across"))
+    assert float(re.search(r"lies ([\d.]+)", note)[1]) == pytest.approx(
+        abs((mesh.triangles_center[largest] @ normal).mean()), abs=1e-3
+    )
+    R = made.scanner.angles.R_rot_laser()
+    found = circles_in(sheet.mesh, R @ [0, 0, -57.0], R[:, 2])
+    holes = np.array([R.T @ centre for diameter, centre in found if abs(diameter - 3.4) < 0.02])
+    assert len(holes) == 4 and any(text.startswith("4x Ø3.4 THRU") for text in sheet.said)
+    for value in np.unique(np.round(holes[:, :2], 1)):
+        assert any(abs(value - other) < 0.01 for other in ordinates(sheet))
+
+
+def test_mount_angle_and_deck_holes(sheets, made):
+    sheet = sheets["base_mount"]
+    (said,) = [float(text[:-1]) for text in sheet.said if re.fullmatch(r"[\d.]+°", text)]
+    axis = made.scanner.angles.axis_world()
+    assert said == pytest.approx(np.degrees(np.arccos(axis[2])), abs=0.005)
+    T = made.scanner.angles.T_world_rot(0.0)
+    T[:3, 3] *= 1000
+    deck = sheet.mesh.copy().apply_transform(T)
+    found = [centre for diameter, centre in circles_in(deck, [0, 0, 3.0], Z) if abs(diameter - 4.4) < 0.02]
+    np.testing.assert_allclose(np.abs(np.array(found)[:, :2]), 40.0, atol=0.01)
+    assert {40.0, -40.0} <= ordinates(sheet) and "4x Ø4.4 THRU" in sheet.said
+
+
+def test_every_screw_hole_of_the_adapter_has_its_place(sheets):
+    sheet = sheets["slip_ring_adapter"]
+    low = sheet.mesh.bounds[0, 2]
+    holes = [centre for diameter, centre in circles_in(sheet.mesh, [0, 0, low + 1.0], Z) if abs(diameter - 2.9) < 0.02]
+    assert any(text.startswith(f"{len(holes)}x Ø2.9 THRU") for text in sheet.said)
+    for value in np.unique(np.round(np.array(holes)[:, :2], 1)):
+        assert any(abs(value - other) < 0.01 for other in ordinates(sheet))
+
+
+def test_the_bearing_has_a_fit_on_both_of_its_sheets(sheets):
+    # 61806 is 30 x 42: the prints are drawn half of the sliding fit of 0.2 away from it
+    assert "Ø42.1  ±0.1" in sheets["bearing_cage"].said
+    assert "Ø29.9  ±0.1" in sheets["alignment_linkage"].said
+
+
+def test_geometry_in_the_dxf_is_true_to_size(sheets):
+    sheet = sheets["servo_shaft"]
+    circles = [entity for entity in sheet.dxf.query("CIRCLE") if entity.dxf.layer == "VISIBLE"]
+    holes = [circle for circle in circles if abs(2 * circle.dxf.radius - 2.9) < 0.01]
+    assert len(holes) == 8
+    centres = np.array([(circle.dxf.center.x, circle.dxf.center.y) for circle in holes])
+    np.testing.assert_allclose(np.linalg.norm(centres - centres.mean(axis=0), axis=1), 11.0, atol=0.01)
+
+
+def test_svg_is_read_and_the_pdf_is_one_page(made, sheets):
+    for name in sheets:
+        drawing = svg2rlg(str(made.folder / "drawings" / f"{name}.svg"))
+        assert min(abs(drawing.width / drawing.height - w / h) for w, h in (A3, A2)) < 1e-3
+        pdf = (made.folder / "drawings" / f"{name}.pdf").read_bytes()
+        assert pdf.startswith(b"%PDF-") and pdf.count(b"/Type /Page\n") == 1
+        assert b"2000" in re.search(rb"/CreationDate \((.*?)\)", pdf)[1]
+
+
+def drawn(solid, right, up):
+    curves = project(solid, right, up)
+    return [c for c in curves if not c.hidden], [c for c in curves if c.hidden]
+
+
+def test_a_block_with_a_blind_hole_seen_from_three_sides():
+    solid = box((0, 0, 0), (40, 20, 10)).cut(upright(3, 4, 11, 10, 10)).Solids()[0]
+    seen, hidden = drawn(solid, X, Y)
+    assert len(seen) == 5 and not hidden
+    (circle,) = [curve for curve in seen if isinstance(curve, Arc)]
+    assert circle.radius == pytest.approx(3, abs=2e-3) and circle.end - circle.start == pytest.approx(2 * np.pi)
+    np.testing.assert_allclose(circle.centre, (10, 10), atol=0.01)
+    seen, hidden = drawn(solid, X, Z)
+    assert len(seen) == 4 and all(isinstance(curve, Line) for curve in seen)
+    ends = sorted((min(line.start[1], line.end[1]), max(line.start[1], line.end[1])) for line in hidden)
+    np.testing.assert_allclose(ends, [(4, 4), (4, 10), (4, 10)], atol=0.01)
+    seen, hidden = drawn(solid, X, -Y)  # from below
+    assert len(seen) == 4 and len([curve for curve in hidden if isinstance(curve, Arc)]) == 1
+
+
+def test_what_lies_exactly_behind_is_drawn_once():
+    solid = box((0, 0, 0), (10, 10, 10))
+    for right, up in ((X, Y), (Y, Z), (X, Z)):
+        seen, hidden = drawn(solid, right, up)
+        assert len(seen) == 4 and not hidden
+
+
+def test_an_inclined_cylinder_ends_in_curves():
+    tilted = cylinder(5, (0, 0, 0), (0.6, 0, 0.8), 30)
+    seen, _ = drawn(tilted, X, Y)
+    assert any(isinstance(curve, Chain) for curve in seen) and any(isinstance(curve, Line) for curve in seen)
+
+
+def test_holes_are_told_from_bosses_and_blind_ones_from_through_ones():
+    solid = box((-20, -20, 0), (20, 20, 10)).cut(upright(2, -1, 11, 8, 0), upright(2, 5, 11, -8, 0))
+    solid = solid.fuse(upright(6, 9, 15, 0, 12)).Solids()[0]
+    found = {(item.hole, item.through, round(item.length, 3)) for item in rounds_of(solid)}
+    assert found == {(True, True, 10.0), (True, False, 5.0), (False, False, 5.0)}
+
+
+def test_screw_holes_take_their_recesses_along():
+    cuts = [upright(1.7, -1, 11, x, y) for x in (-10, 10) for y in (-10, 10)]
+    cuts += [upright(3.2, 6, 11, x, y) for x in (-10, 10) for y in (-10, 10)]
+    solid = box((-20, -20, 0), (20, 20, 10)).cut(*cuts).Solids()[0]
+    (pattern,) = patterns_of(rounds_of(solid))
+    assert pattern.words() == "4x Ø3.4 THRU, Ø6.4 FOR HEADS"
+
+
+def test_holes_on_both_sides_of_a_bore_are_one_and_not_heads():
+    tube = upright(10, 0, 30).cut(upright(7, -1, 31))
+    (pattern,) = patterns_of(rounds_of(tube.cut(cylinder(4, (-12, 0, 20), X, 24)).Solids()[0]))
+    assert pattern.words() == "Ø8 THRU"
+
+
+def test_slots_are_told_by_width_and_length():
+    def slot(x, y, low):
+        ends = [upright(2.2, low, 11, x, y + side * 3) for side in (-1, 1)]
+        return ends[0].fuse(ends[1], box((x - 2.2, y - 3, low), (x + 2.2, y + 3, 11)))
+
+    plate = box((-20, -20, 0), (20, 20, 10))
+    two = plate.cut(slot(-12, 4, -1), slot(9, 4, -1), upright(3, -1, 11, 0, -12)).Solids()[0]
+    (slots,) = slots_of(two)
+    assert slot_words(slots) == "2x SLOT 4.4 x 10.4 THRU"
+    np.testing.assert_allclose([slot.middle for slot in slots], [(-12, 4, 5), (9, 4, 5)], atol=1e-6)
+    assert slots_of(plate.cut(slot(0, 0, 5)).Solids()[0]) == []  # a pocket
+    notched = plate.cut(upright(2.2, -1, 11, -17, 0), box((-21, -2.2, -1), (-17, 2.2, 11)))
+    notched = notched.cut(upright(2.2, -1, 11, 17, 0), box((17, -2.2, -1), (21, 2.2, 11))).Solids()[0]
+    assert slots_of(notched) == []  # two notches that face each other
+
+
+@given(st.lists(st.floats(-100, 100), min_size=1, max_size=12).map(sorted), st.floats(0.5, 10))
+def test_spread_keeps_order_distance_and_mean(wanted, step):
+    places = spread(wanted, step)
+    assert all(b - a >= step - 1e-6 for a, b in itertools.pairwise(places))
+    assert np.mean(places) == pytest.approx(np.mean(wanted), abs=1e-6)
+    if all(b - a >= step for a, b in itertools.pairwise(wanted)):
+        np.testing.assert_allclose(places, wanted, atol=1e-9)
+
+
+def test_every_kind_of_mark_is_written_in_every_format():
+    marks = (
+        Stroke("hidden", ((10, 10), (20, 10), (20, 30))),
+        Bow("visible", (50, 50), 10, 0.0, 2 * np.pi),
+        Bow("centre", (50, 50), 20, 0.5, 4.0),
+        Text((30, 30), "Ø5 <90°>", anchor="middle", angle=90.0),
+        Head((10, 10), 0.0),
+    )
+    sheet = SimpleNamespace(marks=marks, scale=0.5, size=A3, name="a & b")
+    assert [svg_bytes(sheet), pdf_bytes(sheet), dxf_text(sheet)] == [
+        svg_bytes(sheet),
+        pdf_bytes(sheet),
+        dxf_text(sheet),
+    ]
+    document = ezdxf.read(io.StringIO(dxf_text(sheet)))
+    kinds = sorted(entity.dxftype() for entity in document.modelspace())
+    assert kinds == ["ARC", "CIRCLE", "LWPOLYLINE", "SOLID", "TEXT"]
+    assert document.query("CIRCLE")[0].dxf.radius == 20  # views are 1:1, the sheet grows
+    assert ET.fromstring(svg_bytes(sheet)).find(f".//{SVG}text").text == "Ø5 <90°>"
+    left, low, right, top = box_of(list(marks))
+    assert (left, right, top) == (pytest.approx(7.8), pytest.approx(50 + 20 * np.cos(0.5)), pytest.approx(70, abs=0.2))
+    assert low == pytest.approx(9.65)

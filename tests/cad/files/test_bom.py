@@ -1,0 +1,174 @@
+"""`bom.csv` and `assembly.md`: what the solids ask for, against the catalogue and plain arithmetic."""
+
+import csv
+import re
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cad.assembly.assembly import make_parts
+from cad.assembly.joints import LENGTHS, _length, joints_of
+from cad.files.bom import bom_text, items_of
+from cad.files.instructions import instructions_text
+from cad.geometry.holes import rounds_of
+from cad.screws import INSERT_LENGTH, SCREWS
+from design.angles import Angles
+from design.catalogue.catalogue import load_catalogue
+
+
+@pytest.fixture(scope="module")
+def rows(made):
+    return list(csv.DictReader((made.folder / "bom.csv").read_text(encoding="utf-8").splitlines()))
+
+
+@pytest.fixture(scope="module")
+def steps(made):
+    return (made.folder / "assembly.md").read_text(encoding="utf-8")
+
+
+def test_every_made_part_is_listed_once_with_its_mass(rows, made):
+    listed = {row["part"]: row for row in rows if row["kind"] in ("printed", "turned", "sawn")}
+    assert listed.keys() == {part.name for part in made.result.parts}
+    for part in made.result.parts:
+        assert float(listed[part.name]["mass_g"]) == pytest.approx(part.mass_g, abs=0.051)
+    assert listed["servo_shaft"]["kind"] == "turned"
+    assert len({row["number"] for row in listed.values()}) == len(listed)
+
+
+def test_prices_are_the_catalogues_and_unknown_ones_stay_empty(rows, made):
+    bought = {row["part"]: row for row in rows if row["kind"] == "bought"}
+    assert float(bought["lidar"]["unit_usd"]) == made.scanner.lidar.price_usd == 5000
+    assert bought["lidar"]["verified"] == "yes" and bought["slip ring"]["verified"] == "no"
+    assert all(row["source"] for row in rows if row["unit_usd"])
+    assert all(row["unit_usd"] == "" for row in rows if row["kind"] in ("screw", "nut", "wiring", "printed", "turned"))
+    total = next(row for row in rows if row["kind"] == "total")
+    assert float(total["total_usd"]) == sum(float(row["total_usd"]) for row in bought.values() if row["total_usd"])
+    without = sum(row["total_usd"] == "" for row in rows)
+    assert f"{without} rows without a price" in total["note"]
+
+
+def test_what_the_paper_asks_for_is_there(rows):
+    wiring = [row["part"] for row in rows if row["kind"] == "wiring"]
+    assert sum("USB" in part for part in wiring) == 2
+    assert any("12 V" in part for part in wiring)
+
+
+def test_screws_are_those_of_the_catalogue_and_none_bottoms(rows, made):
+    counts = {}
+    for row in rows:
+        if row["kind"] == "screw":
+            for count, part, onto in re.findall(r"(\d+) (\w+) to (\w+)", row["note"]):
+                counts[part, onto] = (int(count), row["number"])
+    lidar, servo = made.scanner.lidar, made.scanner.servo
+    assert counts["servo_shaft", "servo_horn"] == (servo.horn_holes, "ISO 4762 M2.5 x 6")
+    count, number = counts["alignment_linkage", "lidar_body"]
+    assert count == len(lidar.mount_holes_mm)
+    length = int(number.removeprefix(f"ISO 4762 {lidar.mount_screw} x "))
+    plate = 8.0
+    assert 2 * 3.0 <= length - plate < lidar.mount_thread_depth_mm
+    assert counts["base_mount", "servo_case"][0] == 4 and counts["base_mount", "deck"] == (4, "ISO 4762 M4 x 16")
+    assert sum(row["kind"] == "screw" and row["number"].startswith("ISO 4026") for row in rows) == 1
+
+
+def test_steps_and_list_name_the_same_screws(rows, steps):
+    listed = {row["number"]: int(row["quantity"]) for row in rows if row["kind"] == "screw"}
+    used = {}
+    for count, number in re.findall(r"(\d+) x (ISO \d+ M[\d.]+ x \d+)", steps):
+        used[number] = used.get(number, 0) + int(count)
+    assert used == listed
+    nuts = {row["number"].split()[-1]: int(row["quantity"]) for row in rows if row["kind"] == "nut"}
+    told = {}
+    for count, size in re.findall(r"with (\d+) nuts (M[\d.]*\d)", steps):
+        told[size] = told.get(size, 0) + int(count)
+    assert told == nuts
+    assert "{" not in steps
+
+
+def test_the_shaft_comes_before_what_goes_over_it(steps):
+    titles = [re.sub(r"^## \d+\. ", "", line) for line in steps.splitlines() if line.startswith("## ")]
+    order = ["Servo into the mount", "Shaft on the horn", "Adapter on the servo", "Slip ring", "Linkage on the shaft"]
+    assert [title for title in titles if title in order] == order
+
+
+@given(
+    st.sampled_from(sorted(LENGTHS)),
+    st.floats(2, 12),
+    st.sampled_from(["thread", "nut", "deck", "grub"]),
+    st.floats(1.5, 12),
+)
+def test_a_screw_never_bottoms_and_holds_where_it_can(name, grip, fixing, depth):
+    length = _length(SCREWS[name], grip, fixing, depth)
+    assert length in LENGTHS[name]
+    if fixing == "thread":
+        assert length <= grip + depth - 0.5 or length == min(LENGTHS[name])
+        longer = [n for n in LENGTHS[name] if length < n <= grip + depth - 0.5]
+        assert length >= grip + 2 * SCREWS[name].nominal or not longer
+    elif fixing in ("nut", "deck"):
+        assert length >= grip + depth + 0.8 * SCREWS[name].nominal or length == max(LENGTHS[name])
+
+
+@pytest.fixture(scope="module")
+def upright(made):
+    """An upright scanner without mount and ring, its hub in the way of a screw, its ring without a price."""
+    angles = Angles(alpha_rot=0, beta_rot=0, alpha_laser=25, beta_laser=-20)
+    return replace(
+        made.scanner, angles=made.scanner.angles.model_copy(update={"angles_deg": angles, "slip_ring": None})
+    )
+
+
+def test_what_a_scanner_does_not_have_is_not_listed(upright):
+    scanner = replace(upright, slip_ring=None, lidar=upright.lidar.model_copy(update={"price_usd": None}))
+    assembly = make_parts(scanner)
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    joints = joints_of(scanner, assembly, rounds)
+    masses = dict.fromkeys(assembly.made, 1.0)
+    items = items_of(scanner, assembly, joints, masses, {"servo_shaft"}, "0123456789ab")
+    assert "slip ring" not in {item.part for item in items}
+    lidar = next(item for item in items if item.part == "lidar")
+    assert lidar.unit_usd is None and "price unknown" in lidar.note
+    assert items[-1].total_usd == scanner.servo.price_usd
+    assert bom_text(items).count("\n") == len(items) + 1
+    text = instructions_text(scanner, assembly, joints, "0123456789ab")
+    assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
+    seat = next(joint for joint in joints if joint.onto == "lidar_body")
+    assert (seat.part, seat.count, seat.covered) == ("sub_plate", 4, 0)
+
+
+def test_a_recess_is_no_hole_for_a_screw(made):
+    """The boss of a horn lies in a blind pocket that has the size of a hole for M6."""
+    angles = made.scanner.angles.model_copy(
+        update={"angles_deg": Angles(alpha_rot=0, beta_rot=40, alpha_laser=-20, beta_laser=-70), "servo": "AX-12A"}
+    )
+    products = load_catalogue().products
+    scanner = replace(made.scanner, angles=angles, servo=products["AX-12A"], lidar=products["URG-04LX"])
+    assembly = make_parts(scanner)
+    joints = joints_of(scanner, assembly, {n: rounds_of(s) for n, s in (assembly.made | assembly.bought).items()})
+    assert "bearing_cage" in assembly.made
+    assert not [joint for joint in joints if joint.part == "servo_shaft" and joint.onto != "servo_horn"]
+
+
+def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
+    printer = load_catalogue().products["fdm-0.4-insert"]
+    scanner = replace(made.scanner, printer=printer)
+    assembly = make_parts(scanner)
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    joints = joints_of(scanner, assembly, rounds)
+    held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}
+    cage = held.pop(("bearing_cage", "slip_ring_adapter"))
+    grub = held.pop(("alignment_linkage", "servo_shaft"))
+    assert not held and (cage.count, grub.count, grub.fixing) == (4, 2, "grub")
+    for part, count in (("slip_ring_adapter", 4), ("alignment_linkage", 2)):
+        seats = [hole for hole in rounds[part] if hole.hole and hole.diameter == 4.0]
+        assert len(seats) == count and min(hole.length for hole in seats) > INSERT_LENGTH
+    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.scanner, *_solids(made))}
+    assert {(joint.part, joint.onto) for joint in joints} == by_threads
+    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), set(), "0123456789ab")
+    assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 6)]
+    assert "Melt the inserts in" in instructions_text(scanner, assembly, joints, "0123456789ab")
+
+
+def _solids(made):
+    assembly = made.result.assembly
+    return assembly, {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}

@@ -1,0 +1,176 @@
+"""Print files: the pose by its rule on shapes whose answer is plain, and 3MF as a strict reader takes it."""
+
+import itertools
+import shutil
+import zipfile
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lib3mf import get_wrapper
+from scipy.spatial.transform import Rotation
+
+from benchmarks.cad.slicer import PROGRAM, sliced
+from cad.files.threemf import threemf_bytes
+from cad.geometry.mesh import Mesh
+from cad.geometry.print_pose import on_bed, print_pose
+from cad.labels.glyphs import GLYPHS, text_width
+
+BED = (220.0, 220.0, 250.0)
+TABLE = trimesh.boolean.union(
+    [
+        trimesh.creation.box(bounds=[[-20, -20, 10], [20, 20, 14]]),
+        trimesh.creation.box(bounds=[[-3, -3, 0], [3, 3, 12]]),
+    ]
+)
+
+
+def mesh(shape):
+    return Mesh(np.asarray(shape.vertices, dtype=float), np.asarray(shape.faces, dtype=np.int64))
+
+
+def turned(shape, quaternion, shift=(0, 0, 0)):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    T[:3, 3] = shift
+    return mesh(shape.copy().apply_transform(T))
+
+
+quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
+
+
+@given(quaternions, st.tuples(*[st.floats(-50, 50)] * 3))
+@settings(max_examples=40, deadline=None)
+def test_a_table_is_printed_upside_down_whichever_way_it_was_modelled(quaternion, shift):
+    pose = print_pose(turned(TABLE, quaternion, shift), BED)
+    assert pose.overhang_mm2 == 0 and pose.support_mm3 == 0 and pose.fits
+    assert pose.contact_mm2 == pytest.approx(1600, abs=0.01)
+    np.testing.assert_allclose(pose.size_mm, (40, 40, 14), atol=1e-3)
+    lying = on_bed(turned(TABLE, quaternion, shift), pose)
+    np.testing.assert_allclose(lying.vertices.min(axis=0), (90, 90, 0), atol=1e-3)
+    assert lying.volume() == pytest.approx(TABLE.volume, rel=1e-5)  # turned, not mirrored
+
+
+def test_support_is_counted_by_area_and_by_column():
+    discs = [trimesh.creation.cylinder(10, segment=[[0, 0, z], [0, 0, z + 3]], sections=128) for z in (0, 23)]
+    spool = trimesh.boolean.union([*discs, trimesh.creation.cylinder(2, segment=[[0, 0, 1], [0, 0, 25]], sections=128)])
+    pose = print_pose(mesh(spool), BED)
+    assert abs(pose.T_bed_part[2, 2]) == pytest.approx(1)  # it would roll on its rims
+    assert pose.overhang_mm2 == pytest.approx(np.pi * (100 - 4), rel=2e-3)
+    assert pose.support_mm3 == pytest.approx(np.pi * (100 - 4) * 23, rel=2e-3)
+    assert not print_pose(mesh(spool), (25.0, 25.0, 25.0)).fits  # 20 x 20 x 26
+    assert print_pose(mesh(spool), (25.0, 25.0, 26.0)).fits
+
+
+def test_a_cone_steeper_than_45_degrees_needs_no_support():
+    steep = trimesh.creation.cone(radius=10, height=30, sections=64)
+    pose = print_pose(mesh(steep), BED)
+    assert pose.overhang_mm2 == 0 and pose.T_bed_part[2, 2] == pytest.approx(1)
+
+
+def hourglass(half_height):
+    """Two cones tip to tip, cut off at a waist of radius 2: its upper half leans out by atan(8 / half_height)."""
+    h = half_height
+    return trimesh.creation.revolve([[0, 0], [10, 0], [2, h], [10, 2 * h], [0, 2 * h]], sections=128)
+
+
+@pytest.mark.parametrize(("half_height", "needs_support"), [(8.3, False), (7.7, True)])  # 43.9 and 46.1 deg
+def test_45_degrees_out_of_the_vertical_is_the_limit(half_height, needs_support):
+    pose = print_pose(mesh(hourglass(half_height)), BED)
+    cone = np.pi * 12 * np.hypot(8, half_height)
+    assert pose.overhang_mm2 == pytest.approx(cone if needs_support else 0, rel=2e-3)
+
+
+def test_a_part_without_a_flat_still_gets_a_pose():
+    pose = print_pose(mesh(trimesh.creation.icosphere(subdivisions=2, radius=20)), BED)
+    assert pose.fits and pose.size_mm[2] == pytest.approx(40, abs=1.5)
+
+
+def test_the_longer_side_lies_along_x_and_decides_whether_it_fits():
+    bar = trimesh.creation.box(extents=(20, 20, 200))
+    pose = print_pose(turned(bar, (0.3, 0.4, 0.5, 0.6)), (210.0, 30.0, 30.0))
+    assert pose.fits
+    np.testing.assert_allclose(pose.size_mm, (200, 20, 20), atol=1e-6)
+
+
+def test_every_printed_part_has_a_file_that_a_strict_reader_takes(made):
+    printed = {file for file in made.exports.files if file.startswith("print/")}
+    names = {part.name for part in made.result.parts} - {"servo_shaft", "counterweight"} | {"fit_coupon"}
+    assert printed == {f"print/{name}.3mf" for name in names}
+    assert ("print/servo_shaft.3mf", "of metal: made after its STEP file") in {
+        (entry.what, entry.why) for entry in made.exports.left_out
+    }
+    volumes = {part.name: part.volume_mm3 for part in made.result.parts}
+    for file in printed:
+        model = get_wrapper().CreateModel()
+        reader = model.QueryReader("3mf")
+        reader.SetStrictModeActive(True)
+        reader.ReadFromFile(str(made.folder / file))
+        assert reader.GetWarningCount() == 0
+        assert model.GetBuildItems().Count() == 1
+        objects = model.GetMeshObjects()
+        assert objects.MoveNext()
+        part = objects.GetCurrentMeshObject()
+        assert part.IsManifoldAndOriented() and f"print/{part.GetName()}.3mf" == file
+        vertices = np.array([tuple(v.Coordinates) for v in part.GetVertices()])
+        faces = np.array([tuple(t.Indices) for t in part.GetTriangleIndices()])
+        read = trimesh.Trimesh(vertices, faces, process=False)
+        if part.GetName() in volumes:
+            assert read.volume == pytest.approx(volumes[part.GetName()], rel=1e-3)
+        assert read.bounds[0, 2] == 0
+        assert (read.bounds[0] >= 0).all() and (read.bounds[1] <= BED).all()
+        assert (read.face_normals[read.triangles_center[:, 2] < 1e-3][:, 2] < -0.999).all()  # a flat lies on the bed
+
+
+def test_a_slicer_takes_the_print_files_without_repair(made):
+    if shutil.which(PROGRAM) is None:
+        pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
+    volumes = {part.name: part.volume_mm3 for part in made.result.parts}
+    for name in ("alignment_linkage", "slip_ring_adapter"):
+        found = sliced(made.folder / "print" / f"{name}.3mf")
+        assert found.closed
+        assert found.volume_mm3 == pytest.approx(volumes[name], rel=1e-3)
+        assert found.height_mm == pytest.approx(found.size_mm[2], abs=0.3)  # a layer of its own choice
+
+
+def test_a_slicer_is_believed_because_it_sees_a_hole(tmp_path):
+    if shutil.which(PROGRAM) is None:
+        pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
+    open_box = trimesh.creation.box(extents=(20, 20, 20))
+    open_box.update_faces(np.arange(len(open_box.faces)) > 0)
+    (tmp_path / "open.3mf").write_bytes(threemf_bytes(mesh(open_box), "open", "a box that lacks a triangle"))
+    assert not sliced(tmp_path / "open.3mf").closed
+
+
+def test_the_zip_holds_no_date_and_no_platform(tmp_path):
+    data = threemf_bytes(mesh(TABLE), "a <part>", 'of "x" & y')
+    assert data == threemf_bytes(mesh(TABLE), "a <part>", 'of "x" & y')
+    (tmp_path / "a.3mf").write_bytes(data)
+    for entry in zipfile.ZipFile(tmp_path / "a.3mf").infolist():
+        assert entry.date_time == (1980, 1, 1, 0, 0, 0)
+        assert (entry.create_system, entry.compress_type) == (3, zipfile.ZIP_STORED)
+
+
+def test_the_coupon_has_the_clearances_that_it_says(made):
+    coupon = trimesh.load(made.folder / "print" / "fit_coupon.3mf").to_mesh()
+    assert coupon.is_watertight
+    section, _ = coupon.section(plane_origin=[0, 0, 2.0], plane_normal=[0, 0, 1]).to_2D()
+    diameters = sorted(np.ptp(loop[:, 0]) for loop in section.discrete if len(loop) > 20)
+    printer, shaft = made.scanner.printer, 12.0
+    assert (printer.fit_clearance_mm, printer.screw_clearance_mm) == (0.2, 0.4)
+    expected = [nominal + c for nominal in (2.5, 3.0) for c in (0.2, 0.3, 0.4, 0.5, 0.6)]
+    expected += [shaft + c for c in (0.0, 0.1, 0.2, 0.3, 0.4)]
+    np.testing.assert_allclose(diameters, sorted(expected), atol=0.02)
+    top = coupon.section(plane_origin=[0, 0, 4.9], plane_normal=[0, 0, 1])
+    assert len(top.discrete) > len(section.discrete) + 15  # the lettering
+
+
+def test_every_glyph_stays_on_its_grid_and_moves_with_every_stroke():
+    for chains in GLYPHS.values():
+        for chain in chains.split():
+            points = [(int(x), int(y)) for x, y in zip(chain[::2], chain[1::2], strict=True)]
+            assert len(points) > 1 and all(0 <= x <= 4 and 0 <= y <= 6 for x, y in points)
+            assert all(a != b for a, b in itertools.pairwise(points))
+    assert text_width("AB", 6.0) == 10.0 and text_width("", 6.0) == 0.0

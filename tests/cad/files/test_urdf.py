@@ -1,0 +1,111 @@
+"""`scanner.urdf` loads in a URDF library and moves like the angle set."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from cad.files.parts import build_parts
+from cad.files.urdf import roll_pitch_yaw
+from cad.layout.deck import mount_offset_mm
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import Bearing, load_catalogue
+from design.errors import BuildError
+from design.scanner import scanner_of
+
+CASES = {
+    "rolling": {"angles": (0, 90, 0, 0, -90, 0)},
+    "pitching": {"angles": (-90, 0, 0, 90, 0, 0)},
+    "calibrated": {
+        "angles": (20, -35, 15, 40, -60, 0),
+        "delta_rotvec_rot_deg": (0.3, -0.2),
+        "t_rot_laser_mm": (1.2, -0.7, 0.1),
+        "source": "calibration",
+    },
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def built(request, tmp_path_factory):
+    case = dict(CASES[request.param])
+    names = ("alpha_rot", "beta_rot", "gamma_rot", "alpha_laser", "beta_laser", "gamma_laser")
+    angles = AngleSet(
+        task=request.param,
+        angles_deg=Angles(**dict(zip(names, case.pop("angles"), strict=True))),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="UH1256-02-0610-06S",
+        **case,
+    )
+    catalogue = load_catalogue()
+    offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", catalogue))
+    angles = angles.model_copy(update={"t_world_rot_mm": offset})
+    folder = tmp_path_factory.mktemp(request.param)
+    result = build_parts(scanner_of(angles, "fdm-0.4", catalogue), folder, lambda _: None)
+    return angles, folder, result
+
+
+def test_the_chain_is_that_of_the_angle_set(built):
+    angles, folder, _ = built
+    robot = yourdfpy.URDF.load(str(folder / "scanner.urdf"))
+    assert robot.actuated_joint_names == ["spin_joint"]
+    assert {"world", "servo", "rot", "laser"} == set(robot.link_map)
+    for joint in (0.0, 0.7, np.pi / 2, -2.5, 40.0):
+        robot.update_cfg({"spin_joint": joint})
+        np.testing.assert_allclose(robot.get_transform("laser", "world"), angles.T_world_laser(joint), atol=1e-6)
+        np.testing.assert_allclose(robot.get_transform("rot", "world"), angles.T_world_rot(joint), atol=1e-6)
+
+
+def test_meshes_are_found_beside_the_file_and_are_metres(built):
+    _, folder, result = built
+    robot = yourdfpy.URDF.load(str(folder / "scanner.urdf"))
+    for visual in (v for link in robot.link_map.values() for v in link.visuals if v.geometry.mesh is not None):
+        assert (folder / visual.geometry.mesh.filename).is_file()
+        np.testing.assert_allclose(visual.geometry.mesh.scale, 0.001)
+    named = {v.geometry.mesh.filename for link in robot.link_map.values() for v in link.visuals if v.geometry.mesh}
+    assert named == {f"parts/{part.name}.stl" for part in result.parts}
+    extent = robot.scene.extents.max()
+    assert 0.2 < extent < 0.6
+
+
+def test_masses_add_up_and_inertias_are_those_of_bodies(built):
+    _, folder, result = built
+    mass = {}
+    for link in ElementTree.parse(folder / "scanner.urdf").getroot().iter("link"):
+        if link.get("name") == "world":
+            continue
+        mass[link.get("name")] = float(link.find("inertial/mass").get("value"))
+        J = {key: float(value) for key, value in link.find("inertial/inertia").attrib.items()}
+        principal = np.linalg.eigvalsh(
+            [[J["ixx"], J["ixy"], J["ixz"]], [J["ixy"], J["iyy"], J["iyz"]], [J["ixz"], J["iyz"], J["izz"]]]
+        )
+        assert principal[0] > 0 and principal[2] <= principal[0] + principal[1]
+    own = {part.name: part.mass_g / 1000 for part in result.parts}
+    bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
+    turning = own["servo_shaft"] + own["alignment_linkage"] + own.get("counterweight", 0.0) + 0.1 + bearing / 2
+    standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
+    assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
+    assert mass["servo"] == pytest.approx(standing + 0.126, abs=5e-4)
+    assert mass["laser"] == pytest.approx(0.370)
+    shaft = next(part for part in result.parts if part.name == "servo_shaft")
+    assert own["servo_shaft"] == pytest.approx(2.7e-6 * shaft.volume_mm3, rel=1e-4)  # turned from aluminium
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2, 0.4])
+def test_fixed_axis_angles_survive_the_gimbal(pitch):
+    c, s = np.cos([0.3, pitch]), np.sin([0.3, pitch])
+    Rx = np.array([[1, 0, 0], [0, c[0], -s[0]], [0, s[0], c[0]]])
+    Ry = np.array([[c[1], 0, s[1]], [0, 1, 0], [-s[1], 0, c[1]]])
+    roll, tip, yaw = roll_pitch_yaw(Rx @ Ry)
+    cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(tip), np.sin(tip), np.cos(yaw), np.sin(yaw)
+    back = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    np.testing.assert_allclose(back @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]), Rx @ Ry, atol=1e-9)
+
+
+def test_an_angle_set_that_names_another_place_is_refused(built, tmp_path):
+    angles, _, _ = built
+    wrong = angles.model_copy(update={"t_world_rot_mm": (1.0, 2.0, 3.0)})
+    with pytest.raises(BuildError, match=r"t_world_rot_mm = \[1.0, 2.0, 3.0\]"):
+        build_parts(scanner_of(wrong, "fdm-0.4", load_catalogue()), tmp_path, lambda _: None)
+    assert list(tmp_path.iterdir()) == []

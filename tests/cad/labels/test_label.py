@@ -1,0 +1,190 @@
+"""The engraved label: what it says, where it is, that it can be read and leaves a wall; engraving against booleans."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+
+from cad import solids
+from cad.files.parts import config_hash
+from cad.geometry.holes import Piercing
+from cad.geometry.mesh import checked_mesh
+from cad.labels.engrave import engrave, groove_of
+from cad.labels.flats import flat_at, flats_of
+from cad.labels.glyphs import letters, text_width
+from cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
+from cad.labels.sight import Sight
+from cad.solids import box, upright
+
+STROKE = 0.8
+
+
+@pytest.fixture(scope="module")
+def groove(made):
+    return groove_of(made.scanner.printer)
+
+
+def test_the_parts_that_hold_the_angles_say_them(made):
+    digest = config_hash(made.scanner)
+    assert label_texts(made.scanner, "alignment_linkage", digest) == ["tilted", "L -20 -70", digest[:DIGITS]]
+    assert label_texts(made.scanner, "base_mount", digest) == ["tilted", "R 0 35", digest[:DIGITS]]
+    assert label_texts(made.scanner, "bearing_cage", digest) == ["tilted", digest[:DIGITS]]
+    assert set(made.result.meshes) >= {"alignment_linkage", "base_mount"}
+    named = made.scanner.angles.model_copy(update={"task": "another"})
+    assert config_hash(replace(made.scanner, angles=named)) != digest
+
+
+def test_a_printed_part_has_a_label_or_is_told_to_have_none(made):
+    result, missing = made.result, {out.what for out in made.result.left_out if out.unit == "labels"}
+    for name in set(result.assembly.made) - result.assembly.metal():
+        plain = result.assembly.mesh(name).volume() - result.meshes[name].volume() < 1.0
+        assert plain == (f"label of {name}" in missing)
+
+
+def test_engraving_takes_off_the_area_of_its_letters_and_nothing_else(made, groove):
+    assert (groove.width, groove.depth) == (pytest.approx(STROKE), pytest.approx(0.6))
+    for name in ("alignment_linkage", "base_mount"):
+        plain = made.result.assembly.made[name]
+        mesh = made.result.meshes[name]
+        read = trimesh.load(made.folder / "parts" / f"{name}.stl")
+        assert read.is_watertight and read.body_count == 1
+        lost = checked_mesh(plain, name).volume() - mesh.volume()
+        lines = [*label_texts(made.scanner, name, config_hash(made.scanner))]
+        if name == "alignment_linkage":
+            lines.append("FRONT")
+        areas = [sum(part.area for line in lines for part in letters(line, height, STROKE)) for height in (3.6, 4.5)]
+        assert groove.depth * areas[0] * 0.98 < lost < groove.depth * areas[1] * 1.02
+        solid = checked_mesh(plain, name).vertices
+        np.testing.assert_allclose(read.bounds, [solid.min(axis=0), solid.max(axis=0)], atol=1e-3)
+
+
+def test_front_stands_on_the_seat_towards_the_front(made, groove):
+    R = np.array(made.result.assembly.stack.R_rot_laser)
+    mesh = made.result.meshes["alignment_linkage"]
+    local = mesh.vertices @ R
+    floor = local[np.abs(local[:, 2] - (made.result.assembly.linkage.seat - groove.depth)) < 1e-3]
+    front = floor[(np.abs(floor[:, 0] - 20.0) < 2.7) & (np.abs(floor[:, 1]) < 11.5)]
+    assert len(front) > 50
+    assert np.ptp(front[:, 1]) == pytest.approx(text_width("FRONT", 4.5) + STROKE, abs=0.05)
+
+
+def test_labels_are_where_an_eye_finds_them(made):
+    """By rays of another library: outwards from the letters of each label nothing stands, not even the deck."""
+    assembly = made.result.assembly
+    bodies = [trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in assembly.meshes().values()]
+    scanner = trimesh.util.concatenate(bodies)
+    normal, on_deck = np.array(assembly.deck.normal), np.array(assembly.deck.centre)
+    hidden = {finding.subject for finding in made.result.findings if finding.code == "label_hidden"}
+    for name in ("alignment_linkage", "base_mount"):
+        assert name not in hidden
+        mesh, plain = made.result.meshes[name], checked_mesh(assembly.made[name], name)
+        known = {tuple(vertex) for vertex in np.round(plain.vertices, 4)}
+        new = np.array([vertex for vertex in mesh.vertices if tuple(np.round(vertex, 4)) not in known])
+        R = np.array(assembly.stack.R_rot_laser)
+        seat = assembly.linkage.seat
+        label = new[np.abs(new @ R[:, 2] - seat) > 1.0] if name == "alignment_linkage" else new
+        # the letters lie in one plane, and their floors in another
+        _, _, axes = np.linalg.svd(label - label.mean(axis=0), full_matrices=False)
+        out = axes[2]
+        height = label @ out
+        assert np.ptp(height) == pytest.approx(0.6, abs=1e-3)
+        top = label[height > height.max() - 1e-3]
+        if trimesh.Trimesh(plain.vertices, plain.faces).contains(top[:20] + 0.05 * out).all():  # inwards: the other way
+            out, top = -out, label[height < height.min() + 1e-3]
+        starts = top + 0.05 * out
+        assert not scanner.ray.intersects_any(starts, np.tile(out, (len(starts), 1))).any()
+        towards_deck = (starts - on_deck) @ normal / max(1e-9, -float(out @ normal))
+        assert towards_deck.min() > 200.0
+
+
+def test_faces_that_mate_or_are_covered_are_known(made):
+    assembly = made.result.assembly
+    sight, R, seat = Sight(assembly), assembly.stack.R(), assembly.linkage.seat
+    on_seat = flat_at(assembly.made["alignment_linkage"], R @ [0.0, 0.0, seat], R[:, 2])
+    assert sight.touched(on_seat) and not sight.views(on_seat, np.zeros((1, 2)), True).any()
+    deck = -np.array(assembly.deck.normal)
+    foot = flat_at(assembly.made["base_mount"], np.array(assembly.deck.centre) + 1e-9 * deck, deck)
+    assert sight.touched(foot) and not sight.views(foot, np.zeros((1, 2)), False).any()
+
+
+def _ground(solid, wall, groove):
+    return Ground(flats_of(solid, 12), Piercing(solid), groove, wall, np.array([0.0, 1.0, 0.0]), None)
+
+
+def test_a_label_leaves_a_wall_and_goes_round_holes(groove):
+    def found(solid, texts, seen=lambda _: True):
+        def views(flat, points):
+            return np.full((4, len(points)), seen(flat))
+
+        return label_on(_ground(solid, 1.2, groove), texts, views)
+
+    assert found(box((0, 0, 0), (60, 60, 1.5)), ["LABEL"]) is None
+    assert len(found(box((0, 0, 0), (34, 20, 20)), ["A LONG LABEL"]).lines.lines) == 2
+    assert found(box((0, 0, 0), (8, 8, 8)), ["LABEL"]) is None
+    assert found(box((0, 0, 0), (30, 12, 4)), ["MANY", "LINES", "ABCD"]).lines.lines == ("ABCD",)
+    top = np.array([0.0, 0.0, 1.0])
+    block = box((0, 0, 0), (60, 30, 6))
+    assert found(block, ["LABEL"], lambda flat: flat.frame[:, 2] @ top > 0.9).place.flat.frame[2, 2] > 0.9
+    assert not found(block, ["LABEL"], lambda _: False).seen
+    upright_lines = found(block, ["LABEL"], lambda flat: flat.frame[:, 2] @ top > 0.9).place
+    assert (upright_lines.flat.frame[:, :2] @ upright_lines.turn[:, 1]) @ [0.0, 1.0, 0.0] > 0.99
+    plate = block.cut(upright(5.0, -1, 7, 30, 15)).Solids()[0]
+    label = found(plate, ["LABEL"])
+    cut, mesh = engraved(plate, [(label.place, label.lines)], groove)
+    assert mesh.is_closed()
+    lost = plate.Volume() - cut.Volume()
+    area = sum(part.area for part in letters("LABEL", label.lines.height, STROKE))
+    assert lost == pytest.approx(groove.depth * area, rel=1e-6)
+
+
+def test_a_label_goes_to_what_is_seen_of_a_face(groove):
+    """Half of a face is covered, and of the other half a part that turns leaves one end free, then the other."""
+    block = box((0, 0, 0), (100, 100, 6))
+
+    def views(flat, points):
+        x, y, z = flat.at(points).T
+        return np.stack([(z > 5.9) & (x > 60) & (y > 55), (z > 5.9) & (x > 60) & (y < 30)])
+
+    label = label_on(_ground(block, 1.2, groove), ["LABEL"], views)
+    corners = label.place.flat.at(label.place.put(np.array([[0.0, 0.0], label.lines.size])))
+    assert label.seen and (corners[:, 0] > 60).all() and (corners[:, 1] > 55).all()
+    heads = label.place.flat.frame[:, :2] @ label.place.turn[:, 1]
+    assert heads @ [0.0, 1.0, 0.0] > 0.99  # up, as the block stands
+    lying = replace(_ground(block, 1.2, groove), up=np.array([0.0, 0.0, 1.0]))
+    place = label_on(lying, ["LABEL"], views).place
+    outwards = place.flat.at(place.put(np.array([[10.0, 2.0]])))[0] - [50.0, 50.0, 6.0]
+    assert place.flat.frame[:, :2] @ place.turn[:, 1] @ outwards < 0  # read from the nearer edge
+    narrow = label_on(_ground(block, 1.2, groove), ["LABEL"], lambda flat, points: views(flat, points) & False)
+    assert not narrow.seen
+
+
+def test_engraving_is_what_a_boolean_would_cut():
+    rng = np.random.default_rng(4)
+    R, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    R *= np.sign(np.linalg.det(R))
+    block = box((0, 0, 0), (40, 30, 8)).cut(upright(3.0, -1, 9, 33, 22)).Solids()[0]
+    for solid in (block, block.moved(solids.location(R, (3.0, 4.0, 5.0)))):
+        for flat in flats_of(solid, 2):  # of both orientations
+            outlines = [
+                shapely.transform(part, lambda points: points * 0.8 - [8, 2]) for part in letters("08A", 4.5, 0.8)
+            ]
+            assert all(flat.outline.contains(part) for part in outlines)
+            cut = engrave(solid, [(flat, outlines)], 0.6)
+            frame = solids.location(flat.frame, flat.origin)
+            tools = [
+                solids.prism(np.asarray(part.exterior.coords)[:-1], -0.6, 1.0).cut(
+                    *(solids.prism(np.asarray(ring.coords)[:-1], -0.7, 1.1) for ring in part.interiors)
+                )
+                for part in outlines
+            ]
+            wanted = solid.cut(*(tool.moved(frame) for tool in tools))
+            assert cut.isValid()
+            assert cut.cut(wanted).Volume() + wanted.cut(cut).Volume() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_letters_join_where_strokes_meet():
+    assert len(letters("HELLO", 4.5, STROKE)) == 5
+    assert len(letters("0", 4.5, STROKE)[0].interiors) == 1 and len(letters("8", 4.5, STROKE)[0].interiors) == 2
+    assert letters(" ", 4.5, STROKE) == []

@@ -1,0 +1,100 @@
+"""The holes of the robot's deck: what a task may ask for, and what the mount then has."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cad.geometry.mesh import checked_mesh
+from cad.layout.deck import deck_of
+from cad.layout.direct_stack import stack_of
+from cad.parts.base_mount import base_mount, mount_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.errors import BuildError
+from design.scanner import scanner_of
+from design.task.deck_holes import Circle, Rectangle
+from design.task.task import load_task
+
+SCREW_HOLE = {"M3": 3.4, "M4": 4.4, "M5": 5.4, "M6": 6.4}  # with the 0.4 mm of fdm-0.4
+TASK = """name = "holes"
+sensor = "UTM-30LX"
+servo = "MX-64R"
+slip_ring = "UH1256-02-0610-06S"
+[motion]
+period_s = 18.0
+"""
+
+
+def scanner_for(alpha_rot, beta_rot, deck):
+    angles = AngleSet(
+        task="holes",
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=20, beta_laser=-40),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="UH1256-02-0610-06S",
+    )
+    return scanner_of(angles, "fdm-0.4", load_catalogue(), deck)
+
+
+@pytest.mark.parametrize(
+    ("deck", "count"),
+    [
+        (Rectangle(shape="rectangle", size_mm=(150, 70), screw="M5"), 4),
+        (Circle(shape="circle", diameter_mm=110, count=6, first_deg=0, screw="M6"), 6),
+        (Circle(shape="circle", diameter_mm=100, count=3, first_deg=90, screw="M3"), 3),
+    ],
+)
+@pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 90), (0, 0), (180, 0), (66, -52)])
+def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count, alpha_rot, beta_rot):
+    scanner = scanner_for(alpha_rot, beta_rot, deck)
+    stack = stack_of(scanner)
+    where = deck_of(scanner, stack)
+    mesh = checked_mesh(base_mount(mount_of(scanner, where)), "base_mount")
+    turn = scanner.angles.T_world_rot(0.0)[:3, :3]
+    world = mesh.vertices @ turn.T + np.array(where.t_world_rot)
+    assert np.abs(world[:, 2]).min() < 1e-6
+    face = world[np.abs(world[:, 2]) < 1e-3, :2]
+    radius = SCREW_HOLE[deck.screw] / 2
+    holes = np.array(deck.holes())
+    assert len(holes) == count
+    for hole in holes:
+        reach = np.linalg.norm(face - hole, axis=1)
+        rim = face[reach < radius + 0.5]
+        assert len(rim) > 20
+        np.testing.assert_allclose(np.linalg.norm(rim - hole, axis=1), radius, atol=0.01)
+        assert reach[reach > radius + 0.5].min() > 2 * radius  # material around it
+    assert stack == stack_of(scanner_for(alpha_rot, beta_rot, None))  # nothing above the mount changes
+
+
+def test_a_hole_under_the_strut_is_refused_with_the_bound():
+    scanner = scanner_for(0, 90, Rectangle(shape="rectangle", size_mm=(50, 50), screw="M4"))
+    with pytest.raises(BuildError, match=r"deck.shape = 'rectangle': the hole at \(25, 25\) mm .* needs 30.9 mm"):
+        deck_of(scanner, stack_of(scanner))
+
+
+def test_an_upright_axis_needs_a_mount_only_where_the_deck_has_holes():
+    bare, drilled = scanner_for(0, 0, None), scanner_for(0, 0, Circle(shape="circle", diameter_mm=100))
+    assert deck_of(bare, stack_of(bare)).flat and not deck_of(drilled, stack_of(drilled)).flat
+    usual = scanner_for(0, 40, None)
+    named = replace(usual, deck=Rectangle(shape="rectangle"))
+    assert deck_of(usual, stack_of(usual)) == deck_of(named, stack_of(named))
+
+
+@pytest.mark.parametrize(
+    ("deck", "said"),
+    [
+        ('shape = "circle"', "deck.diameter_mm: this key is required"),
+        ('shape = "circle"\ndiameter_mm = -3', "deck.diameter_mm = -3: "),
+        ('shape = "square"', "deck.shape = 'square': not one of 'rectangle', 'circle'"),
+        ('shape = "rectangle"\nscrew = "M8"', "deck.screw = 'M8'"),
+        ('shape = "rectangle"\nsize = [3, 4]', "deck.size: unknown key; did you mean 'size_mm'?"),
+    ],
+)
+def test_a_deck_that_makes_no_sense_is_one_line(tmp_path, command, deck, said):
+    path = tmp_path / "holes.toml"
+    path.write_text(TASK + "[deck]\n" + deck + "\n")
+    code, _, complaint = command("optimise", path)
+    assert code == 2 and len(complaint) == 1 and said in complaint[0], complaint
+    path.write_text(TASK)
+    assert load_task(path).task.deck is None

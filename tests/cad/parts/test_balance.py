@@ -1,0 +1,200 @@
+"""The counterweight: what it balances, measured on meshes; where it has room; when there is none."""
+
+import math
+from dataclasses import replace
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cad.assembly.assembly import make_parts
+from cad.assembly.joints import joints_of
+from cad.assembly.shadow import shadow_of, triangles_of
+from cad.drives.drive import drive_of
+from cad.files.instructions import instructions_text
+from cad.geometry.holes import rounds_of
+from cad.layout.balance import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight, counterweight_of
+from cad.layout.imbalance import estimated_moment, keeps_flank, torque_nm
+from cad.layout.linkage import Ear, linkage_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.left_out import LeftOut
+from design.motion import Sweep
+from design.scanner import scanner_of
+from scanwright.studio.view.bodies import bodies_of
+
+SHIPPED = [(-180, 55, 80, -75), (0, 90, 0, -90)]  # ground_ahead, rolling
+STEEL, PLASTIC, ALUMINIUM = 7.85e-3, 1.24e-3, 2.7e-3  # g/mm3
+
+
+def scanner_for(*angles, sensor="UTM-30LX", servo="MX-64R"):
+    names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    record = AngleSet(
+        task="balance",
+        angles_deg=Angles(**dict(zip(names, angles, strict=True))),
+        sensor=sensor,
+        servo=servo,
+        slip_ring="UH1256-02-0610-06S",
+    )
+    return scanner_of(record, "fdm-0.4", load_catalogue())
+
+
+def found_for(scanner):
+    return counterweight_of(scanner, linkage_of(scanner, drive_of(scanner).stack))
+
+
+@pytest.fixture(scope="module", params=SHIPPED, ids=["ground_ahead", "rolling"])
+def made(request):
+    scanner = scanner_for(*request.param)
+    return scanner, make_parts(scanner)
+
+
+def meshes(assembly, names):
+    return {n: trimesh.Trimesh(m.vertices, m.faces) for n, m in ((n, assembly.mesh(n)) for n in names)}
+
+
+def test_the_rotor_is_balanced_by_its_meshes(made):
+    scanner, assembly = made
+    plastic = scanner.printer.density_g_cm3 / 1000
+    density = {"counterweight": STEEL, "servo_shaft": ALUMINIUM}
+    moment = np.zeros(2)
+    for name, mesh in meshes(assembly, assembly.turning_parts()).items():
+        moment += density.get(name, plastic) * mesh.volume * mesh.center_mass[:2]
+    lidar = scanner.lidar
+    to_middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
+    moment += lidar.mass_g * to_middle * scanner.angles.T_rot_laser()[:2, 2]
+    without = (
+        moment - STEEL * (bar := meshes(assembly, ["counterweight"])["counterweight"]).volume * bar.center_mass[:2]
+    )
+    assert torque_nm(scanner, np.linalg.norm(without)) > 10 * RUBS_NM
+    assert torque_nm(scanner, np.linalg.norm(moment)) < RUBS_NM
+
+
+@pytest.mark.parametrize(
+    "scanner", [scanner_for(*SHIPPED[0]), scanner_for(135, -15, -25, -25, sensor="URG-04LX", servo="AX-12A")]
+)
+def test_the_estimate_that_chooses_the_bar_is_that_of_the_solids(scanner):
+    linkage = linkage_of(scanner, drive_of(scanner).stack)
+    estimate = estimated_moment(scanner, linkage)
+    exact = scanner.servo.model_copy(update={"backlash_deg": 0.0})  # so that no ear is made
+    bare = make_parts(replace(scanner, servo=exact), lambda name: name in ("alignment_linkage", "sub_plate"))
+    assert isinstance(bare.counterweight, LeftOut) and ("sub_plate" in bare.made) == (linkage.ears is not None)
+    lidar = scanner.lidar
+    true = lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * linkage.stack.R()[:2, 2]
+    for mesh in meshes(bare, bare.made).values():
+        true = true + scanner.printer.density_g_cm3 / 1000 * mesh.volume * mesh.center_mass[:2]
+    assert np.linalg.norm(estimate - true) < 0.03 * np.linalg.norm(true)
+
+
+def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made):
+    scanner, assembly = made
+    bodies = {}
+    for name, mesh in assembly.meshes().items():
+        bodies[name] = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
+    bar, azimuth = bodies.pop("counterweight"), assembly.counterweight.ear.azimuth
+    for slid in (-TRIM, 0.0, TRIM):
+        there = bar.translate((slid * math.cos(azimuth), slid * math.sin(azimuth), 0.0))
+        for name, body in bodies.items():
+            assert (there ^ body).volume() < 0.05, (name, slid)
+            if name != "alignment_linkage":
+                assert there.min_gap(body, 2.0) > 0.9, (name, slid)
+    seen = triangles_of({name: assembly.mesh(name) for name in ("counterweight", "servo_case")})
+    assert not shadow_of(scanner, seen).beams.any()
+
+
+def test_screws_from_below_and_a_step_that_says_so(made):
+    scanner, assembly = made
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    joints = joints_of(scanner, assembly, rounds)
+    (joint,) = [joint for joint in joints if joint.onto == "counterweight"]
+    assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
+    bar = assembly.counterweight
+    assert bar.ear.high - bar.ear.low + 6 <= joint.length_mm <= bar.ear.high - bar.ear.low + bar.section[1]
+    text = instructions_text(scanner, assembly, joints, "0" * 12)
+    assert text.index("Lidar on its seat") < text.index("Counterweight on the linkage") < text.index("Linkage on the")
+
+
+@given(
+    moment=st.floats(600, 12_000),
+    azimuth=st.floats(-math.pi, math.pi),
+    section=st.sampled_from(SECTIONS),
+    start=st.floats(12, 30),
+)
+def test_a_bar_is_cut_to_the_moment_that_it_balances(moment, azimuth, section, start):
+    ear = Ear(azimuth, 10.0, 50.0, -70.0, -64.0, ((20.0, 30.0), (36.0, 46.0)), 4.4)
+    bar = Counterweight(ear=ear, section=section, start=start, length=0.0)
+    away = np.array([math.cos(azimuth), math.sin(azimuth)])
+    cut = bar.balancing(-moment * away)
+    own = cut.mass_g * (cut.start + cut.length / 2)
+    finest = cut.mass_g / max(cut.length, SAW) * SAW / 2 * (cut.end + SAW)
+    assert abs(own - moment) <= finest
+
+
+UST = {"sensor": "UST-10LX"}
+SMALL = {"sensor": "URG-04LX", "servo": "AX-12A"}
+
+
+@pytest.mark.parametrize(
+    ("scanner", "why"),
+    [
+        (scanner_for(0, 0, 30, -60), "upright"),
+        (scanner_for(-175, 10, 0, 20, **UST), "no more than bearing and ring"),
+        (scanner_for(65, 65, -50, 70, **SMALL), "in the fan"),
+        (scanner_for(135, -85, 35, -90, **UST), "the horn of MX-64R bears"),
+        (scanner_for(75, 65, -20, 10), "the lidar or its cables"),
+        (scanner_for(105, -20, -10, -70, **UST), "near to the deck"),
+        (scanner_for(-45, 35, -10, 0, **UST), "shorter than its screws"),
+    ],
+)
+def test_where_there_is_none_the_reason_is_told(scanner, why):
+    found = found_for(scanner)
+    assert isinstance(found, LeftOut) and why in found.why
+
+
+def test_a_sweep_that_gravity_holds_on_one_flank_needs_none():
+    scanner = scanner_for(*SHIPPED[1])
+    moment = estimated_moment(scanner, linkage_of(scanner, drive_of(scanner).stack))
+    # the axis is level: the imbalance hangs straight down somewhere, and 90 deg from there gravity pulls hardest
+    up = scanner.angles.T_world_rot(0.0)[2, :2]
+    lowest = math.degrees(math.atan2(-up[1], -up[0]) - math.atan2(moment[1], moment[0])) % 360
+    sideways = (lowest + 90) % 360 - 180
+
+    def swept(low, high):
+        motion = Sweep(limits_deg=(low, high), period_s=10.0)
+        return replace(scanner, angles=scanner.angles.model_copy(update={"motion": motion}))
+
+    held = swept(max(-180.0, sideways - 60), min(180.0, sideways + 60))
+    assert keeps_flank(held, moment) and "one flank" in found_for(held).why
+    assert not keeps_flank(swept(-180.0, 180.0), moment)
+    assert not keeps_flank(scanner, moment)
+
+
+def test_an_ear_over_the_index_mark_carries_it():
+    scanner = scanner_for(0, 90, -80, 0)  # wires and ear at +y
+    assembly = make_parts(scanner, lambda name: name == "alignment_linkage")
+    ear = assembly.counterweight.ear
+    assert math.degrees(ear.azimuth) == pytest.approx(90)
+    part = meshes(assembly, ["alignment_linkage"])["alignment_linkage"]
+    middle = (ear.low + ear.high) / 2
+    at_mark, beside = ([[x, 200.0, middle]] for x in (0.0, 2.0))
+    deep, flush = (
+        part.ray.intersects_location(start, [[0.0, -1.0, 0.0]])[0][:, 1].max() for start in (at_mark, beside)
+    )
+    assert flush == pytest.approx(ear.end, abs=0.01) and flush - deep == pytest.approx(1.0, abs=0.05)
+
+
+def test_both_halves_of_the_studio_together_name_it_once():
+    scanner = scanner_for(*SHIPPED[1])
+    names = [body.name for turning in (True, False) for body in bodies_of(scanner, turning)]
+    assert names.count("counterweight") == 1 and len(names) == len(set(names))
+
+
+def test_a_servo_without_play_needs_none():
+    scanner = scanner_for(*SHIPPED[1])
+    exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.05}))
+    assert "less than the noise" in found_for(exact).why
+    untold = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": None}))
+    assert isinstance(found_for(untold), Counterweight)

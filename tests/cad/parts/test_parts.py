@@ -1,0 +1,247 @@
+"""The exported parts of whole scanners, read back and measured by code that shares nothing with cad/."""
+
+import itertools
+from pathlib import Path
+from types import SimpleNamespace
+
+import cadquery as cq
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+
+from cad.files.parts import build_parts
+from cad.layout.deck import mount_offset_mm
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+# name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo
+SETTINGS = {
+    "rolling": (0, 90, 0, -90, "UTM-30LX", "MX-64R"),
+    "pitching": (-90, 0, 90, 0, "UTM-30LX", "MX-64R"),
+    "upright": (0, 0, 60, -45, "UTM-30LX", "MX-64R"),
+    "tilted": (0, 35, -20, -70, "UTM-30LX", "MX-64R"),
+    "ceiling": (180, 0, 45, -30, "UTM-30LX", "MX-64R"),
+    "leaning": (110, 20, -80, -10, "UST-10LX", "MX-64R"),
+    "small": (20, -50, 33, 12, "URG-04LX", "AX-12A"),
+}
+BEARING = {"rolling", "pitching", "tilted", "small"}  # a UST-10LX is light
+BALANCED = {"rolling", "pitching", "tilted"}  # elsewhere gravity does not turn it, the horn bears no more, or no room
+SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0), "UST-10LX": (47.4, 20.0)}  # optical height, hole offset
+SCREW_HOLE = 3.4  # M3 on fdm-0.4
+
+
+def rot(axis, degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array(
+        {
+            "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+            "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        }[axis]
+    )
+
+
+def scanner_for(setting):
+    alpha_rot, beta_rot, alpha, beta, lidar, servo = setting
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
+        sensor=lidar,
+        servo=servo,
+        slip_ring="UH1256-02-0610-06S",
+    )
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(scanner)})
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+def merged(vertices, faces):
+    """Closed mesh of a re-imported solid, whose tessellation repeats vertices face by face."""
+    points, index = np.unique(np.round(vertices, 5), axis=0, return_inverse=True)
+    faces = index.reshape(-1)[np.asarray(faces)]
+    keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return trimesh.Trimesh(points, faces[keep], process=False)
+
+
+@pytest.fixture(scope="module", params=SETTINGS)
+def built(request, tmp_path_factory):
+    setting = SETTINGS[request.param]
+    folder = tmp_path_factory.mktemp(request.param)
+    scanner = scanner_for(setting)
+    result = build_parts(scanner, folder, lambda _: None)
+    solids = {}
+    for child in cq.Assembly.importStep(str(folder / "assembly.step")).children:
+        solids[child.name] = cq.Compound.makeCompound(child.toCompound().Solids())
+    meshes = {}
+    for name, solid in solids.items():
+        vertices, faces = solid.tessellate(0.02, 0.2)
+        meshes[name] = merged(np.array([v.toTuple() for v in vertices]), faces)
+    stl = {part.name: trimesh.load(folder / "parts" / f"{part.name}.stl") for part in result.parts}
+    R_world = rot("x", setting[0]) @ rot("y", setting[1])
+    return SimpleNamespace(
+        name=request.param,
+        folder=folder,
+        result=result,
+        solids=solids,
+        meshes=meshes,
+        stl=stl,
+        R=rot("y", setting[3]) @ rot("x", setting[2]),
+        R_world=R_world,
+        lidar=setting[4],
+        t_world=np.array(scanner.angles.t_world_rot_mm),
+    )
+
+
+def circle(points):
+    """Centre and diameters of vertices on a circle, in the plane, by least squares."""
+    A = np.column_stack([2 * points, np.ones(len(points))])
+    centre = np.linalg.lstsq(A, (points**2).sum(axis=1), rcond=None)[0][:2]
+    return centre, 2 * np.linalg.norm(points - centre, axis=1)
+
+
+def test_every_stl_is_one_closed_body_of_the_right_volume(built):
+    for part in built.result.parts:
+        mesh = built.stl[part.name]
+        assert mesh.is_watertight and mesh.is_winding_consistent, part.name
+        assert mesh.body_count == 1, part.name
+        solid = cq.importers.importStep(str(built.folder / "parts" / f"{part.name}.step")).val()
+        assert len(solid.Solids()) == 1 and solid.isValid()
+        assert mesh.volume == pytest.approx(solid.Volume(), rel=1e-3)
+        assert part.volume_mm3 == pytest.approx(solid.Volume(), rel=1e-4)
+        np.testing.assert_allclose(mesh.bounds, part.box_mm, atol=1e-3)
+
+
+def test_the_seat_looks_where_the_angles_say(built):
+    height, offset = SEAT[built.lidar]
+    mesh = built.stl["alignment_linkage"]
+    local = mesh.vertices @ built.R  # laser frame
+    seat = local[np.abs(local[:, 2] + height) < 1e-3]
+    world = seat @ built.R.T
+    normal = np.linalg.svd(world - world.mean(axis=0))[2][2]
+    normal *= np.sign(normal @ built.R[:, 2])
+    off = np.degrees(np.arcsin(np.linalg.norm(np.cross(normal, built.R[:, 2]))))
+    assert off < 1e-4
+
+    centres = []
+    for x, y in itertools.product((offset, -offset), repeat=2):
+        edge = seat[np.linalg.norm(seat[:, :2] - [x, y], axis=1) < 2.0, :2]
+        assert len(edge) > 20
+        centre, diameters = circle(edge)
+        np.testing.assert_allclose(diameters, SCREW_HOLE, atol=0.02)
+        centres.append([*centre, seat[:, 2].mean()])
+    np.testing.assert_allclose(np.mean(centres, axis=0) @ built.R.T, -height * built.R[:, 2], atol=0.01)
+    turned = np.array(centres) - np.mean(centres, axis=0)
+    np.testing.assert_allclose(np.abs(turned[:, :2]), offset, atol=0.01)
+
+
+def test_the_bore_sits_on_the_axis_and_is_keyed_towards_the_index(built):
+    vertices = built.stl["alignment_linkage"].vertices
+    rim = vertices[np.abs(vertices[:, 2] - vertices[:, 2].min()) < 1e-3, :2]
+    rim = rim[np.linalg.norm(rim, axis=1) < 8]
+    assert rim[:, 1].max() == pytest.approx(5.1, abs=0.01)  # the flat, at +y
+    _, diameters = circle(rim[rim[:, 1] < 4])
+    np.testing.assert_allclose(diameters, 12.2, atol=0.02)
+    centre, _ = circle(rim[rim[:, 1] < 4])
+    np.testing.assert_allclose(centre, 0, atol=0.01)
+
+
+def test_no_two_parts_share_room(built):
+    bodies = {}
+    for name, mesh in {**built.meshes, **built.stl}.items():
+        bodies[name] = manifold3d.Manifold(
+            manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+        )
+        assert bodies[name].volume() > 1, name
+    for one, other in itertools.combinations(bodies, 2):
+        assert (bodies[one] ^ bodies[other]).volume() < 0.05, (one, other)
+
+
+def test_the_rotor_turns_freely(built):
+    def body(names, turn=0.0):
+        R = rot("z", turn)
+        found = [{**built.meshes, **built.stl}[name] for name in names]
+        solids = [
+            manifold3d.Manifold(manifold3d.Mesh((m.vertices @ R.T).astype(np.float32), m.faces.astype(np.uint32)))
+            for m in found
+        ]
+        return manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
+
+    rotor = ("lidar", "alignment", "counterweight", "servo_shaft", "servo_horn", "ring_rotor", "bearing_inner")
+    turning = [name for name in built.meshes if name.startswith(rotor)]
+    standing = [name for name in built.meshes if name not in turning]
+    still = body(standing)
+    for turn in (20.0, 90.0, 135.0, 250.0):
+        assert (still ^ body(turning, turn)).volume() < 0.05, turn
+
+
+def test_everything_stands_clear_of_the_deck(built):
+    hangs = built.R_world[2, 2] < -1e-6
+    height = {}
+    for name, mesh in built.meshes.items():
+        z = (mesh.vertices @ built.R_world.T + built.t_world)[:, 2] * (-1 if hangs else 1)
+        height[name] = z.min()
+    if "base_mount" not in built.meshes:
+        assert built.name == "upright"
+        assert height["servo_case"] == pytest.approx(0, abs=1e-3)
+        return
+    assert height.pop("base_mount") == pytest.approx(0, abs=1e-3)
+    assert min(height.values()) > 8
+    # the lidar's sphere misses the foot in every position
+    radius = max(np.linalg.norm(built.meshes[n].vertices, axis=1).max() for n in built.meshes if n.startswith("lidar"))
+    assert built.t_world[2] * (-1 if hangs else 1) - radius > 8
+
+
+def test_the_deck_holes_surround_the_world_origin(built):
+    if "base_mount" not in built.stl:
+        pytest.skip("no mount: the axis is upright")
+    vertices = built.stl["base_mount"].vertices @ built.R_world.T + built.t_world
+    face = vertices[np.abs(vertices[:, 2]) < 1e-3, :2]
+    for x, y in itertools.product((40, -40), repeat=2):
+        edge = face[np.linalg.norm(face - [x, y], axis=1) < 3.0]
+        centre, diameters = circle(edge)
+        np.testing.assert_allclose(diameters, 4.4, atol=0.02)
+        np.testing.assert_allclose(centre, [x, y], atol=0.01)
+
+
+def test_the_shaft_fits_the_horn_and_passes_the_ring(built):
+    vertices = built.stl["servo_shaft"].vertices
+    servo = SETTINGS[built.name][5]
+    count, pitch, hole = {"MX-64R": (8, 22.0, 2.9), "AX-12A": (4, 16.0, 2.4)}[servo]
+    horn = vertices[:, 2].min()
+    rim = vertices[np.abs(vertices[:, 2] - horn) < 1e-3, :2]
+    for k in range(count):
+        at = (
+            pitch / 2 * np.array([np.cos(np.pi / 2 + 2 * np.pi * k / count), np.sin(np.pi / 2 + 2 * np.pi * k / count)])
+        )
+        centre, diameters = circle(rim[np.linalg.norm(rim - at, axis=1) < hole / 2 + 0.3])
+        np.testing.assert_allclose(diameters, hole, atol=0.02)
+        np.testing.assert_allclose(centre, at, atol=0.01)
+    ring = built.meshes["ring_rotor"].bounds[:, 2]
+    inside = vertices[vertices[:, 2] > ring[0]]
+    assert np.linalg.norm(inside[:, :2], axis=1).max() == pytest.approx(6.0, abs=1e-3)  # bore 12.7
+    hub = built.stl["alignment_linkage"].bounds[0, 2]
+    journal = 8.5 if built.name in BEARING else 0.0  # 0.5 above a bearing of 7, 1 below it
+    assert inside[:, 2].max() - hub == pytest.approx(11.0 + journal, abs=1e-3)
+    assert hub - ring[1] == pytest.approx(10.0, abs=1e-3)  # room for the wires
+
+
+def test_findings_name_what_to_do(built):
+    found = {finding.code: finding for finding in built.result.findings}
+    assert "aluminium or steel" in found["turn_from_metal"].message
+    unverified = [finding.message for finding in built.result.findings if finding.code == "unverified"]
+    assert any("UH1256-02-0610-06S: length_mm = 45.0" in message and "measure" in message for message in unverified)
+    assert "tilt_moment" not in found
+    left_out = [out.what for out in built.result.left_out if out.unit == "parts"]
+    if built.name == "upright":
+        assert left_out == ["bearing_cage", "counterweight", "base_mount"]
+        assert "M2.5" in found["servo_on_deck"].message
+    else:
+        bearing = [] if built.name in BEARING else ["bearing_cage"]
+        assert left_out == bearing + ([] if built.name in BALANCED else ["counterweight"])
+
+
+def test_every_file_is_where_the_result_says(built):
+    on_disk = sorted(str(Path(p).relative_to(built.folder)) for p in built.folder.rglob("*") if p.is_file())
+    assert on_disk == sorted(built.result.files)

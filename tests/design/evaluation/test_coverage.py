@@ -1,0 +1,115 @@
+"""Blind and masked shares in closed form, and against a ball search on random directions."""
+
+from dataclasses import replace
+from math import acos, cos, radians, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from design.catalogue.catalogue import load_catalogue
+from design.evaluation.coverage import blind_zones, coverage
+from design.frames import R_world_rot
+from design.objective.ball_search import scan_tree
+from design.objective.objectives import log
+from design.objective.problem import problem_of
+from design.task.task import LoadedTask, Task
+
+CONE = {"shape": "cone", "axis": [-1.0, 0.0, -0.5], "half_angle_deg": 25}
+
+
+def problem(mask=(), sensor="UTM-30LX", ball_radius_deg=2.0, period_s=18.0):
+    task = Task.model_validate(
+        {
+            "name": "t",
+            "sensor": sensor,
+            "servo": "MX-64R",
+            "motion": {"period_s": period_s},
+            "weight": [{"shape": "all"}],
+            "mask": mask,
+            "density": {"ball_radius_deg": ball_radius_deg},
+        }
+    )
+    return problem_of(LoadedTask(task, Path(), load_catalogue(), ()))
+
+
+def cap(half_rad):
+    """Share of the sphere within an angle of one direction."""
+    return (1 - cos(max(half_rad, 0.0))) / 2
+
+
+@pytest.mark.parametrize("tilt_deg", [0, 10, 45, 62, 80, 87, 89, 90])
+@pytest.mark.parametrize("ball_deg", [0.5, 2.0, 20.0])
+def test_a_plane_tilted_sideways_leaves_a_cone_at_either_pole(tilt_deg, ball_deg):
+    """The beams at +-90 deg rise by the tilt: they come within 90 - tilt of either pole, the ball within less."""
+    seen = coverage(problem(ball_radius_deg=ball_deg), np.radians([33, -20, tilt_deg, 0]))
+    assert seen.blind_fraction == pytest.approx(2 * cap(radians(90 - tilt_deg - ball_deg)), abs=2e-6)
+    assert seen.masked_fraction == 0
+
+
+@pytest.mark.parametrize("tilt_deg", [-70, -30, 30, 70, 90])
+@pytest.mark.parametrize(("sensor", "ends_deg"), [("UTM-30LX", (-135, 135)), ("URG-04LX", (-119.53125, 119.8828125))])
+def test_a_plane_tilted_forwards_leaves_more_where_the_fan_has_its_gap(tilt_deg, sensor, ends_deg):
+    """cos(polar) = -sin(beta) cos(bearing): the front beam comes nearest to one pole, the last beam to the other."""
+    seen = coverage(problem(sensor=sensor), np.radians([-60, 45, 0, tilt_deg]))
+    lean = sin(radians(abs(tilt_deg)))
+    front = radians(90 - abs(tilt_deg) - 2)
+    rear = acos(lean * -min(cos(radians(end)) for end in ends_deg)) - radians(2)
+    assert seen.blind_fraction == pytest.approx(cap(front) + cap(rear), abs=2e-6)
+
+
+@pytest.mark.parametrize("half_deg", [1, 25, 90, 179])
+def test_a_cone_hides_its_solid_angle(half_deg):
+    seen = coverage(problem([CONE | {"half_angle_deg": half_deg}]), np.radians([0, 90, 0, -90]))
+    assert seen.masked_fraction == pytest.approx(cap(radians(half_deg)), abs=2e-6)
+
+
+def test_a_sphere_that_is_all_masked_is_not_blind():
+    plain = problem([])
+    everything = plain.with_objective(
+        log(replace(plain.field, mask=plain.field.weight))
+    )  # no task is read with such a mask
+    seen = coverage(everything, np.zeros(4))
+    assert (seen.masked_fraction, seen.blind_fraction) == (1.0, 0.0)
+
+
+def test_masked_directions_leave_the_blind_share():
+    """A mask about the axis over one blind cone leaves the other one, of a smaller sphere."""
+    setting = np.radians([33, -20, 50, 0])
+    mask = CONE | {"axis": R_world_rot(*setting[:2])[:, 2].tolist(), "half_angle_deg": 45}
+    seen = coverage(problem([mask]), setting)
+    assert seen.blind_fraction == pytest.approx(cap(radians(38)) / (1 - cap(radians(45))), abs=2e-6)
+
+
+def test_a_small_ball_leaves_rings_between_the_beams():
+    """Ball 0.01 deg, beams of a rolling scanner every 0.25 deg of polar angle, out to 135 deg on either side."""
+    polar = np.radians(np.array([10.0, 20.0, 20.5]))
+    np.testing.assert_allclose(
+        np.degrees(blind_zones(polar, np.radians(1.0))), [(0, 9), (11, 19), (21.5, 180)], atol=1e-9
+    )
+    rolling = np.radians([0, 90, 0, -90])
+    seen = coverage(problem(ball_radius_deg=0.01), rolling)
+    rings = sum(cos(radians(t - 0.01)) - cos(radians(t + 0.01)) for t in np.arange(0.25, 135.1, 0.25)) / 2
+    assert seen.blind_fraction == pytest.approx(1 - rings - cap(radians(0.01)), abs=1e-4)
+
+
+@pytest.mark.parametrize("setting_deg", [(0, 0, 50, 0), (40, -70, 10, 20), (-120, 15, 0, 80), (0, 0, 0, 0)])
+@pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX"])
+def test_random_directions_that_no_beam_comes_near_are_as_many(setting_deg, sensor):
+    """At 18 s a ball of 2 deg reaches over several lines: what one scan misses, every start phase misses."""
+    p, setting = problem([CONE], sensor), np.radians(setting_deg)
+    d = np.random.default_rng(5).normal(size=(6000, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    axis = np.array(CONE["axis"]) / np.linalg.norm(CONE["axis"])
+    d = d[d @ axis < cos(radians(25))]
+    unseen = scan_tree(p, setting).query_ball_point(d, 2 * sin(radians(1)), return_length=True) == 0
+    share = unseen.mean()
+    noise = 4 * sqrt(share * (1 - share) / len(d)) + 1e-3
+    assert coverage(p, setting).blind_fraction == pytest.approx(share, abs=noise)
+
+
+def test_rolling_is_blind_behind_and_pitching_nowhere():
+    """A fan of 270 deg rolled about its own front leaves 45 deg about the rear, less the ball."""
+    rolling, pitching = (coverage(problem(), np.radians(s)) for s in ([0, 90, 0, -90], [-90, 0, 90, 0]))
+    assert rolling.blind_fraction == pytest.approx(cap(radians(43)), abs=1e-6)
+    assert pitching.blind_fraction == pytest.approx(0, abs=1e-12)

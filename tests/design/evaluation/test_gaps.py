@@ -1,0 +1,119 @@
+"""Gaps, seams and crossings in closed form against counts on simulated scans."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from design.density.ball_count import ball_count
+from design.density.beams import Lines, beam_directions_rot, scan_lines, simulated_scan
+from design.errors import TaskError
+from design.evaluation.gaps import gaps, interlaced_period_s, shortest_period_s
+from design.frames import R_world_rot
+from design.objective.problem import problem_of
+from design.sphere.directions import spiral
+from design.task.task import load_task
+
+SETTINGS = [(0, 90, 0, -90), (-90, 0, 90, 0), (10, 20, -50, 35), (0, 0, 45, 0), (200, -30, 70, -60), (0, 0, 0, 0)]
+
+
+@pytest.fixture(scope="module")
+def uniform():
+    return problem_of(load_task(Path("uniform")))
+
+
+@pytest.fixture(scope="module")
+def ground():
+    return problem_of(load_task(Path("ground_ahead")))
+
+
+def seen(bearings, lines, angles, directions, radius):
+    return ball_count(simulated_scan(bearings, lines, angles), directions, radius) > 0
+
+
+@pytest.mark.parametrize("angles_deg", SETTINGS)
+def test_half_a_turn_against_a_simulated_one(uniform, angles_deg):
+    angles = np.radians(angles_deg)
+    directions = spiral(6000)
+    lines = Lines(1440, 2 * np.pi / 1440)
+    half = Lines(720, lines.step_rad)
+    radius = np.radians(0.3)  # a few beams: blurs every edge by 0.3 deg
+    full = seen(uniform.bearings_rad, lines, angles, directions, radius)
+    missed = full & ~seen(uniform.bearings_rad, half, angles, directions, radius)
+    assert gaps(uniform, angles).half_turn_misses == pytest.approx(missed.mean(), abs=0.012)
+
+
+@pytest.mark.parametrize("angles_deg", SETTINGS[:5])
+def test_seen_twice_against_lines_that_come_by(uniform, angles_deg):
+    """A direction is seen twice where its small ball is entered in two separate parts of the turn."""
+    angles = np.radians(angles_deg)
+    directions = spiral(300)
+    radius = np.radians(0.4)
+    R = R_world_rot(angles[0], angles[1], np.radians(np.arange(0, 360, 0.4)))
+    beams = beam_directions_rot(uniform.bearings_rad, angles[2], angles[3])
+    hit = np.stack([(directions @ (r @ beams.T)).max(axis=1) >= np.cos(radius) for r in R])
+    visits = (hit & ~np.roll(hit, 1, axis=0)).sum(axis=0)
+    assert gaps(uniform, angles).seen_twice == pytest.approx((visits >= 2).mean(), abs=0.03)
+
+
+def test_the_figures_of_the_standard_alignments(uniform):
+    """Rolling alone is complete after half a turn (paper, section 4); shares: algorithms, section 0."""
+    rolling, pitching = (gaps(uniform, np.radians(a)) for a in SETTINGS[:2])
+    assert rolling.half_turn_misses == pytest.approx(0, abs=1e-9)
+    assert rolling.blind_cones[0].half_angle_deg == pytest.approx(45)
+    assert rolling.blind_cones[0].axis_world == pytest.approx((-1, 0, 0))
+    assert rolling.seen_twice == pytest.approx((1 + np.cos(np.radians(45))) / 2, abs=1e-3)
+    assert pitching.blind_cones == ()
+    assert pitching.seen_twice == pytest.approx(1 - np.cos(np.radians(45)), abs=2e-3)
+    assert rolling.line_gap_deg == pitching.line_gap_deg == pytest.approx(0.5)
+    assert gaps(uniform, np.radians(SETTINGS[3])).line_gap_deg == pytest.approx(0.5 * np.sin(np.radians(45)))
+    assert rolling.line_gap_mm(10) == pytest.approx(87.3, abs=0.1)
+
+
+def test_blind_cones_are_the_largest_empty_caps(uniform):
+    """The facets of the convex hull of all beams are the empty caps (Delaunay on the sphere)."""
+    angles = np.radians((0, 0, 50, -35))
+    hull = ConvexHull(simulated_scan(uniform.bearings_rad[::4], scan_lines(9.0, 40.0), angles))
+    largest = np.degrees(np.arccos(-hull.equations[:, 3].max()))
+    assert gaps(uniform, angles).blind_cones[0].half_angle_deg == pytest.approx(largest, abs=0.05)
+
+
+def test_lines_cross_at_twice_the_tilt_on_the_equator(uniform):
+    """A band one degree wide about the equator of an upright axis; the plane is tilted by 40 deg."""
+    task = load_task(Path("uniform"))
+    region = [{"shape": "band", "theta_deg": [89.5, 90.5]}]
+    narrow = task.task.model_validate(task.task.model_dump() | {"weight": region})
+    problem = uniform.with_objective(problem_of(replace(task, task=narrow)).objective)
+    assert gaps(problem, np.radians((0, 0, 0, -40))).crossing_deg == pytest.approx(80, abs=0.1)
+    assert gaps(problem, np.radians((0, 0, 0, 70))).crossing_deg == pytest.approx(40, abs=0.1)
+
+
+@pytest.mark.parametrize("least", [1, 20])
+def test_the_shortest_period_by_simulation(ground, least):
+    angles = np.radians((0, 0, -50, 35))
+    period = shortest_period_s(ground, angles, 40.0, least)
+    directions = spiral(40_000)
+    directions = directions[ground.field.weight_at(directions) > 0]
+
+    def lowest(lines):
+        phases = lines.step_rad * np.arange(4) / 4
+        scans = [simulated_scan(ground.bearings_rad, lines, angles, phase) for phase in phases]
+        return min(ball_count(scan, directions, ground.ball_rad).min() for scan in scans)
+
+    assert lowest(scan_lines(period, 40.0)) >= least
+    assert lowest(scan_lines(period * 0.9, 40.0)) < least
+
+
+def test_a_blind_region_has_no_shortest_period(uniform):
+    with pytest.raises(TaskError, match="blind"):
+        shortest_period_s(uniform, np.radians((0, 90, 0, -90)), 40.0, 1)
+
+
+def test_interlaced_turns_halve_the_gap():
+    period = interlaced_period_s(18.0, 40.0)
+    lines = scan_lines(period, 40.0)
+    second = (np.arange(lines.count, 2 * lines.count) * lines.step_rad) % (2 * np.pi)
+    both = np.sort(np.concatenate([lines.angles_rad, second]))
+    assert np.diff(both).max() == pytest.approx(lines.step_rad / 2)

@@ -1,0 +1,199 @@
+"""The catalogue: every value has a source, and the numbers are those of the paper."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from design.catalogue.catalogue import SHIPPED, Lidar, Printer, Product, Servo, SlipRing, load_catalogue, load_product
+from design.errors import TaskError
+
+FILES = sorted(SHIPPED.glob("*.toml"))
+RING = """kind = "slip_ring"
+name = "MY-RING"
+maker = "me"
+bore_mm = { value = 14.0, source = "calipers", verified = true }
+outer_diameter_mm = { value = 60.0, source = "calipers", verified = true }
+length_mm = { value = 40.0, source = "calipers", verified = false }
+mass_g = { value = 150.0, source = "scale", verified = true }
+circuits = { value = "USB 2.0", source = "label", verified = true }
+"""
+
+
+@pytest.fixture
+def shipped():
+    return load_catalogue()
+
+
+def write(tmp_path, text, name="mine.toml"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_all_products_of_the_issue_are_there(shipped):
+    by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
+    assert by_kind[Lidar] == {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX", "LMS 200"}
+    assert by_kind[Servo] == {"MX-64R", "MX-28", "XM430-W350", "AX-12A"}
+    assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"}
+    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_value_has_a_source_and_says_whether_it_is_verified(path):
+    product = load_product(path)
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    values = set(table) - {"kind", "name", "maker"}
+    assert values
+    assert set(product.provenance()) == values
+    for field, origin in product.provenance().items():
+        assert len(origin.source.strip()) > 5 or origin.source == "assumed", field
+        if origin.source.startswith("assumed"):
+            assert not origin.verified, f"{field} is assumed and cannot be verified"
+    in_use = {name for name in type(product).model_fields if getattr(product, name) is not None}
+    assert in_use - values == {"kind", "name", "maker"}, "a value without a source"
+    assert product.unverified() == [f for f in product.provenance() if not table[f]["verified"]]
+
+
+# typed from the paper, Tables 1 and 2 and sections 3.1 to 3.3
+@pytest.mark.parametrize(
+    ("name", "range_m", "fan_deg", "step_deg", "rate_hz", "wavelength_nm", "mass_g", "price_usd"),
+    [("URG-04LX", 4, 240, 0.36, 10, 785, 160, 2000), ("UTM-30LX", 30, 270, 0.25, 40, 905, 370, 5000)],
+)
+def test_table_1_of_the_paper(shipped, name, range_m, fan_deg, step_deg, rate_hz, wavelength_nm, mass_g, price_usd):
+    lidar = shipped.get(name, Lidar)
+    assert lidar.range_max_mm == range_m * 1000
+    bearings = np.degrees(lidar.bearings_rad())
+    assert np.ptp(bearings) == pytest.approx(fan_deg, abs=0.7)  # the URG's 240 deg are 239.4
+    assert np.diff(bearings) == pytest.approx(step_deg, abs=0.01)
+    assert lidar.scan_rate_hz == rate_hz
+    assert lidar.wavelength_nm == wavelength_nm
+    assert lidar.mass_g == mass_g
+    assert lidar.price_usd == price_usd
+
+
+@pytest.mark.parametrize(
+    ("name", "mass_g", "size_mm", "range_deg", "step_deg", "steps", "price_usd"),
+    [
+        ("AX-12A", 54.6, (32, 50, 40), 300, 0.29, 1024, 50),
+        ("MX-64R", 126, (40.2, 61.1, 41), 360, 0.09, 4096, 300),
+    ],
+)
+def test_table_2_of_the_paper(shipped, name, mass_g, size_mm, range_deg, step_deg, steps, price_usd):
+    servo = shipped.get(name, Servo)
+    case = np.subtract(servo.case_max_mm, servo.case_min_mm)
+    assert servo.mass_g == mass_g
+    np.testing.assert_allclose(case[:2], size_mm[:2])
+    # the AX-12A's 40 mm include its horn, the MX-64's 41 mm do not
+    assert size_mm[2] == pytest.approx(case[2]) or size_mm[2] == pytest.approx(case[2] + servo.horn_thickness_mm)
+    assert servo.angular_range_deg == range_deg
+    assert servo.position_step_deg == pytest.approx(step_deg, abs=0.005)
+    assert servo.angular_range_deg / servo.position_step_deg == pytest.approx(steps)
+    assert servo.price_usd == price_usd
+
+
+def test_the_beam_tables_of_the_lidars(shipped):
+    for name, count, first, last in [
+        ("UTM-30LX", 1081, -135.0, 135.0),
+        ("UST-10LX", 1081, -135.0, 135.0),
+        ("URG-04LX", 682, -119.53, 119.88),
+    ]:
+        bearings = np.degrees(shipped.get(name, Lidar).bearings_rad())
+        assert len(bearings) == count
+        assert bearings[0] == pytest.approx(first, abs=0.005)
+        assert bearings[-1] == pytest.approx(last, abs=0.005)
+        np.testing.assert_allclose(np.diff(bearings), (last - first) / (count - 1), atol=1e-4)
+        assert np.abs(bearings).min() < 1e-9, "one beam looks straight ahead"
+
+
+def test_what_the_issue_says_of_the_rings(shipped):
+    uh = shipped.get("UH1256-02-0610-06S", SlipRing)
+    assert (uh.bore_mm, uh.outer_diameter_mm) == (12.7, 56)
+    assert "length_mm" in uh.unverified()
+    snu = shipped.get("SNU11-P0210", SlipRing)
+    assert snu.price_usd == 130
+    assert {"bore_mm", "outer_diameter_mm", "length_mm"} <= set(snu.unverified())
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "words"),
+    [
+        ("UTM30LX", Lidar, ["lidar", "did you mean 'UTM-30LX'"]),
+        ("utm-30lx", Lidar, ["did you mean 'UTM-30LX'"]),
+        ("MX-64R", Lidar, ["lidar"]),
+        ("MX64", Servo, ["servo", "did you mean 'MX-64R'"]),
+        ("zzz", SlipRing, ["slip ring", "known: SNU11-P0210, SRC022A-6, UH1256-02-0610-06S"]),
+        ("fdm", Printer, ["printer", "did you mean 'fdm-0.4'"]),
+        ("UTM30LX", Product, ["did you mean 'UTM-30LX'"]),
+    ],
+)
+def test_an_unknown_product_suggests_the_nearest(shipped, name, kind, words):
+    with pytest.raises(TaskError) as caught:
+        shipped.get(name, kind)
+    for word in [f"'{name}'", *words]:
+        assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_of_ones_own_adds_a_product_and_leaves_the_shipped_ones(tmp_path, shipped):
+    mine = load_catalogue(write(tmp_path, RING))
+    assert mine.get("MY-RING", SlipRing).bore_mm == 14
+    assert mine.get("MY-RING", SlipRing).unverified() == ["length_mm"]
+    assert {p.name for p in mine} == {p.name for p in shipped} | {"MY-RING"}
+    assert "MY-RING" not in {p.name for p in load_catalogue()}
+
+
+def test_a_file_of_ones_own_replaces_and_the_last_one_wins(tmp_path):
+    text = RING.replace("MY-RING", "SNU11-P0210")
+    first = write(tmp_path, text, "a.toml")
+    second = write(tmp_path, text.replace("14.0", "15.0"), "b.toml")
+    assert load_catalogue(first).get("SNU11-P0210", SlipRing).bore_mm == 14
+    assert load_catalogue(first, second).get("SNU11-P0210", SlipRing).bore_mm == 15
+    assert load_catalogue(second, first).get("SNU11-P0210", SlipRing).bore_mm == 14
+    assert load_catalogue().get("SNU11-P0210", SlipRing).bore_mm == 12.7
+
+
+LIDAR = (SHIPPED / "utm-30lx.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("kind = ", ["not a TOML file"]),
+        (RING.replace('"slip_ring"', '"slipring"'), ["kind", "did you mean 'slip_ring'"]),
+        (RING.replace('kind = "slip_ring"', ""), ["kind"]),
+        (RING.replace('kind = "slip_ring"', "kind = []"), ["kind"]),
+        (RING.replace("bore_mm", "bore"), ["bore", "did you mean 'bore_mm'"]),
+        (RING.replace("14.0", "-1.0"), ["bore_mm", "-1.0", "greater than or equal to 0"]),
+        (RING.replace("14.0", "nan"), ["bore_mm", "nan"]),
+        (RING.replace("14.0", '"wide"'), ["bore_mm", "wide"]),
+        (RING + 'mass_kg = { value = 1.0, source = "x", verified = true }\n', ["mass_kg", "did you mean 'mass_g'"]),
+        (RING.replace('{ value = 14.0, source = "calipers", verified = true }', "14.0"), ["bore_mm", "source"]),
+        (RING.replace(", verified = false", ""), ["length_mm", "verified"]),
+        (RING.replace('"label"', "7"), ["circuits"]),
+        (RING.replace("verified = false", 'verified = "perhaps"'), ["length_mm"]),
+        ("\n".join(RING.splitlines()[:-1]), ["circuits", "required"]),
+        (RING.replace('name = "MY-RING"', ""), ["name", "required"]),
+        (RING.replace('maker = "me"', 'maker = "me"\nname_de = "Ring"'), ["name_de"]),
+        (LIDAR.replace("value = 1080", "value = 1440"), ["1440", "per turn"]),
+        (LIDAR.replace("value = 1080", "value = 0"), ["0..0"]),
+        (LIDAR.replace("value = 100.0", "value = 40000.0"), ["range_min_mm", "range_max_mm"]),
+    ],
+)
+def test_a_malformed_file_is_one_line_that_names_the_file_and_the_field(tmp_path, text, words):
+    path = write(tmp_path, text)
+    with pytest.raises(TaskError) as caught:
+        load_catalogue(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in [str(path), *words]:
+        assert word in message
+
+
+def test_a_missing_file_and_a_folder_are_one_line(tmp_path):
+    (tmp_path / "latin.toml").write_bytes(b"\xff\xfe")
+    for path in (tmp_path / "none.toml", tmp_path, tmp_path / "latin.toml"):
+        with pytest.raises(TaskError) as caught:
+            load_catalogue(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)

@@ -1,0 +1,47 @@
+"""The second process: the same results and errors as without it, and nothing left running."""
+
+import contextlib
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from design import second_process as beside
+from design.angles import load_angles
+from design.errors import BuildError, TaskError
+from design.second_process import in_turn, second_process
+
+
+@pytest.mark.parametrize("cores", [1, 2])
+def test_work_and_its_errors_are_the_same_with_one_core_and_two(cores, monkeypatch):
+    monkeypatch.setattr(beside, "_cores", lambda: cores)
+    with second_process() as begin:
+        where, joined, wrong = begin(os.getpid), begin("-".join, ["a", "b"]), begin(load_angles, Path("none.json"))
+        assert (where() == os.getpid()) == (cores == 1)
+        assert joined() == "a-b"
+        with pytest.raises(TaskError, match=r"none\.json"):
+            wrong()
+
+
+def test_what_is_given_is_as_it_was_when_work_began():
+    words = ["a"]
+    later = in_turn(len, words)
+    words.append("b")
+    assert later() == 1
+
+
+def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(beside, "_cores", lambda: 2)
+    began, at_work = time.monotonic(), tmp_path / "at_work"
+    with contextlib.suppress(KeyboardInterrupt), second_process() as begin:
+        process = begin(os.getpid)()
+        begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(90)")
+        while not at_work.exists():
+            time.sleep(0.01)
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < 60
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+    with pytest.raises(BuildError, match="was killed"), second_process() as begin:
+        begin(os._exit, 1)()

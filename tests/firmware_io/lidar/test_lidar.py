@@ -1,0 +1,264 @@
+"""The lidar driver against the twin: whatever state the sensor is in, whatever breaks on the way."""
+
+import itertools
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from design.errors import DeviceError, DeviceTimeoutError
+from firmware_io.lidar import streams
+from firmware_io.lidar.scip import driver as driver
+from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip.driver import Lidar, clock_of, open_lidar
+from firmware_io.lidar.scip.raw_scan import scan_of
+from firmware_io.twins.lidar import LidarTwin
+
+SEEN_M = np.linspace(0.6, 5.2, 1081)
+
+
+def look(time_ns):
+    range_m = SEEN_M[: time_ns.size].copy()
+    range_m[[3, 40]] = np.inf
+    return range_m, np.arange(time_ns.size, dtype=float)
+
+
+def check(raw, count):
+    expected = np.round(look(np.zeros(count))[0], 3).astype(np.float32)
+    np.testing.assert_array_equal(raw.range_m, np.where(np.isinf(expected), np.nan, expected))
+
+
+@pytest.mark.parametrize("way", ["port", "address"])
+@pytest.mark.parametrize(("model", "beams", "code"), [("UTM-30LX", 1081, 1), ("URG-04LX", 682, 0)])
+def test_scans_come_as_they_were_seen(way, model, beams, code):
+    with LidarTwin(model, look) as twin, open_lidar(getattr(twin, way)) as lidar:
+        assert (lidar.model, lidar.firmware) == (model, twin.machine.identity.firmware)
+        assert lidar.serial_number == twin.machine.identity.serial_number
+        assert lidar.parameters == twin.machine.identity.parameters
+        intensity = twin.machine.identity.intensity
+        lidar.start(intensity=intensity)
+        scans = [lidar.read() for _ in range(4)]
+        for raw in scans:
+            check(raw, beams)
+            assert raw.codes == {code: 2}
+            assert raw.intensity.tolist() == (list(range(beams)) if intensity else [])
+        steps_ms = np.diff([raw.stamp_ms for raw in scans])
+        period_ms = lidar.parameters.scan_period_s * 1002  # the motor's error is a default of the twin
+        assert np.all(np.abs(steps_ms - period_ms) <= 1)
+        assert (lidar.dropped, lidar.bad_packets) == (0, 0)
+    assert not twin.machine.laser  # `with` puts the laser out
+
+
+@pytest.mark.parametrize("state", ["scanning", "scip_1", "adjusting its time", "half a request"])
+def test_the_sensor_may_be_in_any_state(state):
+    options = {state: True} if state in ("scanning", "scip_1") else {}
+    with LidarTwin("UTM-30LX", look, **options) as twin:
+        if state == "adjusting its time":
+            twin.machine.answer(b"TM0", time.monotonic_ns())
+        if state == "half a request":
+            Path(twin.port).write_bytes(b"MD0000")
+        with open_lidar(twin.port) as lidar:
+            lidar.start()
+            check(lidar.read(), 1081)
+            assert lidar.bad_packets == 0
+
+
+def test_clusters_and_skips():
+    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+        lidar.start(cluster=5, skip=1)
+        first, second = lidar.read(), lidar.read()
+        assert second.stamp_ms - first.stamp_ms in (50, 51)
+        assert lidar.dropped == 0
+        valid = np.where(np.isinf(look(SEEN_M)[0]), 99, look(SEEN_M)[0])
+        expected = [valid[k : k + 5].min() for k in range(0, 1081, 5)]
+        np.testing.assert_allclose(first.range_m, expected, atol=6e-4)
+        scan, whole = scan_of(first, lidar.parameters, 10**9), lidar.parameters.window.size
+        assert scan.range_m.size == 217 == -(-whole // 5)
+        # The middle one of five steps: two steps after the first.
+        assert scan.angle_min_rad == pytest.approx(np.radians(-135 + 2 * 0.25))
+        assert scan.stamp_ns == pytest.approx(10**9 + 2 * 0.025 / 1440 * 1e9, abs=1)
+        assert scan.bearing_rad[108] == pytest.approx(np.radians((108 * 5 + 2 - 540) * 0.25))
+        assert np.diff(scan.time_ns)[0] == pytest.approx(5 * 0.025 / 1440 * 1e9, abs=1)
+
+
+@pytest.mark.parametrize(("model", "intensity"), [("UTM-30LX", True), ("URG-04LX", False)])
+def test_first_beams_get_their_true_times(model, intensity):
+    true_ns = []
+
+    def timed(time_ns):
+        true_ns.append(int(time_ns[0]))
+        return look(time_ns)
+
+    with LidarTwin(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as twin, open_lidar(twin.port) as lidar:
+        assert lidar.sync is not None
+        clock = clock_of(lidar)
+        lidar.start(intensity=intensity)
+        true_ns.clear()
+        errors_ns, wrapped = [], False
+        for k in range(12):
+            raw = lidar.read()
+            wrapped |= raw.stamp_ms >= 1 << 24
+            errors_ns.append(clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts).time_ns - true_ns[k])
+        assert wrapped
+        # Within what the synchronisation allows: a busy machine answers late, and no scan here comes early.
+        assert np.abs(errors_ns).max() < lidar.sync.half_width_ns + 1_500_000
+
+
+def test_bad_packets_are_counted_and_never_handed_out():
+    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+        lidar.start(intensity=True)
+        lidar.read()
+        twin.garble(3)
+        twin.cut(3)
+        for _ in range(8):
+            check(lidar.read(), 1081)
+        assert 6 <= lidar.bad_packets <= 9  # a lost end takes the next one with it
+        assert 3 <= lidar.dropped <= 7
+
+
+@pytest.mark.parametrize("way", ["port", "address"])
+def test_an_unplugged_sensor_is_told_and_comes_back(way):
+    with LidarTwin("UTM-30LX", look) as twin, open_lidar(getattr(twin, way)) as lidar:
+        lidar.start(intensity=True)
+        lidar.read()
+        twin.unplug()
+        with pytest.raises(DeviceError, match="plug") as told:
+            for _ in range(10):
+                lidar.read()
+        assert str(told.value).count("\n") == 0
+        assert not isinstance(told.value, DeviceTimeoutError)
+        with pytest.raises(DeviceError, match=r"00903971 did not come back in 0\.1 s"):
+            lidar.reconnect(0.1)
+        with pytest.raises(DeviceError, match="plug it in again"):
+            lidar.read()
+        twin.plug()
+        lidar.reconnect(3.0)
+        raw = lidar.read()
+        check(raw, 1081)
+        assert (raw.restarts, raw.intensity.size) == (1, 1081)
+
+
+def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
+    name = tmp_path / "ttyACM0"
+    with LidarTwin("UTM-30LX", look) as ours, LidarTwin("UTM-30LX", lambda t: (look(t)[0] + 1, look(t)[1])) as other:
+        other.machine.identity = replace(other.machine.identity, serial_number="00900001")
+        name.symlink_to(ours.port)
+        with Lidar(str(name), search=lambda: [other.port, str(tmp_path / "gone"), ours.port]) as lidar:
+            lidar.start()
+            ours.unplug()
+            with pytest.raises(DeviceError):
+                for _ in range(10):
+                    lidar.read()
+            name.unlink()
+            name.symlink_to(other.port)  # another sensor took its place
+            ours.plug()
+            lidar.reconnect()
+            check(lidar.read(), 1081)
+            assert (lidar.address, lidar.serial_number) == (ours.port, "00903971")
+            assert not other.machine.laser
+
+
+def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
+    with LidarTwin("UTM-30LX", look, clock_ms=1_000_000) as twin, open_lidar(twin.port) as lidar:
+        clock = clock_of(lidar)
+        lidar.start()
+        before = lidar.read()
+        clock.update(before.stamp_ms, before.arrival_ns, before.restarts)
+        twin.power_cycle()
+        with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
+            for _ in range(5):
+                lidar.read(0.1)
+        lidar.reconnect(3.0)
+        raw = lidar.read()
+        assert raw.stamp_ms < 60_000 < before.stamp_ms
+        assert raw.restarts == before.restarts + 1
+        late_ns = raw.arrival_ns - clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts).time_ns
+        assert 0 < late_ns < 500_000_000
+
+
+def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
+    with LidarTwin("UTM-30LX", look) as twin:
+        with pytest.raises(DeviceError, match="hardware fault"), open_lidar(twin.port) as lidar:
+            lidar.start()
+            answer = twin.machine.next_scan
+            twin.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
+            lidar.read()
+        assert not twin.machine.laser
+
+
+def test_what_a_sensor_cannot_do_is_told():
+    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+        with pytest.raises(DeviceError, match="ME0044072501000: status 0E"):
+            lidar.start(intensity=True)
+        with pytest.raises(DeviceError, match="cluster = 0"):
+            lidar.start(cluster=0)
+
+
+def test_absent_ports_and_ports_in_use_are_told(tmp_path):
+    with pytest.raises(DeviceError, match="cannot open"):
+        open_lidar(str(tmp_path / "ttyACM7"))
+    with pytest.raises(DeviceError, match="cannot open"):
+        open_lidar("127.0.0.1:1")
+    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port), pytest.raises(DeviceError, match="cannot open"):
+        open_lidar(twin.port)
+
+
+def test_a_port_where_no_lidar_answers(monkeypatch):
+    monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
+    master, slave = os.openpty()
+    try:
+        with pytest.raises(DeviceTimeoutError, match="no SCIP sensor answers"):
+            open_lidar(os.ttyname(slave))
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+class SlowPort(streams.SerialStream):
+    """A port whose sensor listens at the speed that it has after power-up, until it is told another one."""
+
+    listens = 19_200
+
+    def write(self, data):
+        if self.baud == self.listens:
+            super().write(data)
+            if data.startswith(b"SS"):
+                self.listens = int(data[2:])
+
+
+def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch):
+    monkeypatch.setattr(streams, "SerialStream", SlowPort)
+    monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
+    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+        assert lidar._stream.listens == lidar._stream.baud == 115_200
+        lidar.start()
+        check(lidar.read(), 682)
+
+
+class Chatter:
+    """A port on which garbage never ends."""
+
+    def __init__(self):
+        self.written, self.closed, self.noise = b"", False, itertools.cycle([b"\x00\xff", b"\n\n", b"99b\nMD"])
+
+    def read(self, _):
+        return next(self.noise)
+
+    def write(self, data):
+        self.written += data
+
+    def close(self):
+        self.closed = True
+
+
+def test_endless_garbage_ends_in_a_timeout(monkeypatch):
+    port = Chatter()
+    monkeypatch.setattr(driver, "open_stream", lambda _: port)
+    monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
+    with pytest.raises(DeviceTimeoutError):
+        open_lidar("somewhere")
+    assert port.closed
+    assert set(port.written.split()) == {b"QT"}

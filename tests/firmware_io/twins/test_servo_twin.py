@@ -1,0 +1,550 @@
+"""The servo's twin, judged by other people's programs, and the driver on it: motion, faults, and every way out."""
+
+import math
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import dynamixel_sdk
+import numpy as np
+import pytest
+import rustypot
+from hypothesis import given
+from hypothesis import strategies as st
+from pyax12.connection import Connection
+
+from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from firmware_io.servo.dynamixel import bus
+from firmware_io.servo.dynamixel.driver import open_servo
+from firmware_io.twins.dynamics import Load
+from firmware_io.twins.servo import ServoTwin
+from firmware_io.twins.servo_machine import ServoMachine
+from firmware_io.twins.servo_packets import packet_2, status, take
+
+MODELS = [("MX-64R", 1.0), ("MX-28", 1.0), ("MX-64R", 2.0), ("XM430-W350", 2.0)]
+RATE = math.radians(180)
+# Bytes that make up headers and stuffing; random ones hardly ever do.
+payload = st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x01, 0x55]), max_size=40).map(bytes)
+
+
+def until(condition, seconds=5.0):
+    """Wait for something to be so."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not come to that in time"
+        time.sleep(0.005)
+
+
+def true_rad(twin, time_ns=None):
+    return float(twin.axis.angle_rad(np.array(time.monotonic_ns() if time_ns is None else time_ns)))
+
+
+def turns(twin):
+    """Whether the horn moves, over the last 20 ms."""
+    now_ns = time.monotonic_ns()
+    return abs(true_rad(twin, now_ns) - true_rad(twin, now_ns - 20_000_000)) > 1e-3
+
+
+def read_for(servo, seconds):
+    end = time.monotonic() + seconds
+    states = [servo.read()]
+    while time.monotonic() < end:
+        states.append(servo.read())
+    return states
+
+
+# Packets
+
+
+@given(servo_id=st.integers(0, 252), instruction=st.integers(1, 8), parameters=payload, noise=payload)
+def test_requests_come_out_of_noise_whole(servo_id, instruction, parameters, noise):
+    buffer = bytearray(noise.replace(b"\xff", b"") + packet_2(servo_id, instruction, parameters))
+    request = take(buffer, 2.0)
+    assert (request.id, request.instruction, request.parameters, request.intact) == (
+        *(servo_id, instruction, parameters, True),
+    )
+    assert not buffer
+
+
+@given(data=payload, error=st.integers(0, 127), cut=st.integers(0, 60))
+def test_the_sdk_reads_the_statuses_of_the_twin(data, error, cut):
+    """Both protocols, and the stream in two parts; where a status is stuffed, as it is on the wire (`servo_bus`)."""
+    for protocol, begin in ((1.0, 4), (2.0, 8)):
+        wire = status(protocol, 9, error, data)
+        stuffed = protocol == 2.0 and b"\xff\xff\xfd" in bytes([error]) + data
+        options = [] if protocol == 1.0 else [stuffed]
+        packet, result = dynamixel_sdk.PacketHandler(protocol).rxPacket(Replay(wire, cut), *options)
+        assert result == dynamixel_sdk.COMM_SUCCESS
+        if stuffed:
+            assert bytes(packet) == wire
+        else:
+            assert bytes(packet[begin : begin + 1 + len(data)]) == bytes([error]) + data
+
+
+class Replay:
+    """A port for the SDK that plays bytes, with a pause after some."""
+
+    def __init__(self, data, cut):
+        self.parts, self.is_using = [data[:cut], b"", data[cut:]], True
+
+    def readPort(self, length):
+        while self.parts and not self.parts[0]:
+            self.parts.pop(0)
+        if not self.parts:
+            return b""
+        taken, self.parts[0] = self.parts[0][:length], self.parts[0][length:]
+        return taken
+
+    def isPacketTimeout(self):
+        return not self.parts
+
+
+def machine(protocol=2.0):
+    """In protocol 2.0 the servo of the e-manual's examples: model 1030, firmware 38, at count 166."""
+    servo = ServoMachine("MX-64R", protocol, Load(), 0, 0.0 if protocol == 1.0 else (166 - 2048) * 2 * math.pi / 4096)
+    if protocol == 2.0:
+        servo.memory[0], servo.memory[6] = 1030, 38
+    return servo
+
+
+def ask(servo, wire, time_ns=0):
+    """What the machine answers to bytes, as bytes."""
+    answered = servo.answer(take(bytearray(wire), servo.table.protocol), time_ns)
+    return None if answered is None else status(servo.table.protocol, servo.id, *answered)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "request_hex", "answer_hex"),
+    [
+        (1.0, "ff ff 01 02 01 fb", "ff ff 01 02 00 fc"),  # ping
+        (1.0, "ff ff 01 04 02 2b 01 cc", "ff ff 01 03 00 1e dd"),  # 30 degC
+        (1.0, "ff ff 01 04 02 2b 01 cd", "ff ff 01 02 10 ec"),  # checksum error
+        (1.0, "ff ff 01 02 05 f7", "ff ff 01 02 40 bc"),  # action without a registered write
+        (1.0, "ff ff 01 05 03 1e ff 1f ba", "ff ff 01 02 08 f4"),  # goal 8191
+        (1.0, "ff ff 02 02 01 fa", None),  # not for us
+        (2.0, "ff ff fd 00 01 03 00 01 19 4e", "ff ff fd 00 01 07 00 55 00 06 04 26 65 5d"),
+        (2.0, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
+        (2.0, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 16", "ff ff fd 00 01 04 00 55 03 ab 0c"),  # CRC error
+        (2.0, "ff ff fd 00 fe 09 00 82 84 00 04 00 01 02 ce fa", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
+    ],
+)
+def test_answers_byte_by_byte(protocol, request_hex, answer_hex):
+    assert ask(machine(protocol=protocol), bytes.fromhex(request_hex)) == (answer_hex and bytes.fromhex(answer_hex))
+
+
+@pytest.mark.parametrize(
+    ("address", "data", "error"),
+    [
+        (132, b"\0\0\0\0", 7),  # read only
+        (11, b"\1", 0),
+        (104, b"\xff\xff\xff\x7f", 4),
+        (104, b"\0\0", 5),
+        (9000, b"\0", 7),
+    ],
+)
+def test_writes_are_refused_as_protocol_2_numbers_it(address, data, error):
+    assert ask(machine(), packet_2(1, 3, address.to_bytes(2, "little") + data))[8] == error
+
+
+def test_eeprom_is_locked_while_torque_is_on():
+    servo = machine()
+    ask(servo, packet_2(1, 3, b"\x40\x00\x01"))
+    assert ask(servo, packet_2(1, 3, b"\x0b\x00\x01"))[8] == 7
+
+
+def test_indirect_data_are_those_of_their_targets():
+    servo = machine()
+    ask(servo, packet_2(1, 3, b"\xa8\x00\x92\x00"))  # indirect address 1 = 146, temperature
+    assert ask(servo, packet_2(1, 2, b"\xe0\x00\x01\x00"))[9] == 30
+
+
+def test_the_bus_watchdog_stops_the_wheel_and_locks_the_goals():
+    servo, second = machine(), 1_000_000_000
+    for address, value in ((11, b"\1"), (64, b"\1"), (98, b"\x32"), (104, b"\x64\0\0\0")):
+        ask(servo, packet_2(1, 3, bytes([address, 0]) + value))
+    servo.protect(second // 2)
+    assert servo.axis.motion(second).rate_rad_s == pytest.approx(100 * servo.table.wheel_speed.unit, rel=0.01)
+    servo.protect(second + 1)
+    assert servo.axis.motion(2 * second).rate_rad_s == pytest.approx(0, abs=1e-3)
+    assert servo.memory[98] == 255
+    assert ask(servo, packet_2(1, 3, b"\x68\x00\x64\0\0\0"), 2 * second)[8] == 4
+    assert ask(servo, packet_2(1, 3, b"\x62\x00\x00"), 2 * second)[8] == 0
+    assert ask(servo, packet_2(1, 3, b"\x68\x00\x64\0\0\0"), 2 * second)[8] == 0
+
+
+def test_a_strained_servo_protects_itself():
+    servo, second = machine(protocol=1.0), 1_000_000_000
+    servo.memory[6] = servo.memory[8] = 0
+    servo.memory[32], servo.memory[24] = 263, 1
+    ask(servo, bytes.fromhex("ff ff 01 05 03 20 07 01 ce"))
+    servo.axis.change(second, blocked=True)
+    for time_ns in range(second, 4 * second, second // 50):
+        servo.protect(time_ns)
+    assert ask(servo, bytes.fromhex("ff ff 01 02 01 fb"), 4 * second)[4] == 32
+    assert servo.memory[24] == 0
+
+
+# Other people's programs
+
+
+def test_pyax12_drives_the_ax_12a():
+    with ServoTwin("AX-12A") as twin:
+        client = Connection(port=twin.port, baudrate=1_000_000, waiting_time=0.1)  # of 20 ms: for a busy machine
+        try:
+            assert client.ping(1) and not client.ping(2)
+            assert (client.get_model_number(1), client.get_present_position(1), client.get_present_voltage(1)) == (
+                *(12, 512, 12.0),
+            )
+            client.goto(1, 30, speed=512, degrees=True)
+            until(lambda: math.degrees(true_rad(twin)) > 29)
+            until(lambda: abs(client.get_present_position(1, degrees=True) - 30) < 1)
+        finally:
+            client.close()
+
+
+def test_rustypot_drives_the_mx_64_and_the_xm430():
+    with ServoTwin("MX-64R") as twin:
+        client = rustypot.MxPyController(twin.port, 57600, 0.2)
+        assert client.read_model_number(1) == [310]
+        client.write_goal_position(1, 0.5)
+        until(lambda: abs(client.read_present_position(1)[0] - 0.5) < 0.05)
+    with ServoTwin("XM430-W350") as twin:
+        second = rustypot.Xl430PyController(twin.port, 57600, 0.2)
+        assert second.ping(1)
+        assert second.sync_read_present_position([1]) == [2048]
+        second.write_torque_enable(1, True)
+        second.sync_write_goal_position([1], [2400])
+        until(lambda: abs(second.sync_read_present_position([1])[0] - 2400) < 20)
+
+
+@pytest.fixture
+def patient_sdk(monkeypatch):
+    """Its 34 ms are short for a twin that shares a busy machine with it."""
+    monkeypatch.setattr(dynamixel_sdk.port_handler, "LATENCY_TIMER", 200)
+
+
+@pytest.mark.usefixtures("patient_sdk")
+def test_the_official_sdk_drives_the_mx_64_of_protocol_2():
+    with ServoTwin("MX-64R", 2.0) as twin:
+        port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
+        assert port.setBaudRate(57600)
+        try:
+            assert handler.ping(port, 1) == (311, 0, 0)
+            assert handler.write1ByteTxRx(port, 1, 64, 1) == (0, 0)
+            assert handler.write4ByteTxRx(port, 1, 116, 2400) == (0, 0)
+            sync = dynamixel_sdk.GroupSyncRead(port, handler, 132, 4)
+            sync.addParam(1)
+            until(lambda: sync.txRxPacket() == 0 and abs(sync.getData(1, 132, 4) - 2400) < 20)
+            bulk = dynamixel_sdk.GroupBulkRead(port, handler)
+            bulk.addParam(1, 126, 21)
+            assert bulk.txRxPacket() == 0 and bulk.getData(1, 146, 1) == 30
+            assert handler.reboot(port, 1) == (0, 0)
+            until(lambda: handler.ping(port, 1) == (311, 0, 0))
+            assert handler.read1ByteTxRx(port, 1, 64) == (0, 0, 0)
+        finally:
+            port.closePort()
+
+
+@pytest.mark.usefixtures("patient_sdk")
+def test_bytes_take_their_time_and_the_return_delay_is_kept():
+    with ServoTwin("MX-64R", 2.0) as twin:
+        twin.memory[9] = 254
+        port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
+        port.setBaudRate(57600)
+        try:
+            begin = time.monotonic()
+            assert handler.readTxRx(port, 1, 126, 21)[1] == 0
+            assert time.monotonic() - begin >= (14 + 32) * 10 / 57600 + 508e-6
+            port.setBaudRate(115200)  # not the servo's: it does not understand
+            assert handler.ping(port, 1)[1] == dynamixel_sdk.COMM_RX_TIMEOUT
+        finally:
+            port.closePort()
+
+
+# The driver on the twin
+
+
+@pytest.mark.parametrize(("model", "protocol"), MODELS)
+def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
+    with ServoTwin(model, protocol, angle_rad=-3.0) as twin, open_servo(twin.port, model) as servo:
+        assert (servo.model, servo.protocol, servo.baud, servo.id) == (model, protocol, 57600, 1)
+        servo.spin(-RATE)
+        states = read_for(servo, 0.3)
+        for state in states:
+            assert abs(state.position_rad - true_rad(twin, state.time_ns)) < slack_rad(servo, state)
+        assert states[-1].position_rad < -3.5  # on and on, through the encoder's end
+        assert states[-1].velocity_rad_s == pytest.approx(-RATE, rel=0.02)
+        assert states[-1].moving
+        servo.hold()
+        until(lambda: not turns(twin))
+        assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(12.0), 30)
+        servo.sweep_to(2.0, 3.0)
+        until(lambda: abs(servo.read().position_rad - 2.0) < 0.03)
+        assert abs(math.remainder(true_rad(twin) - 2.0, 2 * math.pi)) < 0.03
+
+
+def slack_rad(servo, state):
+    """By how much a reading may differ from the truth: half a count, and the turn within the stated time."""
+    step_rad = math.radians(300 / 1024 if servo.model == "AX-12A" else 360 / 4096)
+    return step_rad / 2 + (state.time_bound_ns / 1e9 + 1e-4) * 2 * RATE
+
+
+def test_the_dead_sector_is_marked_and_never_guessed():
+    with ServoTwin("AX-12A") as twin, open_servo(twin.port) as servo:
+        assert servo.baud == 1_000_000
+        servo.spin(5.0)
+        states = read_for(servo, 1.6)
+    dead_rad = math.radians(150)
+    seen = set()
+    for state in states:
+        truth = true_rad(twin, state.time_ns)
+        slack = slack_rad(servo, state)
+        within = abs(math.remainder(truth, 2 * math.pi))
+        if math.isnan(state.position_rad):
+            assert within > dead_rad - 2 * slack
+            seen.add("dead")
+        else:
+            assert within < dead_rad + slack
+            assert abs(state.position_rad - truth) < slack  # turns counted across the sector
+            seen.add("first turn" if truth < math.pi else "second turn")
+        assert math.isnan(state.velocity_rad_s)
+    assert seen == {"dead", "first turn", "second turn"}
+
+
+def test_turns_are_counted_across_a_pause_at_rest():
+    """The speeds before and after say nothing of the time in between."""
+    with ServoTwin() as twin, open_servo(twin.port, servo_id=1) as servo:
+        servo.spin(6.0)
+        read_for(servo, 0.1)
+        servo.hold()
+        due_s = time.monotonic() + 1.5
+        until(lambda: time.monotonic() > due_s)
+        assert abs(servo.read().position_rad - true_rad(twin)) < 0.01
+        servo.spin(-6.0)
+        read_for(servo, 0.1)
+        servo.hold()
+        until(lambda: not turns(twin))
+        assert abs(servo.read().position_rad - true_rad(twin)) < 0.01
+
+
+def test_a_servo_stuck_in_its_dead_sector_stalls():
+    with ServoTwin("AX-12A", angle_rad=math.pi) as twin, open_servo(twin.port) as servo:
+        twin.stall()
+        servo.spin(6.0)
+        with pytest.raises(DeviceFaultError, match="stall: stuck in the dead sector where"):
+            read_for(servo, 5.0)
+
+
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+def test_an_adapter_that_echoes_and_flips_bits(protocol):
+    with ServoTwin("MX-64R", protocol, echo=True, seed=3) as twin, open_servo(twin.port) as servo:
+        twin.bit_errors(0.001)
+        servo.spin(RATE)
+        for state in read_for(servo, 0.3):
+            assert abs(state.position_rad - true_rad(twin, state.time_ns)) < slack_rad(servo, state)
+
+
+def test_opening_sets_what_it_relies_on_and_says_so():
+    with ServoTwin("XM430-W350") as twin:
+        memory = twin.memory
+        memory[7], memory[8], memory[20], memory[68], memory[10] = 42, 2, -500, 0, 1
+        with open_servo(twin.port) as servo:
+            assert (servo.id, servo.baud) == (42, 115200)
+            notes = " ".join(servo.warnings())
+            assert (
+                "register 20 was -500" in notes and "register 10 was 1" in notes and "return delay was 500 us" in notes
+            )
+            assert (memory[20], memory[68], memory[10], memory[9]) == (0, 2, 0, 0)
+        with open_servo(twin.port, servo_id=42) as servo:
+            assert servo.warnings() == ()
+        with pytest.raises(DeviceError, match="servo 42 is a XM430-W350, not a MX-64R"):
+            open_servo(twin.port, "MX-64R")
+
+
+def test_a_locked_memory_is_said():
+    with ServoTwin("MX-64R") as twin:
+        twin.memory[47] = 1
+        with open_servo(twin.port) as servo:
+            assert any("return delay is 500 us and cannot be set to 0" in note for note in servo.warnings())
+            servo.sweep_to(0.1, 1.0)
+            with pytest.raises(DeviceError, match=r"refused|memory is locked"):
+                servo.spin(1.0)
+
+
+def test_the_latency_timer_is_looked_at(tmp_path, monkeypatch):
+    with ServoTwin() as twin:
+        adapter = tmp_path / Path(twin.port).resolve().name
+        adapter.mkdir()
+        (adapter / "latency_timer").write_text("16\n")
+        monkeypatch.setattr(bus, "_ADAPTERS", tmp_path)
+        with open_servo(twin.port) as servo:
+            assert any("gathers bytes for 16 ms" in note and "udev" in note for note in servo.warnings())
+
+
+@pytest.mark.parametrize(
+    ("do", "words"),
+    [
+        (lambda servo: servo.spin(20.0), r"rate 1145.9 deg/s: at most 378 deg/s"),
+        (lambda servo: servo.spin(math.nan), "rate nan"),
+        (lambda servo: servo.sweep_to(3.2, 1.0), r"sweep to 183.3 deg: it reaches -180.0 .. 179.9 deg"),
+        (lambda servo: servo.sweep_to(1.0, 0.0), "choose a rate above 0"),
+    ],
+)
+def test_what_the_servo_cannot_do_is_refused_before_it_moves(do, words):
+    with ServoTwin() as twin, open_servo(twin.port, servo_id=1) as servo:
+        with pytest.raises(DeviceError, match=words):
+            do(servo)
+        assert not turns(twin)
+
+
+def test_two_programs_cannot_share_a_port():
+    with ServoTwin() as twin, open_servo(twin.port, servo_id=1), pytest.raises(DeviceError, match="another program"):
+        open_servo(twin.port)
+
+
+# Faults: whatever happens, the servo stands, and the error says what to do
+
+FAULTS = [
+    ("overload", "overload at 12.0 V, 30 degC: free what brakes the axis"),
+    ("overheat", "overheating at 12.0 V, 85 degC: let it cool down"),
+    ("stall", r"stall: moved 0\.\d deg where"),
+    ("brown_out", r"restarted by itself, 12\.0 V now: look at its supply"),
+    ("low", "voltage at 5.0 V, 30 degC: look at its supply"),
+]
+
+
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize(("fault", "words"), FAULTS)
+def test_a_fault_stops_the_turn_and_says_what_to_do(protocol, fault, words):
+    with ServoTwin("MX-64R", protocol) as twin:
+        with open_servo(twin.port, servo_id=1) as servo:
+            servo.spin(RATE)
+            read_for(servo, 0.1)
+            begin = time.monotonic()
+            twin.set_voltage(5.0) if fault == "low" else getattr(twin, fault)()
+            with pytest.raises(DeviceFaultError, match=words):
+                read_on(servo, 5.0)
+            assert time.monotonic() - begin < 4.0
+        until(lambda: not turns(twin), 0.5)
+        assert twin.memory[24 if protocol == 1.0 else 64] == 0
+
+
+def read_on(servo, seconds):
+    """Read, also while it restarts and does not answer."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        with suppress(DeviceTimeoutError):
+            servo.read()
+
+
+def test_after_an_overload_it_can_be_opened_and_turns_again():
+    for protocol in (1.0, 2.0):
+        with ServoTwin("MX-64R", protocol) as twin:
+            for again in (False, True):
+                with open_servo(twin.port) as servo:
+                    assert again == any("it reported overload and was reset" in note for note in servo.warnings())
+                    servo.spin(RATE)
+                    read_for(servo, 0.1)
+                    assert turns(twin)
+                    if not again:
+                        twin.overload()
+                        with pytest.raises(DeviceFaultError):
+                            servo.read()
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, ZeroDivisionError])
+def test_it_stands_however_the_program_leaves(kind):
+    with ServoTwin() as twin:
+        with pytest.raises(kind), open_servo(twin.port, servo_id=1) as servo:
+            servo.spin(RATE)
+            read_for(servo, 0.1)
+            raise kind
+        until(lambda: not turns(twin), 0.5)
+        with open_servo(twin.port, servo_id=1):
+            pass  # the port is free
+
+
+PROGRAM = """
+import sys, time
+from firmware_io.servo.dynamixel.driver import open_servo
+with open_servo(sys.argv[1], servo_id=1) as servo:
+    servo.spin(3.0)
+    print("turning", flush=True)
+    while True:
+        servo.read()
+"""
+
+
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+def test_it_stands_when_its_program_is_killed(protocol):
+    with ServoTwin("MX-64R", protocol) as twin:
+        with subprocess.Popen([sys.executable, "-c", PROGRAM, twin.port], stdout=subprocess.PIPE) as program:
+            assert program.stdout.readline() == b"turning\n"
+            until(lambda: turns(twin))
+            program.kill()
+            begin = time.monotonic()
+        until(lambda: not turns(twin))
+        assert time.monotonic() - begin < 1.0
+        assert twin.memory[24 if protocol == 1.0 else 64] == 0
+
+
+def test_closing_insists_while_the_bus_is_disturbed():
+    """The driver gives up after three tries; its guard goes on for two seconds."""
+    with ServoTwin() as twin:
+        with open_servo(twin.port, servo_id=1) as servo:
+            servo.spin(RATE)
+            read_for(servo, 0.1)
+            twin.cut()
+            mended = threading.Timer(1.2, twin.mend)
+            mended.start()
+        servo.close()
+        mended.join()
+        until(lambda: not turns(twin), 0.5)
+
+
+def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
+    """Two seconds for all three; a cut bus of protocol 1.0 is the one case that nobody can help."""
+    with ExitStack() as stack:
+        twins = [stack.enter_context(ServoTwin("MX-64R", protocol)) for protocol in (1.0, 1.0, 2.0)]
+        silent, helpless, watched = twins
+        servos = [stack.enter_context(open_servo(twin.port, servo_id=1)) for twin in twins]
+        for servo in servos:
+            servo.spin(RATE)
+        until(lambda: all(turns(twin) for twin in twins))
+        helpless.cut()
+        watched.cut()
+        until(lambda: not turns(silent) and not turns(watched))
+        assert turns(helpless)
+        with pytest.raises(
+            DeviceError, match="not read for 2 s while it turned, so it was stopped: read it more often"
+        ):
+            servos[0].read()
+        for servo in servos[1:]:
+            with pytest.raises(DeviceError, match="could not be stopped: take its power"):
+                servo.close()
+        helpless.mend()
+        with open_servo(helpless.port, servo_id=1):
+            until(lambda: not turns(helpless), 0.5)  # opening it takes the torque
+
+
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+def test_unplugged_is_said_and_plugged_in_it_is_found_again(protocol):
+    with ServoTwin("MX-64R", protocol) as twin:
+        with pytest.raises(DeviceTimeoutError, match="the port is gone") as caught, open_servo(twin.port) as servo:
+            servo.spin(RATE)
+            read_for(servo, 0.1)
+            twin.unplug()
+            read_for(servo, 5.0)
+        assert any("could not be stopped: take its power" in note for note in caught.value.__notes__)
+        with pytest.raises(DeviceError, match="no such port"):
+            open_servo(twin.port)
+        twin.replug()
+        begin = time.monotonic()
+        with open_servo(twin.port) as servo:
+            until(lambda: not turns(twin), 0.5)
+            servo.spin(RATE)
+            read_for(servo, 0.05)
+        assert time.monotonic() - begin < 3.0

@@ -1,0 +1,172 @@
+"""The front door: help, errors in one line with exit 2, and what the commands print."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import scanwright
+from design.task.task import SHIPPED
+from scanwright.cli import app
+
+GROUND = (SHIPPED / "ground_ahead.toml").read_text()
+RING = """kind = "slip_ring"
+name = "CAPSULE"
+maker = "any"
+bore_mm = { value = 0.0, source = "a capsule", verified = true }
+outer_diameter_mm = { value = 22.0, source = "a capsule", verified = true }
+length_mm = { value = 30.0, source = "a capsule", verified = true }
+mass_g = { value = 50.0, source = "a capsule", verified = true }
+circuits = { value = "USB", source = "a capsule", verified = true }
+"""
+
+
+def test_help_names_every_command_and_loads_no_heavy_library():
+    shown = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "scanwright", "--help"], capture_output=True, text=True, check=True
+    )
+    for name in ("build", "optimise", "evaluate", "import", "assemble", "catalogue", "schema"):
+        assert f"\n  {name} " in shown.stdout
+    loaded = {line.split("|")[-1].strip() for line in shown.stderr.splitlines()}
+    assert not loaded & {"numpy", "scipy", "numba", "pydantic", "cadquery", "matplotlib", "trimesh", "rich"}
+
+
+def test_the_front_door_imports_no_kernel_and_no_wire():
+    tree = ast.parse(Path(app.__file__).read_text())
+    modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    modules |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    assert not {str(module).split(".")[0] for module in modules} & {"cadquery", "OCP", "serial", "dynamixel_sdk"}
+
+
+def bad_task(change):
+    old, new = change
+    assert old in GROUND
+    return GROUND.replace(old, new)
+
+
+WRONG_TASKS = [
+    (("sensor =", "sensr ="), ["sensr", "did you mean 'sensor'"]),
+    (("period_s", "period_ms"), ["motion.period_ms", "did you mean 'period_s'"]),
+    (("theta_deg", "theta_rad"), ["weight.0.theta_rad", "did you mean 'theta_deg'"]),
+    (('"UTM-30LX"', '"UTM-30X"'), ["UTM-30X", "did you mean 'UTM-30LX'"]),
+    (('"MX-64R"', '"MX64"'), ["MX64", "did you mean 'MX-64R'"]),
+    (('"UH1256-02-0610-06S"', '"UH1256"'), ["UH1256", "slip ring"]),
+    (('"fdm-0.4"', '"fdm"'), ["fdm", "printer"]),
+    (("value = 1.0", "value = nan"), ["weight.0.value", "nan"]),
+    (("value = 1.0", "value = -1.0"), ["weight.0.value", "-1.0"]),
+    (("value = 1.0", "value = 0.0"), ["task.toml", "region is empty"]),
+    (("ball_radius_deg = 2.0", "ball_radius_deg = 2.0\ntolerance = 1e-12"), ["task.toml", "density.tolerance = 1e-12"]),
+    (('name = "ground_ahead"', 'name = "../ground"'), ["name", "../ground", "path"]),
+    (('name = "ground_ahead"', 'name = "a/b"'), ["name", "a/b"]),
+    (("[95, 150]", "[150, 95]"), ["weight.0", "theta_deg"]),
+    (("[95, 150]", "[95, 190]"), ["weight.0", "theta_deg"]),
+    (('shape = "band"', 'shape = "bond"'), ["bond", "'band'"]),
+    (("period_s = 18.0", "period_s = 0"), ["motion.period_s = 0"]),
+    (("period_s = 18.0", 'period_s = "18 s"'), ["motion.period_s", "18 s"]),
+    (('mode = "spin"', 'mode = "wobble"'), ["motion.mode", "wobble"]),
+    (("[-180, 180]", "[-270, 180]"), ["angles", "alpha_rot_deg"]),
+    (("step_deg = 5.0", "step_deg = 0"), ["angles.step_deg = 0"]),
+    (("axis = [-1.0, 0.0, -0.5]", "axis = [0, 0, 0]"), ["mask.0", "axis"]),
+    (("half_angle_deg = 25", "half_angle_deg = 0"), ["mask.0", "half_angle_deg"]),
+    (('slip_ring = "UH1256-02-0610-06S"', ""), ["slip_ring", "needs a slip ring"]),
+    (('slip_ring = "UH1256-02-0610-06S"', 'slip_ring = "CAPSULE"\ncatalogue = ["ring.toml"]'), ["bore_mm = 0"]),
+    (("[motion]", "[motion"), ["not a TOML file"]),
+    (("ball_radius_deg = 2.0", "ball_radius_deg = 120"), ["density.ball_radius_deg", "90"]),
+]
+
+
+@pytest.mark.parametrize(("change", "words"), WRONG_TASKS, ids=[str(change[1]) for change, _ in WRONG_TASKS])
+def test_a_wrong_task_is_one_line_exit_2_and_no_file(command, tmp_path, change, words):
+    task = tmp_path / "task.toml"
+    task.write_text(bad_task(change))
+    (tmp_path / "ring.toml").write_text(RING)
+    code, _, complaint = command("build", task, "--out", tmp_path / "out")
+    assert code == 2
+    assert len(complaint) == 1
+    for word in words:
+        assert word in complaint[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["optimise", "no_such_task"], "ground_ahead"),
+        (["optimise", "missing.toml"], "missing.toml"),
+        (["evaluate", "uniform", "--angles=0,90,0"], "four numbers"),
+        (["evaluate", "uniform", "--angles=0,90,0,x"], "four numbers"),
+        (["evaluate", "uniform", "--angles=0,90,0,nan"], "four numbers"),
+        (["catalogue", "UTM30LX"], "did you mean 'UTM-30LX'"),
+        (["assemble", "no.mcap", "--angles", "no.json", "-o", "c.ply"], "no.json"),
+        (["import", "no.bag", "--scan", "/s", "--angle", "/a", "--angle-unit", "deg", "-o", "r.mcap"], "no.bag"),
+    ],
+    ids=lambda value: " ".join(value[:2]) if isinstance(value, list) else None,
+)
+def test_wrong_words_are_one_line_and_exit_2(command, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    code, _, complaint = command(*words)
+    assert (code, len(complaint)) == (2, 1)
+    assert told in complaint[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_evaluate_prints_every_figure(command, tmp_path):
+    cloud = tmp_path / "sim.ply"
+    code, out, _ = command("evaluate", "rolling", "--angles=0,90,0,-90", "--cloud", cloud, "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert abs(facts["J"] - facts["J_ball"]) <= facts["J_error"] + facts["J_ball_error"]
+    assert facts["J_lower"] <= facts["J"]
+    # the rolling fan leaves a cone of 45 deg behind, less the ball: (1 - cos 43) / 2
+    assert facts["blind_fraction"] == pytest.approx((1 - np.cos(np.radians(43))) / 2, abs=1e-4)
+    assert (facts["masked_fraction"], facts["min_density"]) == (0, 0)
+    points = trimesh.load(cloud).vertices
+    assert points.shape == (720 * 1081, 3)
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1, atol=1e-6)
+
+
+def test_optimise_as_json(command):
+    code, out, _ = command("optimise", "ceiling", "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["covered"] == 37 * 37
+    assert answer["best"] == sorted(answer["best"], key=lambda family: family["J"])
+    for family in answer["best"]:
+        assert (family["alpha_rot_deg"], family["beta_rot_deg"]) == (180, 0)
+    assert answer["best"][0]["J"] < min(other["J"] for other in answer["standard"].values())
+    assert {entry["unit"] for entry in answer["left_out"]} >= {"settings", "square degrees"}
+
+
+def test_schema_and_catalogue(command):
+    code, out, _ = command("schema")
+    assert code == 0
+    assert set(json.loads(out)["properties"]) >= {"name", "sensor", "motion", "angles", "density", "weight", "mask"}
+    _, out, _ = command("catalogue")
+    for name in ("UTM-30LX", "URG-04LX", "UST-10LX", "MX-64R", "AX-12A", "UH1256-02-0610-06S", "SNU11-P0210", "sla"):
+        assert name in out
+    _, out, _ = command("catalogue", "SNU11-P0210")
+    assert "? bore_mm = 12.7" in out
+
+
+def test_import_and_assemble_a_real_recording(command, data, tmp_path):
+    recording, cloud = tmp_path / "room.mcap", tmp_path / "room.ply"
+    source = ["--scan", "/slice:laserScan", "--angle", "/slice:stepAngle", "--angle-unit", "deg", "--hold"]
+    code, out, _ = command("import", data / "tilting/room_240.bag", *source, "-o", recording)
+    assert (code, "wrote 865 scans" in out) == (0, True)
+    angles = Path(scanwright.__file__).parents[1] / "design/angle_sets/tilting_urg.json"
+    code, out, _ = command("assemble", recording, "--angles", angles, "-o", cloud)
+    assert code == 0
+    assert "467,596 points of 589,065 beams" in out
+    assert "left out 121,469 beams: no return" in out
+    assert len(trimesh.load(cloud).vertices) == 865 * 681
+
+
+def test_a_bug_shows_its_traceback(command, monkeypatch):
+    monkeypatch.setattr("design.catalogue.catalogue.load_catalogue", lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        command("catalogue")

@@ -1,0 +1,122 @@
+"""The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
+
+import threading
+import time
+from multiprocessing import Pipe
+
+import numpy as np
+import pytest
+
+from design.angles import Angles, AngleSet
+from firmware_io.assembly.deskew import deskew
+from firmware_io.samples import JointLog, Scan
+from firmware_io.scan.live_feed import MOST_SCANS, Batch, Feed, Placing, growing
+from scanwright.live import page
+from scanwright.live.gate import guarded_server
+from scanwright.live.page import LiveView
+
+ANGLES = AngleSet(
+    task="live",
+    angles_deg=Angles(alpha_rot=10, beta_rot=-55, alpha_laser=-80, beta_laser=75),
+    sensor="UTM-30LX",
+    servo="MX-64R",
+    motion={"mode": "spin", "period_s": 2.0},
+)
+
+
+def scan_at(index, beams=61):
+    rng = np.random.default_rng(index)
+    range_m = rng.uniform(0.2, 20, beams).astype(np.float32)
+    range_m[::7] = np.inf
+    return Scan(
+        stamp_ns=1_000_000_000 + 25_000_000 * index,
+        angle_min_rad=-2.3,
+        angle_increment_rad=4.6 / (beams - 1),
+        time_increment_s=18e-3 / beams,
+        scan_time_s=0.025,
+        range_min_m=0.1,
+        range_max_m=30.0,
+        range_m=range_m,
+        intensity=range_m[:0],
+    )
+
+
+def joints(count):
+    time_ns = 990_000_000 + 10_000_000 * np.arange(count)
+    return JointLog(time_ns, 3.0 * (time_ns - time_ns[0]) / 1e9 + 0.001 * np.sin(np.arange(count)))
+
+
+def test_points_of_the_view_are_those_of_the_frame_chain():
+    scans, log = [scan_at(k) for k in range(40)], joints(120)
+    receiving, sending = Pipe(duplex=False)
+    found = []
+    reader = threading.Thread(target=lambda: found.extend(growing(receiving, Placing(ANGLES, None))))
+    reader.start()
+    feed = Feed(sending)
+    for when, angle in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
+        feed.joint(when, angle)
+    for scan in scans:
+        feed.scan(scan)
+    feed.told("a line")
+    feed.close()
+    reader.join(20)
+    expected = np.concatenate([deskew(scan, log, ANGLES) for scan in scans])
+    expected = expected[np.isfinite(expected[:, 0])]
+    points = np.concatenate([more.points_m for more in found])
+    np.testing.assert_allclose(points, expected, atol=2e-5)
+    seconds = np.concatenate([more.time_s for more in found])
+    assert (seconds[0], seconds[-1]) == (0, pytest.approx(39 * 0.025))
+    assert [line for more in found for line in more.lines] == ["a line"]
+    assert found[-1].lost == 0
+    receiving.close()
+
+
+def test_a_viewer_that_sleeps_costs_the_scan_no_time_and_loses_the_oldest():
+    receiving, sending = Pipe(duplex=False)
+    feed = Feed(sending)
+    scan = scan_at(0, beams=20_000)  # one of them fills the pipe
+    slowest = 0.0
+    for index in range(3 * MOST_SCANS):
+        began = time.perf_counter()
+        feed.scan(scan)
+        feed.joint(index, 0.0)
+        slowest = max(slowest, time.perf_counter() - began)
+        if index == MOST_SCANS:
+            time.sleep(0.3)  # the sender is in the pipe now
+    assert feed.lost > MOST_SCANS // 2
+    began = time.monotonic()
+    receiving.close()
+    feed.close()
+    assert time.monotonic() - began < 5
+    assert slowest < 1.0
+
+
+def test_angles_that_come_twice_or_late_do_no_harm():
+    log = joints(60)
+    placing = Placing(ANGLES, None)
+    first = Batch(log.time_ns[:40], log.position_rad[:40], (), (), 0)
+    again = Batch(log.time_ns[30:], log.position_rad[30:], tuple(scan_at(k) for k in range(10)), (), 3)
+    assert len(placing.place(first).points_m) == 0
+    more = placing.place(again)
+    expected = np.concatenate([deskew(scan_at(k), log, ANGLES) for k in range(10)])
+    np.testing.assert_allclose(more.points_m, expected[np.isfinite(expected[:, 0])], atol=2e-5)
+    assert more.lost == 3
+
+
+def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
+    monkeypatch.setattr(page, "CHUNK_POINTS", 500)
+    monkeypatch.setattr(page, "MOST_POINTS", 2000)
+    rng = np.random.default_rng(0)
+    with guarded_server() as (server, _):
+        view = LiveView(server, "scan of live")
+        for index in range(30):
+            points = rng.normal(0, 1 + index, (100, 3)).astype(np.float32)
+            view.add(points, np.zeros(100, np.float32), np.full(100, index, np.float32))
+        view.by.value = "time"
+        view.lost = 7
+        view.add(np.empty((0, 3), np.float32), np.empty(0, np.float32), np.empty(0, np.float32))
+        shown = sum(len(chunk.points_m) for chunk in view.chunks)
+        assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
+        colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])
+        assert len(colours) == shown and len(np.unique(colours, axis=0)) > 10
+        assert "left out 7 scans" in view.facts.content

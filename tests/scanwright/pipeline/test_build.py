@@ -1,0 +1,186 @@
+"""`scanwright build` from end to end, and the build folder."""
+
+import hashlib
+import json
+import sys
+
+import pytest
+
+from design.angles import load_angles
+from design.errors import BuildError
+from design.task.task import load_task
+from scanwright.cli.app import run as scanwright_command
+from scanwright.pipeline.folder import first_difference, fresh_folder, is_current
+from scanwright.pipeline.records import rounded_to_error
+
+PARTS = ("servo_shaft", "alignment_linkage", "slip_ring_adapter", "base_mount")
+FILES = {
+    "task.toml",
+    "angles.json",
+    "search.csv",
+    "axes.csv",
+    "density.png",
+    "assembly.step",
+    "assembly.glb",
+    "exploded.glb",
+    "assembly.md",
+    "bom.csv",
+    "scanner.urdf",
+    "left_out.json",
+    "checks.json",
+    "own_body.npz",
+    "report.html",
+    "manifest.json",
+    *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
+    *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
+    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part != "servo_shaft"),
+}
+
+
+def build(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["scanwright", "build", *map(str, words)])
+    with pytest.raises(SystemExit) as stop:
+        scanwright_command()
+    assert not stop.value.code
+
+
+@pytest.fixture(scope="module")
+def ceiling(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        out = tmp_path_factory.mktemp("builds")
+        build(patch, "ceiling", "--out", out)
+    return out / "ceiling"
+
+
+def test_a_build_is_complete_and_its_manifest_true(ceiling):
+    made = {path.relative_to(ceiling).as_posix() for path in ceiling.rglob("*") if path.is_file()}
+    assert made == FILES
+    manifest = json.loads((ceiling / "manifest.json").read_text())
+    assert set(manifest["files"]) == FILES - {"manifest.json"}
+    for name, facts in manifest["files"].items():
+        content = (ceiling / name).read_bytes()
+        assert (hashlib.sha256(content).hexdigest(), len(content)) == (facts["sha256"], facts["bytes"])
+    assert not list(ceiling.parent.glob(".*"))
+
+
+def test_the_angle_set_is_the_optimum_of_its_task(ceiling):
+    angles = load_angles(ceiling / "angles.json")
+    assert (angles.angles_deg.alpha_rot, angles.angles_deg.beta_rot) == (180, 0)
+    assert angles.task_sha256 == load_task(ceiling / "task.toml").sha256() == load_task(_shipped("ceiling")).sha256()
+    assert angles.J < -5.5
+    assert angles.t_world_rot_mm[2] < -80  # hangs: the deck is above the lidar's sweep
+
+
+def test_the_report_of_a_build_has_a_picture_of_every_place_that_a_check_names(ceiling):
+    checks = json.loads((ceiling / "checks.json").read_text())["checks"]
+    placed = [check for check in checks if check["where"] != "fdm-0.4"]  # a printer is no place
+    text = (ceiling / "report.html").read_text()
+    assert text.count('<button type="button" class="where"') == len(placed) > 20
+
+
+def test_a_second_run_does_no_work_and_says_so(ceiling, monkeypatch, capsys):
+    before = {path: path.stat().st_mtime_ns for path in ceiling.rglob("*")}
+    build(monkeypatch, "ceiling", "--out", ceiling.parent)
+    assert "nothing has changed" in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in ceiling.rglob("*")} == before
+
+
+def test_the_resolved_task_builds_the_same(ceiling):
+    assert is_current(ceiling, load_task(ceiling / "task.toml"))
+
+
+def test_a_touched_file_is_no_current_build(ceiling):
+    loaded = load_task(ceiling / "task.toml")
+    table = ceiling / "search.csv"
+    kept = table.read_bytes()
+    table.write_bytes(kept + b"\n")
+    assert not is_current(ceiling, loaded)
+    table.write_bytes(kept)
+    assert is_current(ceiling, loaded)
+
+
+def test_building_again_elsewhere_finds_the_one_file_that_was_touched(ceiling, monkeypatch, capsys):
+    table = ceiling / "task.toml"
+    kept = table.read_bytes()
+    table.write_bytes(kept + b"# mine\n")  # the last of all files by name: every other one is compared before it
+    assert max(FILES - {"manifest.json"}) == "task.toml"
+    monkeypatch.setattr(sys, "argv", ["scanwright", "build", "--check", str(ceiling)])
+    with pytest.raises(SystemExit) as stop:
+        scanwright_command()
+    table.write_bytes(kept)
+    assert stop.value.code == 1
+    assert f"{ceiling}: task.toml: sha256 " in capsys.readouterr().out
+
+
+def _written(folder, files):
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    manifest = {"files": {name: {} for name in files}}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    return folder
+
+
+def test_the_first_difference_of_two_builds_is_named(tmp_path):
+    first = _written(tmp_path / "first", {"a.txt": "a", "parts/b.stl": "b"})
+    assert first_difference(first, _written(tmp_path / "same", {"a.txt": "a", "parts/b.stl": "b"})) is None
+    other = _written(tmp_path / "other", {"a.txt": "a", "parts/b.stl": "B"})
+    assert first_difference(first, other).startswith("parts/b.stl: sha256 ")
+    more = _written(tmp_path / "more", {"a.txt": "a", "b.txt": "b", "parts/b.stl": "b"})
+    assert first_difference(first, more) == "b.txt: missing"
+    assert first_difference(more, first) == "b.txt: the second build has no such file"
+    (first / "a.txt").unlink()
+    assert first_difference(first, other) == "a.txt: missing"
+
+
+def test_a_folder_without_a_manifest_is_no_build(tmp_path):
+    with pytest.raises(BuildError, match=r"manifest\.json: missing or unreadable"):
+        first_difference(tmp_path, _written(tmp_path / "again", {}))
+
+
+def test_a_build_that_fails_leaves_the_last_one_alone(tmp_path):
+    target = tmp_path / "task"
+    target.mkdir()
+    (target / "recording.mcap").write_bytes(b"mine")
+    with pytest.raises(RuntimeError), fresh_folder(target) as work:
+        (work / "angles.json").write_text("half")
+        raise RuntimeError
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["recording.mcap"]
+
+
+def test_a_build_that_fails_leaves_no_folder_where_there_was_none(tmp_path):
+    with pytest.raises(RuntimeError), fresh_folder(tmp_path / "new" / "out" / "task") as work:
+        (work / "angles.json").write_text("half")
+        raise RuntimeError
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_last_build_had_and_this_one_has_not_is_removed(tmp_path):
+    target = tmp_path / "task"
+    for files in (["a.txt", "b.txt"], ["a.txt"]):
+        with fresh_folder(target) as work:
+            for name in files:
+                (work / name).write_text(name)
+            (work / "manifest.json").write_text(json.dumps({"files": {name: {} for name in files}}))
+    assert sorted(path.name for path in target.iterdir()) == ["a.txt", "manifest.json"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(BuildError, match="cannot write the build folder"), fresh_folder(tmp_path / "file" / "task"):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [(-6.128414, 5.5e-5, (-6.12841, 6e-5)), (1.0, 0.0, (1.0, 0.0)), (-5.29596, 9.96e-5, (-5.29596, 1e-4))],
+)
+def test_a_figure_is_rounded_to_its_error(value, error, expected):
+    assert rounded_to_error(value, error) == pytest.approx(expected, abs=1e-12)
+
+
+def _shipped(name):
+    from design.task.task import SHIPPED
+
+    return SHIPPED / f"{name}.toml"

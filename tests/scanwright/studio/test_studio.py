@@ -1,0 +1,228 @@
+"""What the studio makes of a task, without a page: paint, files, facts, and work that follows a hand."""
+
+import math
+import os
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from design.errors import BuildError, TaskError
+from design.objective.problem import problem_of
+from design.objective.score import score
+from design.sphere.directions import spiral
+from design.task.task import load_task
+from scanwright.studio.panel import panel_html
+from scanwright.studio.panel.facts import judge_of
+from scanwright.studio.state import MOST_DABS, Dab, painted, save_task, setting_of, task_text
+from scanwright.studio.view.latest_only import Newest
+from scanwright.studio.view.makers import Makers, Order, Shows
+from scanwright.studio.view.sphere import BLIND, RADIUS_M, density_colours, direction_hit, edges, highest_density, tiles
+from scanwright.studio.view.workbench import Body, Workbench
+
+SETTING = setting_of((0, -55, -80, 75))
+
+
+@pytest.fixture
+def loaded(tmp_path, small_task):
+    path = tmp_path / "small.toml"
+    path.write_text(small_task)
+    return load_task(path)
+
+
+def test_the_last_dab_that_holds_a_direction_wins_as_in_a_task_file(loaded):
+    dabs = (
+        Dab((0.0, 0.0, 1.0), 30.0, "matters", 3.0),
+        Dab((0.0, 0.0, 1.0), 10.0, "does not matter"),
+        Dab((0.0, 1.0, 0.0), 15.0, "hidden"),
+    )
+    field = problem_of(painted(loaded, dabs)).field
+    directions = spiral(5000)
+    slow = []
+    for n in directions:
+        weight = 1.0 if n @ np.array([1, 0, -1]) / 2**0.5 >= math.cos(math.radians(40)) else 0.0
+        for dab in dabs[:2]:
+            if n @ np.array(dab.direction) >= math.cos(math.radians(dab.radius_deg)):
+                weight = dab.value if dab.brush == "matters" else 0.0
+        hidden = n[1] >= math.cos(math.radians(15)) or -n[0] >= math.cos(math.radians(20))
+        slow.append(0.0 if hidden else weight)
+    np.testing.assert_array_equal(field.weight_at(directions), slow)
+
+
+def test_too_much_paint_or_paint_on_everything_is_refused(loaded):
+    with pytest.raises(TaskError, match=f"{MOST_DABS} at most"):
+        painted(loaded, (Dab((1.0, 0.0, 0.0), 5.0, "matters"),) * (MOST_DABS + 1))
+    with pytest.raises(TaskError, match="axis"):
+        painted(loaded, (Dab((0.0, 0.0, 0.0), 5.0, "matters"),))
+    with pytest.raises(TaskError, match="the region is empty"):
+        problem_of(painted(loaded, (Dab((1.0, 0.0, -1.0), 60.0, "hidden"),)))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    x=st.floats(-1, 1), y=st.floats(-1, 1), radius=st.floats(1, 60), value=st.floats(0.01, 1000),
+    angles=st.tuples(st.floats(-180, 180), st.floats(-90, 90), st.floats(-90, 90), st.floats(-90, 90)),
+)  # fmt: skip
+def test_a_saved_task_reads_back_as_what_was_on_the_page(tmp_path_factory, small_task, x, y, radius, value, angles):
+    folder = tmp_path_factory.mktemp("saved")
+    (folder / "small.toml").write_text(small_task)
+    now = painted(load_task(folder / "small.toml"), (Dab((x, y, 1.0), radius, "matters", value),))
+    setting = setting_of(angles)
+    again = load_task(save_task(now, folder, "mine", setting, overwrite=False))
+    fixed = [again.task.angles.limits(name) for name in ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")]
+    assert fixed == [(angle, angle) for angle in setting.angles_deg]
+    assert again.task.weight == now.task.weight and again.task.mask == now.task.mask
+    assert again.task.motion == now.task.motion and again.task.density == now.task.density
+
+
+def test_saved_elsewhere_a_task_still_finds_its_files(tmp_path, small_task):
+    np.save(tmp_path / "map.npy", np.ones((4, 8)))
+    source = tmp_path / "mapped.toml"
+    source.write_text(small_task + '[[weight]]\nshape = "map"\nfile = "map.npy"\n')
+    (tmp_path / "elsewhere").mkdir()
+    saved = save_task(load_task(source), tmp_path / "elsewhere", "mine", None, overwrite=False)
+    np.testing.assert_array_equal(load_task(saved).maps[0], np.ones((4, 8)))
+
+
+@pytest.mark.parametrize(
+    "name", ["../out", "a/b", "a\\b", "/tmp/x", "", ".", "..", "-x", "x" * 65, "a b", "a\0b", "a.b"]
+)
+def test_a_name_that_leads_elsewhere_writes_nothing(loaded, tmp_path, name):
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(TaskError):
+        save_task(loaded, tmp_path, name, None, overwrite=True)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_file_is_overwritten_only_when_asked_and_a_link_never(loaded, tmp_path):
+    save_task(loaded, tmp_path, "mine", None, overwrite=False)
+    with pytest.raises(TaskError, match="exists; tick 'overwrite'"):
+        save_task(loaded, tmp_path, "mine", SETTING, overwrite=False)
+    assert "alpha_rot_deg" not in (tmp_path / "mine.toml").read_text()
+    save_task(loaded, tmp_path, "mine", SETTING, overwrite=True)
+    assert "alpha_rot_deg = 0.0" in (tmp_path / "mine.toml").read_text()
+    (tmp_path / "victim").write_text("keep me")
+    (tmp_path / "link.toml").symlink_to(tmp_path / "victim")
+    with pytest.raises(TaskError, match="a link"):
+        save_task(loaded, tmp_path, "link", None, overwrite=True)
+    assert (tmp_path / "victim").read_text() == "keep me"
+
+
+def test_every_shipped_task_can_be_saved(tmp_path):
+    for name in ("uniform", "indoor_urg", "ceiling"):
+        shipped = load_task(Path(name))
+        (tmp_path / f"{name}.toml").write_text(task_text(shipped, tmp_path, name, None))
+        assert load_task(tmp_path / f"{name}.toml").task == shipped.task
+
+
+def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(loaded):
+    problem = problem_of(loaded)
+    judge = judge_of(loaded, problem)
+    truth = score(problem, SETTING.angles_rad)
+    exact, quick = judge.exact(SETTING), judge.quick(SETTING)
+    assert (exact.J, exact.J_error, exact.exact) == (truth.J, truth.J_error, True)
+    assert not quick.exact and abs(quick.J - truth.J) <= quick.J_error + truth.J_error
+    assert f"{truth.J:.5f}" in panel_html.facts_html(exact, log=True)
+    assert exact.gap_mm == pytest.approx(math.radians(exact.gap_deg) * 10_000)
+
+
+def test_colours_are_pale_exactly_where_no_beam_comes(loaded):
+    from design.evaluation.coverage import mean_density_at
+
+    problem, directions = problem_of(loaded), tiles().directions
+    highest = highest_density(problem, SETTING.angles_rad)
+    colours = density_colours(problem, SETTING.angles_rad, directions, highest)
+    blind = mean_density_at(problem, SETTING.angles_rad, directions) <= 1e-9
+    assert 0 < blind.sum() < len(blind)
+    np.testing.assert_array_equal((colours == BLIND).all(axis=1), blind)
+
+
+def test_edges_lie_on_the_cones_of_the_task(loaded):
+    weight, mask = edges(problem_of(loaded).field)
+    np.testing.assert_allclose(mask @ np.array([-1.0, 0, 0]), math.cos(math.radians(20)), atol=0.01)
+    np.testing.assert_allclose(weight @ np.array([1, 0, -1]) / 2**0.5, math.cos(math.radians(40)), atol=0.012)
+
+
+@given(azimuth=st.floats(-3, 3), height=st.floats(-0.9, 0.9), off=st.floats(0, 0.95))
+def test_a_ray_meets_the_near_wall_from_outside_and_the_far_one_from_inside(azimuth, height, off):
+    eye = 3 * RADIUS_M * np.array([math.cos(azimuth), math.sin(azimuth), height])
+    aside = np.cross(eye, [0.0, 0.0, 1.0])
+    ray = off * RADIUS_M * aside / np.linalg.norm(aside) - eye
+    near, far = (direction_hit(eye, ray, inside=inside) for inside in (False, True))
+    for hit in (near, far):
+        assert np.linalg.norm(hit) == pytest.approx(1)
+        np.testing.assert_allclose(np.cross(RADIUS_M * hit - eye, ray), 0, atol=1e-9)
+    assert near @ eye > far @ eye
+    assert direction_hit(eye, eye, inside=True) is None
+    assert direction_hit(eye, (0.0, 0.0, 0.0), inside=True) is None
+
+
+def test_of_many_wishes_the_last_is_done_and_then_the_rest():
+    gate, begun, done, rested = threading.Event(), threading.Event(), [], []
+
+    def work(wish):
+        begun.set()
+        gate.wait(10)
+        done.append(wish)
+        if wish == "bad":
+            raise RuntimeError("a fault of one wish")
+
+    newest = Newest("test", work, rested.append, rest_s=0.01)
+    newest.wish(0)
+    assert begun.wait(10)
+    for wish in range(1, 50):
+        newest.wish(wish)
+    gate.set()
+    assert newest.settled(10)
+    assert (done, rested, newest.replaced) == ([0, 49], [49], 48)
+    newest.close()
+
+
+def bodies(scanner, turning):
+    """A stand-in for the kernel: a triangle as large as beta_rot, none at beta_laser = 13; what stands waits."""
+    if scanner.angles.angles_deg.beta_laser == 13:
+        raise BuildError("alignment_linkage: no room")
+    while not turning and not Path(os.environ["SCANWRIGHT_TEST_GO"]).exists():
+        time.sleep(0.01)
+    corners = np.eye(3, dtype=np.float32) * np.float32(scanner.angles.angles_deg.beta_rot)
+    return (Body("turning" if turning else "standing", corners, np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
+
+
+def points(view):
+    return np.full((len(view.joint_rad), 3), view.every, np.float32)
+
+
+def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp_path, monkeypatch):
+    monkeypatch.setenv("SCANWRIGHT_TEST_GO", str(tmp_path / "go"))
+    shown, notes = {}, []
+    problem = problem_of(loaded)
+
+    def show(name, value):
+        shown[name] = value
+        if shown.keys() >= {True, "points"}:  # what turns, and the scan, did not wait for what stands
+            (tmp_path / "go").touch()
+
+    shows = Shows(
+        bodies=lambda _, turning, made: show(turning, made[0].vertices_m.max() if made else None),
+        points=lambda _, points_m: show("points", points_m.shape),
+        note=lambda text, bad: notes.append((text, bad)),
+    )
+    makers = Makers(Workbench(bodies, points), shows)
+    try:
+        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, "room"))
+        assert makers.settled(60)
+        assert shown == {True: 40, False: 40, "points": (80, 3)}
+        assert notes[-1] == ("", False)
+        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 13)), True, ""))
+        assert makers.settled(60)
+        assert notes[-1] == ("alignment_linkage: no room", True)
+        assert shown[True] is shown[False] is None  # and no other setting's parts stay
+        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, ""))
+        assert makers.settled(60)
+        assert (shown[True], notes[-1]) == (40, ("", False))
+    finally:
+        makers.close()

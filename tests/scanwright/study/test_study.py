@@ -1,0 +1,253 @@
+"""Studies without a cluster: what is crossed, who beats whom, and that the answer does not depend on who was first."""
+
+import random
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
+from design.catalogue.catalogue import load_catalogue
+from design.errors import TaskError
+from design.task.task import load_task
+from scanwright.study import session as sessions
+from scanwright.study.answer.columns import COLUMNS, costs
+from scanwright.study.answer.pareto import Front, dominators
+from scanwright.study.answer.tables import FIELDS, write_tables
+from scanwright.study.candidate import bounds_of, digest, search_record, winner_task
+from scanwright.study.crossing import Crossing, _with_period
+from scanwright.study.runner.engine import Finished
+from scanwright.study.runner.identity import identity
+from scanwright.study.runner.store import open_store, shared_store
+from scanwright.study.runner.work import OtherVersionError, Unit, do
+from scanwright.study.session import Session, addresses
+from scanwright.study.study import load_study, shipped_studies
+
+rows = st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=30)
+
+
+@given(rows, st.randoms(use_true_random=False))
+def test_a_front_is_what_nothing_beats_in_whatever_order(points, dice):
+    costs = np.array(points, dtype=float)
+    costs[costs == 4] = np.inf  # not known
+    beaten = [any(all(q <= p) and any(q < p) for q in costs) for p in costs]
+    front = Front(3)
+    order = list(range(len(points)))
+    dice.shuffle(order)
+    for i in order:
+        front.add(i, costs[i])
+    assert set(front.numbers.tolist()) == {i for i, lost in enumerate(beaten) if not lost}
+    for i, lost in enumerate(beaten):
+        assert (front.beater(costs[i]) is not None) == lost
+        assert dominators(costs, costs[i]).any() == lost
+
+
+def test_the_shipped_study_crosses_everything_and_refuses_with_a_reason():
+    crossing = Crossing(load_study(Path("fleet")))
+    combinations = list(crossing)
+    assert len(combinations) == len(crossing) == 3 * 3 * 2 * 2
+    assert len({c.name for c in combinations}) == 36
+    refused = [c for c in combinations if c.loaded is None]
+    assert len(refused) == 12
+    assert all(c.choice["servo"] == "AX-12A" and "no angle is read" in c.refused for c in refused)
+    sweeping = [c for c in combinations if c.choice["task"] == "indoor_urg"]
+    assert all(c.loaded.task.slip_ring is None for c in sweeping)
+    assert len({digest(c.loaded) for c in sweeping}) == 6  # the same with either ring: made once
+    assert len({digest(search_record(c.loaded)) for c in combinations if c.loaded}) == 9
+    assert combinations[17].name == crossing[17].name
+
+
+def crossed(text, tmp_path, **files):
+    for name, content in files.items():
+        (tmp_path / f"{name}.toml").write_text(content)
+    path = tmp_path / "study.toml"
+    path.write_text('name = "small"\nfront = ["J"]\n' + text)
+    return list(Crossing(load_study(path)))
+
+
+def test_periods_and_mountings_take_the_place_of_those_of_the_task(tmp_path):
+    mountings = (
+        '[[mounting]]\nname = "upright"\nangles = { beta_rot_deg = 0, step_deg = 10 }\n[[mounting]]\nname = "any"\n'
+    )
+    few = 'tasks = ["ground_ahead"]\nperiods_s = [2.0, 0.5, "shortest"]\n' + mountings
+    found = crossed(few, tmp_path)
+    assert [(c.choice["mounting"], c.choice["period"]) for c in found] == [
+        (mounting, period) for mounting in ("upright", "any") for period in ("2s", "0.5s", "shortest")
+    ]
+    upright, fast, shortest = found[:3]
+    base = load_task(Path("ground_ahead")).task
+    assert upright.loaded.task.angles == base.angles.model_copy(update={"beta_rot_deg": 0.0, "step_deg": 10.0})
+    assert found[3].loaded.task.angles == base.angles
+    assert upright.loaded.task.motion.period_s == 2.0
+    assert shortest.loaded.task.motion.mode == "shortest"
+    assert "MX-64R': turns at" in fast.refused  # 120 rpm
+    with pytest.raises(TaskError, match="no period"):
+        _with_period({"mode": "stop_and_go"}, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ('tasks = ["rolling"]\nfront = ["J", "mas_g"]', "front.*'mas_g' is no column; did you mean 'mass_g'"),
+        ('tasks = ["rolling"]\nfront = []', "front"),
+        ('tasks = ["roling"]\nfront = ["J"]', "no such task file"),
+        ('tasks = ["rolling"]\nfront = ["J"]\nsensors = ["UTM-30L"]', "sensors: 'UTM-30L' is no lidar.*UTM-30LX"),
+        ('tasks = ["rolling"]\nfront = ["J"]\nservos = ["MX-64R", "MX-64R"]', "servos.*'MX-64R' is named twice"),
+        ('tasks = ["rolling"]\nfront = ["J"]\nperiods_s = [0.0]', "periods_s"),
+        ('tasks = ["rolling"]\nfront = ["J"]\nsensor = ["UTM-30LX"]', "sensor: unknown key; did you mean 'sensors'"),
+        ('tasks = ["rolling"]\nfront = ["J"]\n[[mounting]]\nname = "a"\nangles = { beta = 3 }', "unknown key"),
+    ],
+)
+def test_wrong_studies_get_one_line(tmp_path, command, line, says):
+    path = tmp_path / "wrong.toml"
+    path.write_text(f'name = "wrong"\n{line}\n')
+    code, _, complaint = command("study", path, "--plan")
+    assert code == 2
+    assert len(complaint) == 1
+    assert "wrong.toml" in complaint[0]
+    with pytest.raises(TaskError, match=says):
+        load_study(path)
+
+
+def test_the_name_decides_nothing_and_a_servo_no_search():
+    one, other = (load_task(Path("rolling")) for _ in range(2))
+    other = replace(other, task=other.task.model_copy(update={"name": "another"}))
+    assert addresses(one) == addresses(other)
+    other = replace(other, task=other.task.model_copy(update={"servo": "MX-28"}))
+    assert addresses(one)[0] == addresses(other)[0]
+    assert addresses(one)[1] != addresses(other)[1]
+
+
+def in_some_order(seed, at_once=6):
+    """A cluster of two that finishes what it holds in any order."""
+    dice = random.Random(seed)
+
+    def run(_client, units, store, _limit_s, _ticked):
+        units, at_work, more = iter(units), [], True
+        while more or at_work:
+            while more and len(at_work) < at_once:
+                unit = next(units, None)
+                more = unit is not None
+                if more:
+                    at_work.append(unit)
+            if not at_work:
+                continue
+            unit = at_work.pop(dice.randrange(len(at_work)))
+            known = store.get(unit.address)
+            result = known or unit.function(*unit.arguments)
+            store.put(unit.address, result)
+            yield Finished(unit, result, "", None if known else 0.1, 1.0)
+
+    return run
+
+
+def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path, monkeypatch):
+    loaded = invented_study(120, mountings=3)
+    crossing = Crossing(loaded)
+    names = loaded.study.front
+    every = []  # the slow obvious way: make all, then ask who beats whom
+    for c in crossing:
+        found = invented_search(search_record(c.loaded))
+        bound = costs(bounds_of(c.loaded, found), names)
+        every.append((bound, costs(invented_judge(c.loaded, found)["values"], names)))
+
+    def beaten(cost):
+        return any((other <= cost).all() and (other < cost).any() for _, other in every)
+
+    expected = ["dominated" if beaten(b) else "built" if beaten(c) else "front" for b, c in every]
+    assert min(Counter(expected)[status] for status in ("dominated", "built", "front")) >= 2
+    tables, made = set(), set()
+    for seed in range(4):
+        monkeypatch.setattr(sessions, "run", in_some_order(seed))
+        session = Session(crossing, open_store(tmp_path / str(seed)), invented_judge, invented_search)
+        session.run(None, lambda _: None)
+        assert [row["status"] for row in session.rows()] == expected
+        write_tables(tmp_path, session.rows())
+        tables.add((tmp_path / "study.csv").read_bytes() + (tmp_path / "study.parquet").read_bytes())
+        made.add(session.counts.judged)
+        assert session.counts.judged + session.counts.beaten == len(crossing)
+    assert len(tables) == 1
+    assert max(made) < len(crossing)
+    again = Session(crossing, session.store, invented_judge, invented_search)
+    again.run(None, lambda _: None)
+    assert (again.counts.judged, again.counts.searches) == (0, 0)
+    assert list(again.rows()) == list(session.rows())
+
+
+def test_a_candidate_whose_bound_is_beaten_is_never_made(tmp_path, monkeypatch):
+    """With one worker that has one unit at a time, nothing is at work when a bound is asked for."""
+    session = Session(Crossing(invented_study(60, mountings=3)), open_store(tmp_path), None, invented_search)
+    wasted = []
+
+    def judge(loaded, found):
+        bound = costs(bounds_of(loaded, found), session.crossing.loaded.study.front)
+        wasted.append(any((done <= bound).all() and (done < bound).any() for done in session.fronts[0].costs))
+        return invented_judge(loaded, found)
+
+    session.judge = judge
+    monkeypatch.setattr(sessions, "run", in_some_order(0, at_once=1))
+    session.run(None, lambda _: None)
+    assert not any(wasted)
+    assert 0 < session.counts.beaten == 60 - len(wasted)
+    assert session.counts.beaten == sum(row["status"] == "dominated" for row in session.rows())
+
+
+def test_both_tables_hold_the_same(tmp_path):
+    import pyarrow.parquet as pq
+
+    given = [
+        {"name": "a", "status": "front", "reason": "", "J": -1.5},
+        {"name": "b", "status": "refused", "reason": "é, \n"},
+    ]
+    assert write_tables(tmp_path, given) == Counter(front=1, refused=1)
+    table = pq.read_table(tmp_path / "study.parquet").to_pylist()
+    assert table == [dict.fromkeys(FIELDS) | row for row in given]
+    lines = (tmp_path / "study.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].split(",") == list(FIELDS)
+    assert set(COLUMNS) <= set(FIELDS)
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_worker_keeps_results_only_in_the_folder_of_its_client(tmp_path):
+    store = open_store(tmp_path / "results")
+    unit = Unit("ab" * 32, "unit", dict, ({"status": "built"},))
+    done = do(unit, str(store.folder), store.mark, identity(), 10.0)
+    assert done.kept and done.seconds is not None
+    assert store.get(unit.address) == {"status": "built"}
+    assert do(unit, str(store.folder), store.mark, identity(), 10.0).seconds is None  # looked up
+    assert shared_store(str(store.folder), "another mark") is None
+    assert not do(unit, str(tmp_path / "elsewhere"), store.mark, identity(), 10.0).kept
+    with pytest.raises(OtherVersionError):
+        do(unit, str(store.folder), store.mark, identity() | {"numpy": "0"}, 10.0)
+    cut_off = store.folder / "cd" / f"{'cd' * 32}.json"
+    cut_off.parent.mkdir()
+    cut_off.write_text('{"status": "bu')  # by a file system that lost its end
+    assert store.get("cd" * 32) is None
+
+
+def test_a_winner_is_built_with_its_own_angles_and_period():
+    loaded = load_task(Path("ground_ahead"))
+    found = {"motion": {"mode": "spin", "period_s": 3.25}}
+    task = winner_task(loaded, found, {"angles_deg": [-180.0, 55.0, 80.0, -75.0]}).task
+    assert [task.angles.limits(name) for name in ("alpha_rot", "beta_laser")] == [(-180.0, -180.0), (-75.0, -75.0)]
+    assert task.motion.period_s == 3.25
+
+
+def test_a_product_of_the_study_goes_with_its_winners(tmp_path):
+    shipped = Path(__file__).parents[3] / "design" / "catalogue" / "uh1256.toml"
+    (tmp_path / "ring.toml").write_text(shipped.read_text().replace("UH1256-02-0610-06S", "my ring"))
+    found = crossed('tasks = ["rolling"]\ncatalogue = ["ring.toml"]\nslip_rings = ["my ring", "none"]', tmp_path)
+    mine, none = found
+    assert mine.name == "rolling-my-ring"
+    assert load_catalogue(*map(Path, mine.loaded.task.catalogue)).named("my ring")
+    assert "needs a slip ring" in none.refused
+
+
+def test_every_shipped_study_can_be_read():
+    assert "fleet" in shipped_studies()
+    for name in shipped_studies():
+        load_study(Path(name))
