@@ -1,1 +1,68 @@
-"""The front door: what people call, and the applications: pipeline, commands, report, studio, live page, study."""
+"""Scanwright: one task file becomes the angles, the parts and the frame chain of a rotating 2D lidar.
+
+    import scanwright as sw
+
+The names below are those of `scanwright.api`, each loaded when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scanwright.api import (
+        assemble,
+        build,
+        calibrate,
+        check,
+        compare,
+        draw_density,
+        evaluate,
+        import_bag,
+        load_angles,
+        load_task,
+        make_parts,
+        open_lidar,
+        open_recording,
+        open_servo,
+        optimise,
+        read_cloud,
+        register,
+        scan,
+        simulate,
+        write_cloud,
+    )
+
+__all__ = [
+    "assemble",
+    "build",
+    "calibrate",
+    "check",
+    "compare",
+    "draw_density",
+    "evaluate",
+    "import_bag",
+    "load_angles",
+    "load_task",
+    "make_parts",
+    "open_lidar",
+    "open_recording",
+    "open_servo",
+    "optimise",
+    "read_cloud",
+    "register",
+    "scan",
+    "simulate",
+    "write_cloud",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return getattr(import_module("scanwright.api"), name)
+    raise AttributeError(f"module 'scanwright' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.methods import Point, Reference, on_front
-from design.accuracy.stress import Row
+from design.accuracy.methods import Point, Reference, as_log, measure, on_front
+from design.accuracy.stress import Row, stress_rows
+from design.objective.problem import problem_of
+from design.search.optimum import optimum_of
+from design.task.task import LoadedTask
 
 MARKS = "osD^vP*X"
 GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
@@ -65,3 +69,51 @@ def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)
+
+
+@dataclass(frozen=True, slots=True)
+class StressReport:
+    """What became of the stiff and extreme cases, in words, and whether all are within what is allowed."""
+
+    lines: tuple[str, ...]
+    passed: bool
+
+
+def report_stress(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> StressReport:
+    """Run the stiff and extreme cases on a task and write `stress.csv`.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    say("stiff and extreme cases")
+    loaded = as_log(loaded)
+    rows = stress_rows(loaded, problem_of(loaded))
+    folder.mkdir(parents=True, exist_ok=True)
+    write_rows(folder / "stress.csv", rows)
+    failed = sum(not row.passed for row in rows)
+    lines = [
+        f"{'ok  ' if row.passed else 'FAIL'} {row.case:58} {row.quantity:15} expected {row.expected:.8g}, "
+        f"off by {row.error:.1e}"
+        for row in rows
+    ]
+    end = f"{len(rows) - failed} of {len(rows)} within what is allowed; wrote {folder / 'stress.csv'}"
+    return StressReport((*lines, end), failed == 0)
+
+
+def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
+    """Measure every way to compute J at the optimum of a task, write `work_precision.csv` and `.png`; in words.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting keeps the limits.
+    """
+    optimum = optimum_of(as_log(loaded), say)
+    truth, points = measure(optimum.problem, optimum.search.best[0].angles_rad, say)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_points(folder / "work_precision.csv", points, truth)
+    work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
+    lines = [f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
+    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+        seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
+        mark = "*" if front else " "
+        lines.append(f"{mark} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
+    return [*lines, f"* nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}"]

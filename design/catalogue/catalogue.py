@@ -10,6 +10,7 @@ A user's own catalogue file adds products or replaces shipped ones of the same n
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -52,6 +53,15 @@ class Product(Record):
     def unverified(self) -> list[str]:
         """Names of the values that nobody has verified."""
         return [field for field, origin in self._provenance.items() if not origin.verified]
+
+    def lines(self) -> list[str]:
+        """Every value with its source, in words."""
+        values = [
+            f"  {' ' if origin.verified else '?'} {field} = {json.dumps(getattr(self, field))}   [{origin.source}]"
+            for field, origin in self._provenance.items()
+        ]
+        doubt = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
+        return [f"{self.name} ({self.maker})", *values, doubt]
 
 
 class Lidar(Product):
@@ -305,6 +315,15 @@ class Catalogue:
         if name not in self.products:
             raise TaskError(f"'{name}' is not in the catalogue{suggest(name, self.products)}")
         return self.products[name]
+
+    def lines(self) -> list[str]:
+        """One for each product, in words."""
+        lines = []
+        for product in self:
+            doubt = product.unverified()
+            note = f"   not verified: {', '.join(doubt)}" if doubt else ""
+            lines.append(f"{product.kind:10} {product.name:20} {product.maker}{note}")
+        return lines
 
     def __iter__(self) -> Iterator[Product]:
         """Products in the order of their kinds, then names."""

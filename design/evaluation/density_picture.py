@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,15 @@ STEP_DEG = 0.5
 INK = "#111111"
 
 
-def density_picture(path: Path, problem: Problem, settings: dict[str, Array], title: str) -> None:
+def density_picture(path: Path, problem: Problem, settings: Mapping[str, Array], title: str) -> None:
+    """Write `density_figure` to a PNG."""
+    density_figure(problem, settings, title).savefig(path, dpi=110, metadata={"Software": None})
+
+
+def density_figure(problem: Problem, settings: Mapping[str, Array], title: str) -> Figure:
     """Density maps one above the other on one colour scale.
 
     Args:
-        path: PNG to write.
         problem: the task as numbers.
         settings: title of each map and its (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top.
         title: line above all.
@@ -59,4 +64,4 @@ def density_picture(path: Path, problem: Problem, settings: dict[str, Array], ti
         ball = np.degrees(problem.ball_rad)
         figure.colorbar(image, ax=axes, label=f"mean beams within {ball:g} deg (white: never seen)", shrink=0.9)
     figure.suptitle(title, fontsize=11)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    return figure

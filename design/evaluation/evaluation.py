@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -26,6 +26,8 @@ class Evaluation:
     """One setting of a task, judged.
 
     Attributes:
+        problem: the task as numbers.
+        angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
         score: J by the closed form.
         ball: J by the paper's ball search over simulated scans.
         coverage: what is blind and what is masked.
@@ -37,6 +39,8 @@ class Evaluation:
         surfaces: points per square metre, where the task has a scene.
     """
 
+    problem: Problem
+    angles_rad: Array
     score: Score
     ball: BallScore
     coverage: Coverage
@@ -46,6 +50,10 @@ class Evaluation:
     rises: dict[str, float]
     hit: PoleChances | None
     surfaces: dict[str, float] | None
+
+    def beam_directions(self) -> Array:
+        """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
+        return simulated_beams(self.problem, self.angles_rad)
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
@@ -127,6 +135,8 @@ def evaluate(
     found = score(problem, angles_rad)
     progress("ball search, 8 start phases")
     return Evaluation(
+        problem=problem,
+        angles_rad=angles_rad,
         score=found,
         ball=ball_score(problem, angles_rad),
         coverage=coverage(problem, angles_rad),
@@ -148,19 +158,31 @@ def problem_to_judge(loaded: LoadedTask, lever: str | None) -> Problem:
     return problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_lever_of(lever))
 
 
-def setting_of(text: str) -> Array:
-    """The setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] from four numbers in degrees.
+def angles_in(text: str) -> tuple[float, float, float, float]:
+    """Four angles in degrees, separated by commas: alpha_rot, beta_rot, alpha_laser, beta_laser.
 
     Raises:
         TaskError: these are not four angles.
     """
     try:
-        angles = [float(part) for part in text.split(",")]
-    except ValueError:
-        angles = []
-    if len(angles) != 4 or not all(abs(angle) <= 360 for angle in angles):
-        raise TaskError(f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling")
-    return np.radians(angles)
+        alpha_rot, beta_rot, alpha_laser, beta_laser = (float(part) for part in text.split(","))
+        setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
+    except (ValueError, TaskError) as error:
+        raise TaskError(
+            f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling"
+        ) from error
+    return alpha_rot, beta_rot, alpha_laser, beta_laser
+
+
+def setting_rad(angles_deg: Sequence[float]) -> Array:
+    """The setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] from degrees.
+
+    Raises:
+        TaskError: these are not four angles.
+    """
+    if len(angles_deg) != 4 or not all(abs(angle) <= 360 for angle in angles_deg):
+        raise TaskError(f"angles_deg = {tuple(angles_deg)}: four numbers in degrees, such as (0, 90, 0, -90)")
+    return np.radians(angles_deg)
 
 
 def simulated_beams(problem: Problem, angles_rad: Array) -> Array:

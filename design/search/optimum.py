@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from typing import Any
 
-from design.angles import standard_settings
+import numpy as np
+
+from design.angles import Angles, AngleSet, standard_settings
 from design.frames import Array
 from design.left_out import LeftOut
-from design.motion import Shortest
+from design.motion import Shortest, Sweep
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.coarse import Progress
+from design.search.families import Family
 from design.search.search import SearchResult, search
 from design.search.shortest_period import fastest
 from design.sphere.directions import spiral
@@ -52,6 +56,10 @@ class Optimum:
         shortest = isinstance(self.asked.task.motion, Shortest)
         return f"{self.title}, the shortest found that keeps the limits" if shortest else self.title
 
+    def angle_set(self, rank: int = 0) -> AngleSet:
+        """The designed angles of a family, the best one first."""
+        return angle_set(self.loaded, self.search.best[rank])
+
     @property
     def left_out(self) -> list[LeftOut]:
         """What the task made superfluous in the search."""
@@ -74,6 +82,16 @@ class Optimum:
             "seconds": round(self.search.seconds, 3),
             "left_out": [asdict(entry) for entry in self.left_out],
         }
+
+    def lines(self) -> list[str]:
+        """The whole answer in words."""
+        result = self.search
+        return [
+            *self.table(),
+            self.long_title,
+            f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s",
+            *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
+        ]
 
     def table(self) -> list[str]:
         """The best families, a line each, and what the best buys against the standard alignments."""
@@ -121,3 +139,34 @@ def directions_left_out(problem: Problem) -> list[LeftOut]:
     if ignored.any():
         out.append(LeftOut("directions of weight zero", "they add nothing to J", int(ignored.sum()), "square degrees"))
     return out
+
+
+def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
+    """The designed angle set of a family; J is rounded to its error."""
+    task = loaded.task
+    assert not isinstance(task.motion, Shortest)  # the search has put the period that it found
+    alpha_rot, beta_rot, alpha_laser, beta_laser = family.angles_deg
+    J, J_error = rounded_to_error(family.score.J, family.score.J_error)
+    return AngleSet(
+        task=task.name,
+        task_sha256=loaded.sha256(),
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha_laser, beta_laser=beta_laser),
+        sensor=task.sensor,
+        servo=task.servo,
+        slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
+        motion=task.motion,
+        J=J,
+        J_error=J_error,
+        versions={"scanwright": version("scanwright")},
+    )
+
+
+def rounded_to_error(value: float, error: float) -> tuple[float, float]:
+    """A value rounded to one digit of its error, and the error rounded up to hold the rounding too."""
+    if not error > 0:
+        return value, error
+    digits = -int(np.floor(np.log10(error)))
+    unit = 10.0**-digits
+    rounded = round(value, digits)
+    total = error + abs(value - rounded)
+    return rounded, round(float(np.ceil(total / unit - 1e-9)) * unit, digits)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -27,9 +28,17 @@ def named_record(path: Path, kind: type[R], shipped: Path, what: str) -> tuple[R
         TaskError: there is none, or it is malformed.
     """
     source = _found(path, shipped, what)
-    table = read_toml(source, f"the {what} file")
+    return valid_record(read_toml(source, f"the {what} file"), kind, source), source
+
+
+def valid_record(table: Mapping[str, Any], kind: type[R], source: Path) -> R:
+    """A record from a table; `source` says in messages where that comes from.
+
+    Raises:
+        TaskError: it is malformed.
+    """
     try:
-        return kind.model_validate(table), source
+        return kind.model_validate(dict(table))
     except ValidationError as error:
         raise TaskError(explain(error, source, kind)) from error
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,15 +15,17 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from design.angles import AngleSet
 from design.camera import Camera
 from design.catalogue.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
 from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record
+from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, surface_of
 from design.task.deck_holes import DeckHoles
-from design.task.named_record import named_record, names_in
+from design.task.named_record import named_record, names_in, valid_record
 from design.task.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
 
 SHIPPED = Path(__file__).parent / "shipped"
@@ -143,6 +146,14 @@ class LoadedTask:
     maps: tuple[Array, ...]
     surface: Surface | None = None
 
+    def scanner(self, angles: AngleSet) -> Scanner:
+        """The scanner of an angle set, with the printer and the deck of this task.
+
+        Raises:
+            TaskError: a product of the angle set is not in the catalogue.
+        """
+        return scanner_of(angles, self.task.printer, self.products, self.task.deck)
+
     @property
     def lidar(self) -> Lidar:
         """The 2D lidar of the task."""
@@ -181,14 +192,23 @@ class LoadedTask:
         return digest.hexdigest()
 
 
-def load_task(path: Path) -> LoadedTask:
-    """Read a task file, or a shipped task by its name.
+def load_task(source: Path | str | Mapping[str, Any]) -> LoadedTask:
+    """Read a task file, a shipped task by its name, or a table with the keys of a task file.
+
+    Args:
+        source: the file, the name, or the table; files that a table names lie in the working folder.
 
     Raises:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
             cannot do the motion.
     """
-    task, source = named_record(path, Task, SHIPPED, "task")
+    if isinstance(source, Mapping):
+        return _load(valid_record(source, Task, Path("task")), Path("task"))
+    return _load(*named_record(Path(source), Task, SHIPPED, "task"))
+
+
+def _load(task: Task, source: Path) -> LoadedTask:
+    """With its products and maps."""
     products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
     check_products(task, products, source)
     limits = task.limits

@@ -63,6 +63,16 @@ class AssembleSummary:
     left_out: dict[str, int]
     said: tuple[str, ...]
 
+    def lines(self) -> list[str]:
+        """The same in words."""
+        form = f"organised, {self.height:,} scans x {self.width:,} beams" if self.width else "flat"
+        where = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
+        return [
+            *self.said,
+            *(f"left out {count:,} beams: {reason.replace('_', ' ')}" for reason, count in self.left_out.items()),
+            f"wrote {self.points:,} points of {self.beams:,} beams ({form}) to {where}",
+        ]
+
 
 def assemble_recording(
     recording: Path,

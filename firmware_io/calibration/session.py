@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,29 @@ from firmware_io.calibration.entropy import witness
 from firmware_io.calibration.estimate import Estimate, estimate
 from firmware_io.calibration.lag import lag_of
 from firmware_io.calibration.model import Mount, gather, start_vector
-from firmware_io.calibration.report import report
+from firmware_io.calibration.report import lines, report
 from firmware_io.calibration.tiles import fan_side
 from firmware_io.files import whole_file
 from firmware_io.recording.recording import Recording, open_recording
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What was found.
+
+    Attributes:
+        angles: the calibrated angle set.
+        record: errors with their sigmas, residuals before and after, as in the report beside the angle set.
+        out: file of the angle set.
+    """
+
+    angles: AngleSet
+    record: dict[str, Any]
+    out: Path
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}"]
 
 
 def calibrate_recordings(
@@ -33,8 +53,8 @@ def calibrate_recordings(
     one_place: bool = False,
     own_body: OwnBody | None = None,
     say: Callable[[str], None] = lambda _: None,
-) -> dict[str, Any]:
-    """Write the calibrated angle set to `out` and what was found to `report_path(out)`; return the latter.
+) -> Calibration:
+    """Write the calibrated angle set to `out` and what was found to `report_path(out)`.
 
     Args:
         recordings: of scenes that stand still; each may be of another place.
@@ -71,10 +91,11 @@ def calibrate_recordings(
         "left_out": left_out,
         **report(found, start, mount, beams, seen),
     }
+    calibration = Calibration(calibrated(angles, found), record, out)
     with whole_file(out) as part, whole_file(report_path(out)) as beside:
-        part.write_text(calibrated(angles, found).to_json(), encoding="utf-8")
+        part.write_text(calibration.angles.to_json(), encoding="utf-8")
         beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return record
+    return calibration
 
 
 def _late(opened: Sequence[Recording]) -> str:

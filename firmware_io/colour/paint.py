@@ -10,7 +10,7 @@ things points are left without colour rather than given a wrong one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 from design import frames
 from design.angles import AngleSet
 from design.camera import Camera
+from design.errors import TaskError
+from design.task.task import LoadedTask
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.point_file import PlyWriter, ply_comments, read_ply
-from firmware_io.colour.camera_views import View, opened
-from firmware_io.recording.recording import Recording
+from firmware_io.colour.camera_views import View, opened, views_of
+from firmware_io.recording.recording import Recording, open_recording
 from firmware_io.samples import Floats, Times
 
 COLOURS = ("red", "green", "blue", "alpha")
@@ -48,6 +50,30 @@ class ColourSummary:
     hidden: int
     outside: int
     images: int
+
+    def line(self, cloud: Path) -> str:
+        """The same of one cloud, in words."""
+        return (
+            f"coloured {self.coloured:,} points of {cloud.name} from {self.images} images; without colour "
+            f"{self.hidden:,} behind others, {self.outside:,} in no image"
+        )
+
+
+def painter(
+    loaded: LoadedTask, recording: Path, angles: AngleSet, poses: Trajectory | None, lag_s: float
+) -> Callable[[Path], ColourSummary]:
+    """What colours a cloud of a recording, in place, with the images of a task's camera.
+
+    Raises:
+        TaskError: the task describes no camera.
+        RecordingError: the recording is unreadable, no such image, or nobody knows where it was taken.
+    """
+    camera, source = loaded.task.camera, open_recording(recording)
+    if camera is None:
+        raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
+    views = views_of(camera, loaded.source.parent, angles, source, poses, lag_s)
+    spacing, from_m = spacing_of(source), stands_m(source, angles, poses)
+    return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m)
 
 
 def colour_cloud(path: Path, camera: Camera, views: list[View], spacing: Spacing, from_m: Floats) -> ColourSummary:

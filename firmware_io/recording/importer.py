@@ -51,6 +51,16 @@ class ImportSummary:
     left_out: dict[str, int]
     warnings: tuple[str, ...]
 
+    def lines(self) -> list[str]:
+        """The same in words."""
+        low, high = self.angle_deg
+        return [
+            *(f"warning: {warning}" for warning in self.warnings),
+            *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
+            f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:.2f} to "
+            f"{high:.2f} deg, {self.duration_s:.1f} s, to {self.out}",
+        ]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Survey:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from design.errors import RecordingError, suggest
 from firmware_io.files import foreign, whole_file
 from firmware_io.recording import ros_messages
+from firmware_io.recording.arrays import RecordingArrays, arrays_of
 from firmware_io.recording.mcap_chunks import note_of, read_messages, topics_of
 from firmware_io.recording.metadata import NOTE, held_by
 from firmware_io.samples import JointLog, Scan, Times
@@ -153,6 +154,10 @@ class Recording:
         """The scans in the order of their times, one at a time."""
         for _, data in read_messages(self.path, {SCAN_TOPIC}):
             yield _decoded_scan(self.path, data)
+
+    def arrays(self) -> RecordingArrays:
+        """All of it in memory."""
+        return arrays_of(list(self.scans()), self.joint_log)
 
 
 def open_recording(path: Path) -> Recording:

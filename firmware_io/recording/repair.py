@@ -44,6 +44,16 @@ class RepairSummary:
         """There is nothing to repair."""
         return self.closed and not self.lost_bytes
 
+    def lines(self, path: Path, out: Path) -> list[str]:
+        """What was found in the recording `path` and written to `out`, in words."""
+        first_ns, last_ns = self.times_ns
+        kept = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(self.messages.items()))
+        found = f"{path}: {kept}, {(last_ns - first_ns) / 1e9:.1f} s"
+        if self.whole:
+            return [found, "it is whole: nothing to repair, nothing written"]
+        chunks = f"{self.damaged_chunks} damaged chunks, {self.lost_messages:,} messages known to be lost"
+        return [found, f"left out {self.lost_bytes:,} bytes that are not whole ({chunks})", f"wrote {out}"]
+
 
 def repair(path: Path, out: Path) -> RepairSummary:
     """Write all that is whole in the recording `path` to `out`, which may be the same file; a whole one is left alone.

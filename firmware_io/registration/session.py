@@ -38,9 +38,32 @@ class Session:
     said: tuple[str, ...]
 
     @property
+    def complete(self) -> bool:
+        """Whether every cloud found its place; else nothing was written."""
+        return self.found.complete
+
+    @property
     def refused(self) -> list[Pair]:
         """The pairs that were not believed."""
         return [pair for pair in self.found.pairs if pair.why_not]
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        lines = [f"note: {line}" for line in self.said]
+        for pair in self.found.pairs:
+            if not pair.why_not:
+                lines.append(f"{pair.a} - {pair.b}: {pair.overlap:.0%} overlap, {pair.contradiction:.1%} contradicted")
+        lines += [f"{pair.a} - {pair.b}: not used: {'; '.join(pair.why_not)}" for pair in self.refused]
+        stands = list(zip(self.names, self.found.T_world, self.found.covariance, strict=True))
+        if not self.found.complete:
+            lost = [name for name, T, _ in stands if np.isnan(T[0, 0])]
+            return [*lines, f"no place was found for {', '.join(lost)}: nothing is written"]
+        for name, T, covariance in stands:
+            x, y, z = T[:3, 3]
+            sigma_mm = 1e3 * np.sqrt(covariance[3:, 3:].trace())
+            sigma_deg = np.degrees(np.sqrt(covariance[:3, :3].trace()))
+            lines.append(f"{name}: at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {sigma_mm:.2f} mm and {sigma_deg:.4f} deg")
+        return [*lines, f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}"]
 
 
 def register_files(

@@ -70,6 +70,20 @@ class ScanSummary:
     reconnects: int
     left_out: dict[str, int]
 
+    def lines(self) -> list[str]:
+        """The same in words."""
+        lines = [f"left out {count:,}: {reason}" for reason, count in self.left_out.items()]
+        if self.reconnects:
+            lines.append(f"the lidar was away {self.reconnects} times")
+        if self.speed_deg_s:
+            lines.append(f"servo turned at {self.speed_deg_s:.2f} deg/s, ripple {self.ripple_deg:.3f} deg")
+        return [
+            *lines,
+            f"beams are timed to {self.clock_ns / 1e6:.2f} ms",
+            f"recorded {self.scans:,} scans and {self.joint_samples:,} angles, {self.duration_s:.1f} s, "
+            f"to {self.recording}",
+        ]
+
 
 def acquire(plan: Plan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     """Do it. Both devices are stopped and the recording is closed on every way out.

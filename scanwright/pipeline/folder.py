@@ -104,6 +104,11 @@ def manifest_of(folder: Path) -> dict[str, Any]:
     return manifest
 
 
+def listed_files(folder: Path) -> tuple[str, ...]:
+    """Files of a build folder as its manifest lists them; none where there is none."""
+    return tuple(manifest_of(folder).get("files", {}))
+
+
 def is_current(folder: Path, loaded: LoadedTask) -> bool:
     """Whether a folder holds the finished build of this very task by these versions, every file as it was written."""
     manifest = manifest_of(folder)

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import shutil
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
-from design.angles import Angles, AngleSet
 from design.left_out import LeftOut
-from design.motion import Shortest, Sweep
-from design.search.families import Family
 from design.search.search import SearchResult
 from design.task.shapes import Map, Mesh
 from design.task.task import LoadedTask
@@ -50,37 +46,6 @@ def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
     """`left_out.json`: what the task made superfluous."""
     entries = [{"what": x.what, "why": x.why, "saved": x.saved, "unit": x.unit} for x in left_out]
     write_json(folder / "left_out.json", {"schema": "scanwright/left_out/1", "left_out": entries})
-
-
-def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
-    """The designed angle set of a family; J is rounded to its error."""
-    task = loaded.task
-    assert not isinstance(task.motion, Shortest)  # the search has put the period that it found
-    alpha_rot, beta_rot, alpha_laser, beta_laser = family.angles_deg
-    J, J_error = rounded_to_error(family.score.J, family.score.J_error)
-    return AngleSet(
-        task=task.name,
-        task_sha256=loaded.sha256(),
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha_laser, beta_laser=beta_laser),
-        sensor=task.sensor,
-        servo=task.servo,
-        slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
-        motion=task.motion,
-        J=J,
-        J_error=J_error,
-        versions={"scanwright": version("scanwright")},
-    )
-
-
-def rounded_to_error(value: float, error: float) -> tuple[float, float]:
-    """A value rounded to one digit of its error, and the error rounded up to hold the rounding too."""
-    if not error > 0:
-        return value, error
-    digits = -int(np.floor(np.log10(error)))
-    unit = 10.0**-digits
-    rounded = round(value, digits)
-    total = error + abs(value - rounded)
-    return rounded, round(float(np.ceil(total / unit - 1e-9)) * unit, digits)
 
 
 def _bring(folder: Path, source: Path, prefix: str) -> str:

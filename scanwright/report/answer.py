@@ -17,10 +17,10 @@ from design.evaluation.gaps import gaps
 from design.frames import Array
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.search.optimum import rounded_to_error
 from design.search.tolerance import sensitivity
 from design.shadow import Shadow
 from design.task.task import NAMES, LoadedTask
-from scanwright.pipeline.records import rounded_to_error
 
 OFF_DEG = 1.0  # what a printed and screwed mount may be off by
 

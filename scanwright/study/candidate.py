@@ -22,11 +22,10 @@ from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
 from design.scanner import Scanner, scanner_of
 from design.search.families import Family
-from design.search.optimum import Optimum, optimum_of
+from design.search.optimum import Optimum, angle_set, optimum_of
 from design.search.with_parts import choose
 from design.shadow import Refused, Workshop
 from design.task.task import LoadedTask, Task
-from scanwright.pipeline.records import angle_set
 from scanwright.study.answer.columns import tidy
 from scanwright.study.runner.store import Result
 

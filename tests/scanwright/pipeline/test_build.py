@@ -8,10 +8,10 @@ import pytest
 
 from design.angles import load_angles
 from design.errors import BuildError
+from design.search.optimum import rounded_to_error
 from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
 from scanwright.pipeline.folder import first_difference, fresh_folder, is_current
-from scanwright.pipeline.records import rounded_to_error
 
 PARTS = ("servo_shaft", "alignment_linkage", "slip_ring_adapter", "base_mount")
 FILES = {

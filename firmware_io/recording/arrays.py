@@ -1,0 +1,60 @@
+"""A recording as arrays: every scan a row, every beam a column. For notebooks; commands read recordings as streams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.errors import RecordingError
+from firmware_io.samples import Floats, JointLog, Scan, Times
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordingArrays:
+    """What lidar and servo said; beam i of scan k is at [k, i].
+
+    Attributes:
+        time_ns: of each beam, shape (scans, beams).
+        bearing_rad: of each beam in the scan plane, shape (scans, beams); NaN behind the last beam of a short scan.
+        range_m: shape (scans, beams); NaN, inf or 0 where nothing returned.
+        intensity: shape (scans, beams), or (scans, 0) where the sensor measures none.
+        joint_log: the servo's angle over time.
+    """
+
+    time_ns: Times
+    bearing_rad: Floats
+    range_m: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    joint_log: JointLog
+
+    @property
+    def joint_rad(self) -> Floats:
+        """Servo angle at the time of each beam, straight between samples, shape (scans, beams); NaN outside the log."""
+        return self.joint_log.angle_at(self.time_ns.ravel()).reshape(self.time_ns.shape)
+
+
+def arrays_of(scans: Sequence[Scan], joint_log: JointLog) -> RecordingArrays:
+    """All scans at once; short ones are filled up.
+
+    Raises:
+        RecordingError: there is no scan.
+    """
+    if not scans:
+        raise RecordingError("no scan: there is nothing to put into arrays")
+    shape = len(scans), max(scan.range_m.size for scan in scans)
+    lit = max(scan.intensity.size for scan in scans)
+    time_ns = np.zeros(shape, np.int64)
+    bearing_rad = np.full(shape, np.nan)
+    range_m = np.full(shape, np.nan, np.float32)
+    intensity = np.full((shape[0], lit), np.nan, np.float32)
+    for row, scan in enumerate(scans):
+        beams = scan.range_m.size
+        time_ns[row] = scan.stamp_ns
+        time_ns[row, :beams] = scan.time_ns
+        bearing_rad[row, :beams] = scan.bearing_rad
+        range_m[row, :beams] = scan.range_m
+        intensity[row, : scan.intensity.size] = scan.intensity
+    return RecordingArrays(time_ns, bearing_rad, range_m, intensity, joint_log)

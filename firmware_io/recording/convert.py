@@ -1,0 +1,30 @@
+"""Files of one kind into files of another: clouds among each other, recordings into other people's bags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from firmware_io.clouds.files import read_clouds, write_clouds
+from firmware_io.recording.bag_export import export_bag
+
+
+def convert(source: Path, target: Path) -> list[str]:
+    """Turn a cloud into another format, or a recording into a bag; what came of it, in words.
+
+    Args:
+        source: a cloud, or a recording (`.mcap`).
+        target: a cloud; or a bag, `.bag` for ROS 1, else a new folder for ROS 2.
+
+    Raises:
+        RecordingError: `source` is unreadable, its form is not known, or `target` cannot be written.
+    """
+    if source.suffix == ".mcap":
+        exported = export_bag(source, target)
+        unknown = [f"note: left out {topic}: this ROS has no {kind}" for topic, kind in exported.unknown.items()]
+        written = ", ".join(f"{count:,} of {topic}" for topic, count in exported.written.items())
+        return [*unknown, f"wrote {written} to {target}"]
+    clouds, unread = read_clouds(source)
+    wrote, lost = write_clouds(target, clouds)
+    rows = sum(len(cloud.points_m) for cloud in clouds)
+    notes = [f"note: {line}" for line in (*unread, *lost)]
+    return [*notes, f"wrote {rows:,} rows to {', '.join(str(path) for path in wrote)}"]

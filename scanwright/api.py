@@ -1,0 +1,528 @@
+"""What a person wants of a scanner, a typed function each; `import scanwright as sw` gives all of them.
+
+Angles of the arguments are degrees, lengths metres, as in task files; arrays that come back are SI units. Everything
+that can go wrong by wrong input raises a `ScanwrightError` whose message is one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from design.angles import AngleSet, load_angles
+from design.task.task import LoadedTask, load_task
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cad.assembly.assembly import Assembly
+    from cad.checks.check import Check
+    from design.evaluation.comparison import Row
+    from design.evaluation.evaluation import Evaluation
+    from design.search.optimum import Optimum
+    from firmware_io.assembly.assemble import AssembleSummary
+    from firmware_io.calibration.session import Calibration
+    from firmware_io.clouds.record import Cloud
+    from firmware_io.lidar.scip.driver import Lidar
+    from firmware_io.recording.arrays import RecordingArrays
+    from firmware_io.recording.importer import ImportSummary
+    from firmware_io.recording.recording import Recording
+    from firmware_io.registration.session import Session
+    from firmware_io.scan.acquire import ScanSummary
+    from firmware_io.servo.dynamixel.driver import Servo
+    from scanwright.pipeline.build import Build
+
+__all__ = [
+    "assemble",
+    "build",
+    "calibrate",
+    "check",
+    "compare",
+    "draw_density",
+    "evaluate",
+    "import_bag",
+    "load_angles",
+    "load_task",
+    "make_parts",
+    "open_lidar",
+    "open_recording",
+    "open_servo",
+    "optimise",
+    "read_cloud",
+    "register",
+    "scan",
+    "simulate",
+    "write_cloud",
+]
+
+TaskLike = LoadedTask | str | Path | Mapping[str, Any]
+"""A task: loaded, the name of a shipped one, a file, or a table with the keys of a task file."""
+AnglesLike = AngleSet | str | Path
+"""An angle set, or the file of one."""
+Say = Callable[[str], None]
+
+
+def _quiet(_line: str) -> None:
+    """Progress that nobody asked for."""
+
+
+def _task(task: TaskLike) -> LoadedTask:
+    return task if isinstance(task, LoadedTask) else load_task(task)
+
+
+def _angles(angles: AnglesLike) -> AngleSet:
+    return angles if isinstance(angles, AngleSet) else load_angles(Path(angles))
+
+
+def optimise(task: TaskLike, *, say: Say = _quiet) -> Optimum:
+    """Search all mounting angles of a task.
+
+    Args:
+        task: what the scanner shall see.
+        say: is told what is being done.
+
+    Returns:
+        The best families of settings, `optimum.search.best`, the best one first; `optimum.angle_set()` is what parts
+        and frame chain are made from.
+
+    Raises:
+        TaskError: the task is malformed, no direction has a weight, or no setting keeps its limits.
+
+    Example:
+        >>> import scanwright as sw
+        >>> optimum = sw.optimise("ceiling")
+        >>> optimum.search.best[0].angles_deg  # alpha_rot, beta_rot, alpha_laser, beta_laser
+        (180.0, 0.0, -45.0, -35.0)
+    """
+    from design.search.optimum import optimum_of
+
+    return optimum_of(_task(task), say)
+
+
+def evaluate(
+    task: TaskLike,
+    angles_deg: Sequence[float],
+    *,
+    pole: str | None = None,
+    lever: str | None = None,
+    say: Say = _quiet,
+) -> Evaluation:
+    """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
+
+    Args:
+        task: what the scanner shall see.
+        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser.
+        pole: "WIDTH_MM,HEIGHT_MM,RANGE_M" of a thin upright pole, to tell the chance that it is hit.
+        lever: "X_MM,Y_MM,RANGE_M": the optical centre off the axis, as seen at a range.
+        say: is told what is being done.
+
+    Raises:
+        TaskError: the task is malformed, these are not four angles, or no direction has a weight.
+
+    Example:
+        >>> import scanwright as sw
+        >>> rolling = sw.evaluate("uniform", (0, 90, 0, -90))
+        >>> abs(rolling.score.J - rolling.ball.J) < rolling.score.J_error + rolling.ball.J_error
+        True
+    """
+    from design.evaluation import evaluation
+
+    loaded = _task(task)
+    problem = evaluation.problem_to_judge(loaded, lever)
+    return evaluation.evaluate(loaded, problem, evaluation.setting_rad(angles_deg), pole, say)
+
+
+def compare(task: TaskLike, *, say: Say = _quiet) -> tuple[Optimum, list[Row]]:
+    """Put the optimum of a task beside the usual mounts and ready-made scanners.
+
+    Raises:
+        TaskError: as for `optimise`.
+    """
+    from design.evaluation.comparison import compare
+    from design.search.optimum import optimum_of
+
+    optimum = optimum_of(_task(task), say)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
+
+
+def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:
+    """Draw how many beams of a full scan fall within the ball around each direction, a map for each setting.
+
+    Args:
+        task: what the scanner shall see: its region and its masks are drawn in.
+        settings_deg: title of a map -> its (alpha_rot, beta_rot, alpha_laser, beta_laser).
+
+    Raises:
+        TaskError: the task is malformed, a setting is not four angles, or no direction has a weight.
+
+    Example:
+        >>> import scanwright as sw
+        >>> figure = sw.draw_density("ceiling", {"rolling": (0, 90, 0, -90)})
+        >>> figure.get_size_inches().tolist()
+        [8.0, 4.0]
+    """
+    from design.evaluation.density_picture import density_figure
+    from design.evaluation.evaluation import setting_rad
+    from design.objective.problem import problem_of
+
+    loaded = _task(task)
+    settings = {name: setting_rad(angles) for name, angles in settings_deg.items()}
+    return density_figure(problem_of(loaded), settings, loaded.task.name)
+
+
+def build(task: TaskLike, out: str | Path = "out", *, say: Say = _quiet) -> Build:
+    """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
+
+    Nothing is done where the folder already holds the build of this very task.
+
+    Raises:
+        TaskError: as for `optimise`.
+        BuildError: no setting can be built, the folder cannot be written, or the CAD kernel is not installed.
+    """
+    from scanwright.pipeline.build import build_task
+
+    loaded = _task(task)
+    return build_task(loaded, Path(out) / loaded.task.name, say)
+
+
+def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = _quiet) -> Assembly:
+    """Make the parts of a scanner in memory, in the rotation frame [mm], without labels.
+
+    Args:
+        task: whose printer and deck the parts are for.
+        angles: angle set of the scanner, such as `optimise(task).angle_set()`.
+        say: is told what is being done.
+
+    Returns:
+        Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
+
+    Raises:
+        BuildError: a part cannot be made, or the CAD kernel is not installed.
+    """
+    from cad.kernel import require_kernel
+
+    require_kernel()
+    from cad.assembly.assembly import make_parts
+
+    say("making the parts")
+    return make_parts(_task(task).scanner(_angles(angles)))
+
+
+def check(folder: str | Path, *, say: Say = _quiet) -> list[Check]:
+    """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
+
+    Raises:
+        TaskError: the folder has no angle set or no task.
+        BuildError: a part cannot be made, or the CAD kernel is not installed.
+    """
+    from cad.kernel import require_kernel
+
+    folder = Path(folder)
+    scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
+    require_kernel()
+    from cad.checks.run import check_scanner
+
+    return check_scanner(scanner, say)
+
+
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> Servo:
+    """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
+
+    Args:
+        port: such as "/dev/serial/by-id/...".
+        model: what it must be; None for any that is known.
+        servo_id: its number on the bus; None if it is alone there.
+
+    Raises:
+        DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
+    """
+    from firmware_io.servo.dynamixel.driver import open_servo
+
+    return open_servo(port, model, servo_id)
+
+
+def open_lidar(address: str) -> Lidar:
+    """Open a lidar at a serial port or HOST:PORT, whatever it is doing. Use it with `with`.
+
+    Raises:
+        DeviceError: no such port, it is in use, or what answers is no sensor that is known.
+    """
+    from firmware_io.lidar.scip.driver import open_lidar
+
+    return open_lidar(address)
+
+
+@dataclass(frozen=True, slots=True)
+class Scanned:
+    """A scan: what was recorded, and the cloud of it."""
+
+    recorded: ScanSummary
+    assembled: AssembleSummary
+
+
+def scan(
+    folder: str | Path,
+    *,
+    turns: int = 1,
+    lidar: str | None = None,
+    servo: str | None = None,
+    recording: str | Path | None = None,
+    intensity: bool = False,
+    stamp_at: Literal["step_0", "rear"] = "step_0",
+    say: Say = _quiet,
+) -> Scanned:
+    """Turn the scanner of a build folder, record, and assemble the cloud beside the recording.
+
+    Args:
+        folder: its `angles.json` is all that is needed.
+        turns: full scans.
+        lidar: serial port or HOST:PORT; None for the emulated or the plugged-in one, as for `servo`.
+        servo: serial port.
+        recording: file to write, `.mcap`; None for one in the folder, named by date and time.
+        intensity: ask the sensor for intensities too.
+        stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
+        say: is told what is being done.
+
+    Raises:
+        ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
+            stopped then, and what was recorded is whole.
+    """
+    from firmware_io.scan.acquire import acquire
+    from firmware_io.scan.plan import plan_scan
+
+    named = None if recording is None else Path(recording)
+    plan = plan_scan(
+        Path(folder), turns=turns, lidar=lidar, servo=servo, recording=named, intensity=intensity, stamp_at=stamp_at
+    )
+    recorded = acquire(plan, say)
+    return Scanned(recorded, assemble(plan.recording, Path(folder) / "angles.json", plan.recording.with_suffix(".ply")))
+
+
+def import_bag(
+    bag: str | Path,
+    out: str | Path,
+    *,
+    scan: str,
+    angle: str,
+    angle_unit: Literal["deg", "rad"],
+    hold: bool = False,
+) -> ImportSummary:
+    """Bring somebody's ROS 1 or ROS 2 bag into the project's own form: MCAP, /scan and /joint_states.
+
+    Args:
+        bag: the bag.
+        out: recording to write, `.mcap`.
+        scan: TOPIC[:FIELD] of the LaserScan.
+        angle: TOPIC[:FIELD] of the servo's angle.
+        angle_unit: of that angle.
+        hold: the motor stood still during each scan.
+
+    Raises:
+        RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
+    """
+    from firmware_io.recording.importer import import_bag
+
+    return import_bag(Path(bag), Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold)
+
+
+def simulate(
+    angles: AnglesLike,
+    scene: str | Path | None = None,
+    *,
+    turns: int = 1,
+    noise_mm: float | None = None,
+    seed: int = 0,
+) -> RecordingArrays:
+    """Record a scene without devices, faster than time: the servo obeys to the letter, ranges have their noise.
+
+    Args:
+        angles: angle set of the scanner, with its motion.
+        scene: mesh in metres, STL, PLY, OBJ, DAE or GLB, the scanner's world frame at its origin; None for a furnished
+            room.
+        turns: full scans.
+        noise_mm: range noise; None for the data sheet's.
+        seed: of the noise.
+
+    Raises:
+        SceneError: the mesh cannot be used.
+        TaskError: the sensor is not in the catalogue.
+        DeviceError: the angle set does not say how the servo moves.
+    """
+    from firmware_io.twins.scanner import room
+    from firmware_io.twins.simulated import simulated_recording
+
+    place = room(None if scene is None else Path(scene))
+    return simulated_recording(_angles(angles), place, turns=turns, sigma_mm=noise_mm, seed=seed)
+
+
+def open_recording(path: str | Path) -> Recording:
+    """Open a recording: `joint_log` has the servo's angles, `scans()` gives the scans, `arrays()` all of it as arrays.
+
+    Raises:
+        RecordingError: the file is missing, cut off, not of our topics and types, or empty.
+    """
+    from firmware_io.recording.recording import open_recording
+
+    return open_recording(Path(path))
+
+
+def assemble(
+    recording: str | Path,
+    angles: AnglesLike,
+    out: str | Path,
+    *,
+    flat: bool = False,
+    lag_s: float = 0.0,
+    per: Literal["recording", "turn", "half"] = "recording",
+    poses: str | None = None,
+    smooth: bool = True,
+    columns: Iterable[str] = ("intensity", "time_s", "joint_rad", "ring"),
+    camera: TaskLike | None = None,
+) -> AssembleSummary:
+    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
+
+    Where an own_body.npz stands beside the file of the angle set, beams that end on the scanner itself are left out.
+
+    Args:
+        recording: `.mcap`.
+        angles: angle set of the scanner that made it.
+        out: cloud to write, `.ply`; `out_000.ply` and so on where there are several.
+        flat: only points that exist; else NaN rows keep beam i in column i.
+        lag_s: time by which the angle log is late.
+        per: one cloud for the recording, or for each (half) turn.
+        poses: where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).
+        smooth: smooth the steps of the encoder where that helps.
+        columns: of each point beside x y z.
+        camera: a task whose [camera] the points are coloured with.
+
+    Raises:
+        RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
+    """
+    from firmware_io.assembly.assemble import assemble_recording
+    from firmware_io.assembly.own_body import own_body_beside
+    from firmware_io.assembly.pose_files import load_trajectory
+
+    recording, angle_set = Path(recording), _angles(angles)
+    trajectory = None if poses is None else load_trajectory(poses, recording)
+    paint = None
+    if camera is not None:
+        from firmware_io.colour.paint import painter
+
+        paint = painter(_task(camera), recording, angle_set, trajectory, lag_s)
+    summary = assemble_recording(
+        recording,
+        angle_set,
+        Path(out),
+        flat=flat,
+        lag_s=lag_s,
+        per=per,
+        poses=trajectory,
+        own_body=None if isinstance(angles, AngleSet) else own_body_beside(Path(angles)),
+        smooth=smooth,
+        columns=columns,
+    )
+    painted = () if paint is None else tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
+    return replace(summary, said=(*summary.said, *painted))
+
+
+def calibrate(
+    recordings: Sequence[str | Path],
+    angles: AnglesLike,
+    out: str | Path,
+    *,
+    one_place: bool = False,
+    say: Say = _quiet,
+) -> Calibration:
+    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
+
+    Where an own_body.npz stands beside the file of the angle set, beams that end on the scanner itself are left out.
+
+    Args:
+        recordings: of scenes that stand still.
+        angles: angle set of the scanner, as designed.
+        out: calibrated angle set to write, `.json`.
+        one_place: the scanner stood still from the first recording to the last.
+        say: is told what is being done.
+
+    Raises:
+        RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
+    """
+    from firmware_io.assembly.own_body import own_body_beside
+    from firmware_io.calibration.session import calibrate_recordings
+
+    own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
+    paths = [Path(recording) for recording in recordings]
+    return calibrate_recordings(paths, _angles(angles), Path(out), one_place=one_place, own_body=own_body, say=say)
+
+
+def register(
+    clouds: Sequence[str | Path],
+    out: str | Path,
+    *,
+    poses: str | Path | None = None,
+    start: str | Path | None = None,
+    spacing_m: float = 0.1,
+    map_spacing_m: float = 0.02,
+    say: Say = _quiet,
+) -> Session:
+    """Find where clouds stand to each other, from no start if need be, and merge them into one map.
+
+    Args:
+        clouds: of one place, two or more.
+        out: map to write.
+        poses: TUM file to write; None for one beside the map.
+        start: TUM file of start poses, a line for each cloud; found if not given.
+        spacing_m: distance of the points that are registered.
+        map_spacing_m: distance of the points of the map.
+        say: is told what is being done.
+
+    Raises:
+        RecordingError: a file cannot be read or written, or there is only one cloud.
+    """
+    from firmware_io.registration.session import register_files
+
+    target = Path(out)
+    tum = target.with_suffix(".tum") if poses is None else Path(poses)
+    given = None if start is None else Path(start)
+    return register_files([Path(cloud) for cloud in clouds], target, tum, given, spacing_m, map_spacing_m, say)
+
+
+def read_cloud(path: str | Path) -> Cloud:
+    """Read a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
+
+    Raises:
+        RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
+    """
+    from design.errors import RecordingError
+    from firmware_io.clouds.files import read_clouds
+
+    clouds, _unread = read_clouds(Path(path))
+    if len(clouds) != 1:
+        raise RecordingError(
+            f"{path}: holds {len(clouds)} clouds, not one: firmware_io.clouds.files.read_clouds reads all"
+        )
+    return clouds[0]
+
+
+def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any]) -> list[str]:
+    """Write a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
+
+    Args:
+        path: the file.
+        cloud: a cloud, or the points [m] of one, shape (n, 3).
+
+    Returns:
+        What the format cannot hold, one sentence each.
+
+    Raises:
+        RecordingError: the format is not known, or the file cannot be written.
+    """
+    from firmware_io.clouds.files import write_clouds
+    from firmware_io.clouds.record import Cloud
+
+    record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud))
+    return write_clouds(Path(path), [record])[1]

@@ -1,0 +1,170 @@
+"""Commands about recordings and clouds: import, repair, assemble, calibrate, register, convert."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scanwright.cli.console import AsJson, group, say, show, show_json
+
+app = group()
+
+
+class AngleUnit(Enum):
+    """Unit of an angle in somebody's recording."""
+
+    deg = "deg"
+    rad = "rad"
+
+
+class Per(Enum):
+    """What makes one cloud."""
+
+    recording = "recording"
+    turn = "turn"
+    half = "half"
+
+
+@app.command("import")
+def import_(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],
+    scan: Annotated[str, typer.Option(metavar="TOPIC[:FIELD]", help="Where the LaserScan is.")],
+    angle: Annotated[str, typer.Option(metavar="TOPIC[:FIELD]", help="Where the servo angle is.")],
+    angle_unit: Annotated[AngleUnit, typer.Option(help="Unit of the angle in the bag.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
+    hold: Annotated[bool, typer.Option("--hold", help="The motor stood still during each scan.")] = False,
+) -> None:
+    """Bring somebody's ROS recording into the project's own: MCAP, /scan and /joint_states."""
+    from scanwright import api
+
+    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit.value, hold=hold)
+    show(summary.lines())
+
+
+@app.command()
+def repair(
+    recording: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that was cut off.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE.mcap", help="Write there and leave FILE as it is.")
+    ] = None,
+) -> None:
+    """Close a recording that was cut off by a crash, a full disk or a pulled plug: all that is whole is kept."""
+    from firmware_io.recording.repair import repair
+
+    target = out or recording
+    show(repair(recording, target).lines(recording, target))
+
+
+@app.command()
+def assemble(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
+    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.ply", help="Cloud to write.")],
+    flat: Annotated[
+        bool, typer.Option("--flat", help="Only points that exist; default keeps beam i in column i.")
+    ] = False,
+    lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
+    per: Annotated[
+        Per, typer.Option(help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ...")
+    ] = Per.recording,
+    poses: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|TOPIC",
+            help="Where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).",
+        ),
+    ] = None,
+    straight: Annotated[
+        bool, typer.Option("--straight", help="Take the angle straight between its samples, steps not smoothed.")
+    ] = False,
+    columns: Annotated[
+        str, typer.Option(help="What to write of each point beside x,y,z.")
+    ] = "intensity,time_s,joint_rad,ring",
+    camera: Annotated[
+        Path | None, typer.Option(metavar="TASK", help="Colour the points from the images of a task's [camera].")
+    ] = None,
+) -> None:
+    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
+
+    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    """
+    from scanwright import api
+
+    summary = api.assemble(
+        recording,
+        angles,
+        out,
+        flat=flat,
+        lag_s=lag_s,
+        per=per.value,
+        poses=poses,
+        smooth=not straight,
+        columns=[name.strip() for name in columns.split(",") if name.strip()],
+        camera=camera,
+    )
+    show(summary.lines())
+
+
+@app.command()
+def calibrate(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings of scenes that stand still.")
+    ],
+    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner, as designed.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.json", help="Calibrated angle set to write.")],
+    one_place: Annotated[
+        bool, typer.Option("--one-place", help="The scanner stood still from the first recording to the last.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
+
+    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    """
+    from scanwright import api
+
+    found = api.calibrate(recordings, angles, out, one_place=one_place, say=say)
+    if as_json:
+        show_json(found.record)
+    else:
+        show(found.lines())
+
+
+@app.command()
+def register(
+    clouds: Annotated[list[Path], typer.Argument(metavar="CLOUD...", help="Clouds of one place, two or more.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Map to write.")],
+    poses: Annotated[
+        Path | None, typer.Option(metavar="FILE.tum", help="Poses to write; beside the map by default.")
+    ] = None,
+    start: Annotated[
+        Path | None, typer.Option(metavar="FILE.tum", help="Start poses, a line for each cloud; found if not given.")
+    ] = None,
+    spacing_m: Annotated[float, typer.Option(help="Distance of the points that are registered.")] = 0.1,
+    map_spacing_m: Annotated[float, typer.Option(help="Distance of the points of the map.")] = 0.02,
+) -> None:
+    """Find where clouds stand to each other, from no start if need be, and merge them into one map."""
+    from scanwright import api
+
+    found = api.register(
+        clouds, out, poses=poses, start=start, spacing_m=spacing_m, map_spacing_m=map_spacing_m, say=say
+    )
+    show(found.lines())
+    raise typer.Exit(0 if found.complete else 1)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read, or a recording (.mcap).")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
+) -> None:
+    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
+
+    A recording becomes a ROS 1 bag where OUT ends in .bag, else a ROS 2 bag in sqlite3.
+    """
+    from firmware_io.recording.convert import convert
+
+    show(convert(source, target))

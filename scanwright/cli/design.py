@@ -1,0 +1,140 @@
+"""Commands about the angles: optimise, evaluate, compare, accuracy; and what a task can name."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scanwright.cli.console import AsJson, TaskFile, group, say, show, show_json
+
+app = group()
+
+
+@app.command()
+def optimise(
+    task: TaskFile,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the lowest J over scan planes and over axes.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Search all mounting angles of a task and print the best ten families of settings."""
+    from scanwright import api
+
+    optimum = api.optimise(task, say=say)
+    if picture is not None:
+        from design.evaluation.landscape_picture import landscape_picture
+
+        landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
+    if as_json:
+        show_json(optimum.facts())
+    else:
+        show(optimum.lines())
+
+
+@app.command()
+def evaluate(
+    task: TaskFile,
+    angles: Annotated[str, typer.Option(metavar="A_ROT,B_ROT,A_LASER,B_LASER", help="The setting, in degrees.")],
+    cloud: Annotated[
+        Path | None, typer.Option(metavar="FILE.ply", help="Write the simulated beams as points on the unit sphere.")
+    ] = None,
+    pole: Annotated[
+        str | None,
+        typer.Option(metavar="WIDTH_MM,HEIGHT_MM,RANGE_M", help="Tell the chance to hit a thin upright pole."),
+    ] = None,
+    lever: Annotated[
+        str | None,
+        typer.Option(metavar="X_MM,Y_MM,RANGE_M", help="Optical centre off the axis by (x, y), as seen at a range."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
+    from design.evaluation.evaluation import angles_in
+    from scanwright import api
+
+    loaded, angles_deg = api.load_task(task), angles_in(angles)
+    found = api.evaluate(loaded, angles_deg, pole=pole, lever=lever, say=say)
+    if cloud is not None:
+        from firmware_io.clouds.point_file import write_points
+
+        beams = found.beam_directions()
+        write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
+    if as_json:
+        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **found.facts()})
+        return
+    show(found.lines())
+    if cloud is not None:
+        print(f"wrote {len(beams):,} points to {cloud}")
+
+
+@app.command()
+def accuracy(
+    task: TaskFile,
+    stress: Annotated[bool, typer.Option("--stress", help="The table of stiff and extreme cases instead.")] = False,
+    choices: Annotated[
+        bool, typer.Option("--choices", help="Meshes, integrator of the emulated servo and its angle instead.")
+    ] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one folder of reports per task.")] = Path(
+        "out/accuracy"
+    ),
+) -> None:
+    """Report error against run time of every way to compute J, at the optimum of a task; of other choices too."""
+    from scanwright import api
+
+    loaded = api.load_task(task)
+    folder = out / loaded.task.name
+    if choices:
+        from scanwright.trials.report import report_choices
+
+        show(report_choices(loaded, folder, say))
+        return
+    from design.accuracy.report import report_precision, report_stress
+
+    if stress:
+        told = report_stress(loaded, folder, say)
+        show(told.lines)
+        raise typer.Exit(0 if told.passed else 1)
+    show(report_precision(loaded, folder, say))
+
+
+@app.command()
+def compare(
+    task: TaskFile,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder that holds one folder of comparisons per task.")
+    ] = Path("out/compare"),
+    as_json: AsJson = False,
+) -> None:
+    """Put the optimum of a task beside the usual mounts and ready-made scanners: table, CSV and picture."""
+    from scanwright import api
+    from scanwright.pipeline.comparison import write_comparison
+
+    loaded = api.load_task(task)
+    found = write_comparison(loaded, out / loaded.task.name, say)
+    if as_json:
+        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows]})
+    else:
+        show(found.lines())
+
+
+@app.command()
+def catalogue(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
+) -> None:
+    """List the products that a task can name, or one of them with the source of every value."""
+    from design.catalogue.catalogue import load_catalogue
+
+    products = load_catalogue()
+    show(products.lines() if name is None else products.named(name).lines())
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a task file, so that an editor completes and checks it."""
+    from design.task.task import Task
+
+    show_json(Task.model_json_schema())

@@ -1,0 +1,121 @@
+"""Commands that talk to devices: emulate, scan, doctor."""
+
+from __future__ import annotations
+
+from contextlib import closing, suppress
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scanwright.cli.console import BuildFolder, complain, group, on_duty, say_in_place, show
+
+app = group()
+
+
+class StampAt(Enum):
+    """Which moment of a turn the stamps of a sensor mean."""
+
+    step_0 = "step_0"
+    rear = "rear"
+
+
+@app.command()
+def emulate(
+    out: BuildFolder,
+    scene: Annotated[
+        Path | None, typer.Option(metavar="MESH", help="STL, PLY, OBJ, DAE or GLB; default is a furnished room.")
+    ] = None,
+    unit_m: Annotated[float, typer.Option(metavar="M", help="Length of one unit of the mesh, 0.001 for mm.")] = 1.0,
+    at: Annotated[
+        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where the scanner stands in the mesh, metres.")
+    ] = (0.0, 0.0, 0.0),
+    noise_mm: Annotated[float | None, typer.Option(min=0, help="Range noise; default is the data sheet's.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+) -> None:
+    """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
+    from threading import Event
+
+    from design.angles import load_angles
+    from firmware_io.ports import announced
+    from firmware_io.twins.head import load_of
+    from firmware_io.twins.scanner import emulated_scanner, room
+
+    angles = load_angles(out / "angles.json")
+    place = room(scene, unit_m, at)
+    with (
+        suppress(KeyboardInterrupt),
+        on_duty(),
+        emulated_scanner(angles, place, load=load_of(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
+        announced(out, twins.ports),
+    ):
+        print(f"lidar {angles.sensor} at {twins.ports.lidar} and {twins.lidar.address}")
+        print(f"servo {angles.servo} at {twins.ports.servo}")
+        print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
+        Event().wait()
+
+
+@app.command()
+def scan(
+    out: BuildFolder,
+    turns: Annotated[int, typer.Option(help="Full scans.")] = 1,
+    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
+    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    recording: Annotated[
+        Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
+    ] = None,
+    intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+    stamp_at: Annotated[
+        StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
+    ] = StampAt.step_0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and stop.")] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
+    ] = False,
+) -> None:
+    """Turn the scanner, record, and assemble the cloud beside the recording."""
+    from firmware_io.scan.acquire import acquire
+    from firmware_io.scan.plan import plan_scan
+    from scanwright import api
+    from scanwright.live.feed import live_page
+
+    plan = plan_scan(
+        out,
+        turns=turns,
+        lidar=lidar,
+        servo=servo,
+        recording=recording,
+        intensity=intensity,
+        stamp_at=stamp_at.value,
+    )
+    show(plan.lines())
+    if dry_run:
+        return
+    with live_page(out, wanted=live) as watch:
+        try:
+            with on_duty(), closing(watch):
+                recorded = acquire(plan, say_in_place, watch)
+        except KeyboardInterrupt:
+            kept = f"; what was recorded is in {plan.recording}" if plan.recording.exists() else ""
+            complain(f"stopped, both devices stand still{kept}")
+            raise typer.Exit(130) from None
+        say_in_place(f"recorded {recorded.duration_s:.1f} s, assembling")
+        show(recorded.lines())
+        show(api.assemble(plan.recording, out / "angles.json", plan.recording.with_suffix(".ply")).lines())
+
+
+@app.command()
+def doctor(
+    out: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Build folder of the scanner.")] = None,
+    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
+    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+) -> None:
+    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. Nothing turns."""
+    from firmware_io.scan.doctor import examine
+
+    wrong = False
+    for finding in examine(out, lidar, servo):
+        print(f"{finding.verdict:8} {finding.says}", flush=True)
+        wrong |= finding.verdict == "wrong"
+    raise typer.Exit(1 if wrong else 0)

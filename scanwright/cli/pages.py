@@ -1,0 +1,32 @@
+"""Commands that open a page in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scanwright.cli.console import group, say
+
+app = group()
+
+
+@app.command()
+def studio(
+    task: Annotated[Path, typer.Argument(metavar="[TASK]", help="Task file, or the name of a shipped task.")] = Path(
+        "ground_ahead"
+    ),
+    port: Annotated[int, typer.Option(help="Port on this computer; 0 is any that is free.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
+        "out"
+    ),
+) -> None:
+    """Drag the angles and paint what matters in a page of your browser, and see what it comes to."""
+    from design.task.task import load_task
+    from scanwright.live.page_life import run_studio
+    from scanwright.studio.view.bodies import bodies_of
+    from scanwright.studio.view.preview_scan import glimpse
+    from scanwright.studio.view.workbench import Workbench
+
+    run_studio(load_task(task), Workbench(bodies_of, glimpse), port=port, out=out, say=say)

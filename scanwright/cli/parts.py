@@ -1,0 +1,117 @@
+"""Commands that make things: build, check, report, and studies of many scanners."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from scanwright.cli.console import AsJson, BuildFolder, TaskFile, complain, group, say, say_in_place, show, show_json
+
+if TYPE_CHECKING:
+    from design.task.task import LoadedTask
+
+app = group()
+
+
+@app.command()
+def build(
+    task: TaskFile,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
+        "out"
+    ),
+    check: Annotated[
+        bool, typer.Option("--check", help="TASK is a build folder: build it again elsewhere, compare every file.")
+    ] = False,
+) -> None:
+    """Make everything of a task: angles, parts, drawings, parts list, frame chain, pictures, into DIR/<task>/."""
+    if check:
+        from scanwright.pipeline.build import difference_when_rebuilt
+        from scanwright.pipeline.folder import listed_files
+
+        difference = difference_when_rebuilt(task, say)
+        print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
+        raise typer.Exit(0 if difference is None else 1)
+    from scanwright import api
+
+    show(api.build(task, out, say=say).lines())
+
+
+@app.command()
+def report(out: BuildFolder) -> None:
+    """Write report.html of a build folder from the files in it: the answer, 3D view, checks, parts, steps, drawings."""
+    from scanwright.report.page import write_report
+
+    print(f"wrote {write_report(out)}")
+
+
+@app.command()
+def check(out: BuildFolder, as_json: AsJson = False) -> None:
+    """Check the parts of a build folder: room, beams, loads, print. Exit 1 where one fails."""
+    from scanwright import api
+
+    checks = api.check(out, say=say)
+    failed = [entry for entry in checks if entry.severity == "error"]
+    if as_json:
+        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
+    else:
+        show(f"{entry.severity:7} {entry.message}" for entry in checks)
+        print(f"{len(checks) - len(failed)} of {len(checks)} without a failure")
+    raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def study(
+    study: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file, or the name of a shipped study.")],
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://HOST:PORT", help="A running Dask scheduler; else this computer works.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of tables and winners; default: out/STUDY.")
+    ] = None,
+    results: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Results, shared with the workers or not; default: OUT/results.")
+    ] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="Of this computer; default: one for each core.")] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Say what it would cost, and stop.")] = False,
+) -> None:
+    """Cross tasks with products, judge every candidate with its parts, and build the winners of the trade-off."""
+    from scanwright.study.crossing import Crossing
+    from scanwright.study.study import load_study
+
+    crossing = Crossing(load_study(study))
+    folder = out or Path("out") / crossing.loaded.study.name
+    kept = results or folder / "results"
+    if plan:
+        from scanwright.study.plan import plan_of
+
+        for line in plan_of(crossing, kept, say_in_place).lines():
+            print(line)
+        return
+    from scanwright.study.answer.write import write_answer
+    from scanwright.study.candidate_parts import judge
+    from scanwright.study.runner.cluster import cluster
+    from scanwright.study.runner.store import open_store
+    from scanwright.study.session import Session
+
+    session = Session(crossing, open_store(kept), judge)
+    try:
+        with cluster(scheduler, processes) as client:
+            session.run(client, say_in_place)
+        for line in write_answer(session, folder):
+            print(line)
+        for combination, loaded in session.winners():
+            _build_winner(loaded, folder / combination.name)
+    except KeyboardInterrupt:
+        complain("stopped; the same command goes on where it was")
+        raise typer.Exit(130) from None
+    print(f"wrote study.csv, study.parquet and front.png to {folder}")
+
+
+def _build_winner(loaded: LoadedTask, target: Path) -> None:
+    from scanwright.pipeline.build import build_task
+
+    made = build_task(loaded, target, say)
+    print(f"built {target}" if made.made else f"{target}: nothing has changed, no work to do")

@@ -1,0 +1,42 @@
+"""The page of a scan in a process of its own, and the way to feed it: the scan must never wait for a browser."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from design.angles import load_angles
+from firmware_io.assembly.own_body import own_body_beside
+from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Watch, growing
+
+
+@contextmanager
+def live_page(folder: Path, *, wanted: bool) -> Iterator[Watch]:
+    """What `acquire` tells of a scan: the page of a build folder's scanner, or nobody where it is not wanted.
+
+    When the body has ended well, this waits until nobody looks any more.
+    """
+    if not wanted:
+        yield NOBODY
+        return
+    spawn = get_context("spawn")
+    receiving, sending = spawn.Pipe(duplex=False)
+    page = spawn.Process(target=_show, args=(receiving, folder), daemon=True)
+    page.start()
+    receiving.close()
+    yield Feed(sending)
+    with suppress(KeyboardInterrupt):
+        page.join()
+
+
+def _show(receiving: Connection, folder: Path) -> None:
+    """What the page's process does."""
+    from scanwright.live.page_life import run_live
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
+    placing = Placing(load_angles(folder / "angles.json"), own_body_beside(folder / "angles.json"))
+    run_live(growing(receiving, placing), f"scan of {folder.name}")

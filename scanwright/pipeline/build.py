@@ -1,0 +1,147 @@
+"""The order of a build: task, search, angles, parts, checks, drawings, files, report, into `out/<task>/`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from design.second_process import second_process
+from design.task.task import LoadedTask, load_task
+from scanwright.pipeline.folder import (
+    first_difference,
+    fresh_folder,
+    is_current,
+    listed_files,
+    write_manifest,
+)
+
+if TYPE_CHECKING:
+    from cad.findings import Finding
+    from design.search.optimum import Optimum
+    from design.search.with_parts import Chosen
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What the work of one build came to.
+
+    Attributes:
+        optimum: the search.
+        chosen: the setting that is best with its parts: the one that was built.
+        findings: what a person should know before the parts are made.
+    """
+
+    optimum: Optimum
+    chosen: Chosen
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """A build folder.
+
+    Attributes:
+        folder: where it is.
+        files: its files, relative to the folder.
+        warnings: what the task can do, but not as well as its author may think.
+        made: what was done; None where the folder was current and there was nothing to do.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    warnings: tuple[str, ...]
+    made: Made | None
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        if self.made is None:
+            return [f"{self.folder}: nothing has changed, no work to do ({len(self.files)} files)"]
+        return [
+            *self.made.optimum.table(),
+            *self.made.chosen.lines(),
+            *(f"warning: {warning}" for warning in self.warnings),
+            *(f"{finding.severity}: {finding.message}" for finding in self.made.findings),
+            f"wrote {len(self.files)} files to {self.folder}",
+        ]
+
+
+def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
+    """Make the build folder of a task, unless it is current.
+
+    Args:
+        loaded: the task.
+        target: the folder, `out/<task>`.
+        say: progress.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting keeps the limits.
+        BuildError: no setting can be built, or the folder cannot be written.
+    """
+    made = None if is_current(target, loaded) else _make(loaded, target, say)
+    return Build(target, listed_files(target), tuple(loaded.warnings()), made)
+
+
+def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
+    """Build the task of a build folder again, elsewhere: the first difference in words, None where there is none.
+
+    Raises:
+        TaskError: the folder has no task.
+        BuildError: the folder is no finished build.
+    """
+    loaded = load_task(folder / "task.toml")
+    with tempfile.TemporaryDirectory() as elsewhere:
+        again = Path(elsewhere) / loaded.task.name
+        _make(loaded, again, say)
+        return first_difference(folder, again)
+
+
+def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
+    """All of it, in the order in which one thing follows from another."""
+    from cad.files.parts import build_parts, write_files
+    from cad.kernel import require_kernel
+    from cad.layout.deck import mount_offset_mm
+    from design.angles import standard_settings
+    from design.evaluation.density_picture import density_picture
+    from design.search.optimum import angle_set, optimum_of
+    from design.search.with_parts import choose
+    from scanwright.pipeline import records
+    from scanwright.report.page import write_report
+
+    with fresh_folder(target) as work, second_process() as begin:
+        begin(require_kernel)  # it loads while the search runs
+        optimum = optimum_of(asked, say)
+        # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
+        loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
+        require_kernel()
+        from cad.assembly.shadow import PartsWorkshop
+        from cad.checks.run import check_files
+        from cad.files.write_all import export_scanner
+
+        workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
+        chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)
+        best = chosen.family
+        angles = angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
+        angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(loaded.scanner(angles))})
+        scanner = loaded.scanner(angles)
+        checked = begin(check_files, scanner, workshop.assembly(scanner), say)
+        parts = build_parts(scanner, work, say, workshop.assembly)
+        exported = export_scanner(scanner, parts, work, say, begin)
+        say("drawing density.png")
+        standard = standard_settings()
+        settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
+        settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
+        density_picture(work / "density.png", problem, settings, optimum.title)
+        write_files(work, checked())
+        (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        records.write_task(work, asked)
+        records.write_search(work, result)
+        records.write_left_out(work, [*optimum.left_out, *parts.left_out, *exported.left_out])
+        write_manifest(work, asked, [asdict(part) for part in parts.parts])
+        say("writing report.html")
+        write_report(work)
+    return Made(optimum, chosen, (*parts.findings, *exported.findings))

@@ -1,0 +1,41 @@
+"""`out/compare/<task>/`: the optimum of a task beside the usual mounts and ready-made scanners."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from design.evaluation.comparison import Row, compare, notes, table, write_csv
+from design.evaluation.comparison_picture import compare_picture
+from design.search.optimum import Optimum, optimum_of
+from design.task.task import LoadedTask
+from scanwright.pipeline.folder import report_folder
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """The rows of a comparison, and the folder that it was written to."""
+
+    optimum: Optimum
+    rows: list[Row]
+    folder: Path
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        return [*table(self.rows), *notes(self.optimum.loaded), f"wrote compare.csv and compare.png to {self.folder}"]
+
+
+def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None]) -> Comparison:
+    """Compare, and write `compare.csv` and `compare.png`.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting keeps the limits.
+        BuildError: the folder is a build folder, or cannot be written.
+    """
+    with report_folder(target) as folder:
+        optimum = optimum_of(loaded, say)
+        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
+        write_csv(folder / "compare.csv", rows)
+        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")
+    return Comparison(optimum, rows, target)

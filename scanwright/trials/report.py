@@ -1,0 +1,40 @@
+"""Error against run time of every numerical choice that is not J: measured, written and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from cad.kernel import require_kernel
+from design.accuracy.trials import on_front, trials_picture, write_trials
+from design.search.optimum import optimum_of
+from design.task.task import LoadedTask
+from firmware_io.twins.dynamics import plant_of
+from scanwright.trials.axis import axis_trials
+from scanwright.trials.solver import solver_trials
+
+
+def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
+    """Measure them at the optimum of a task, write `choices.csv` and `choices.png`; in words.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting keeps the limits.
+        BuildError: a part cannot be made, or the CAD kernel is not installed.
+    """
+    require_kernel()
+    from cad.assembly.assembly import make_parts
+    from scanwright.trials.mesh import mesh_trials
+
+    optimum = optimum_of(loaded, say)
+    solids = make_parts(loaded.scanner(optimum.angle_set())).made
+    trials = [*mesh_trials(solids, say), *solver_trials(plant_of(loaded.task.servo), say), *axis_trials(say)]
+    folder.mkdir(parents=True, exist_ok=True)
+    write_trials(folder / "choices.csv", trials)
+    trials_picture(folder / "choices.png", trials)
+    lines = []
+    for trial in trials:
+        mark = "=" if trial.chosen else "*" if on_front(trial, trials) else " "
+        method = f"{trial.method}, {trial.setting}"
+        price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
+        lines.append(f"{mark} {trial.choice:26} {method:50} {price}")
+    return [*lines, f"= chosen, * nothing is both faster and nearer; wrote choices.csv and .png to {folder}"]
