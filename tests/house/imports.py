@@ -1,0 +1,74 @@
+"""The imports of the house, read from its files: wherever they stand, in functions and under TYPE_CHECKING too."""
+
+import ast
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FLOORS = ("design", "cad", "firmware_io", "scanwright")
+
+
+@dataclass(frozen=True)
+class Import:
+    """One import of a module; `where` is "module", "function" or "typing"."""
+
+    importer: str
+    imported: str
+    where: str
+
+
+def modules(root=ROOT, floors=FLOORS):
+    """Every module by its dotted name, with its file; packages stand for their `__init__`."""
+    found = {}
+    for floor in floors:
+        for path in sorted((root / floor).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(root=ROOT, floors=FLOORS):
+    """All imports of all modules, of the house and of libraries; those of the house name the module, not the name."""
+    known = modules(root, floors)
+    return [one for name, path in known.items() for one in _imports(name, path, known)]
+
+
+def _imports(name, path, known):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    typing = {
+        id(inside)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and getattr(node.test, "id", None) == "TYPE_CHECKING"
+        for inside in ast.walk(node)
+    }
+    inner = {
+        id(inside)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        for inside in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        where = "typing" if id(node) in typing else "function" if id(node) in inner else "module"
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield Import(name, full if full in known else node.module, where)
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(name, alias.name, where)
+
+
+def loaded_by(module, every):
+    """Libraries and modules that importing a module loads, itself included; `every` is what `imports` gave."""
+    graph = defaultdict(set)
+    for one in every:
+        if one.where == "module":
+            graph[one.importer].add(one.imported)
+    seen, waiting = set(), [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += graph[name]
+    return seen
