@@ -29,7 +29,7 @@ def build(
     """Make everything of a task: angles, parts, drawings, parts list, frame chain, pictures, into DIR/<task>/."""
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
-        from scanwright.pipeline.folder import listed_files
+        from scanwright.pipeline.manifest import listed_files
 
         difference = difference_when_rebuilt(task, say)
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")

@@ -10,13 +10,8 @@ from typing import TYPE_CHECKING
 
 from design.second_process import second_process
 from design.task.task import LoadedTask, load_task
-from scanwright.pipeline.folder import (
-    first_difference,
-    fresh_folder,
-    is_current,
-    listed_files,
-    write_manifest,
-)
+from scanwright.pipeline.folder import fresh_folder
+from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
 
 if TYPE_CHECKING:
     from cad.findings import Finding

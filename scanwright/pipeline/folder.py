@@ -1,43 +1,22 @@
-"""The build folder `out/<task>/`: written whole or not at all, and known by the digests in its manifest.
+"""The build folder `out/<task>/`: written whole or not at all, one build at a time, and nothing outside of it touched.
 
-Cheap to import: asking whether a build is current must not load what makes one.
+A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
+stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
+and none of those before it, stay behind unlisted.
 """
 
 from __future__ import annotations
 
-import hashlib
+import fcntl
 import json
+import os
 import shutil
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from design.errors import BuildError
-from design.task.task import LoadedTask
-
-MANIFEST = "manifest.json"
-WRITERS = (
-    "cadquery",
-    "cadquery-ocp",
-    "ezdxf",
-    "jinja2",
-    "matplotlib",
-    "numba",
-    "numpy",
-    "pillow",
-    "reportlab",
-    "scipy",
-    "tomli-w",
-    "trimesh",
-)
-
-
-def versions() -> dict[str, str]:
-    """Versions of this program and of everything that writes bytes of a build."""
-    return {name: version(name) for name in ("scanwright", *WRITERS)}
+from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
 
 
 @contextmanager
@@ -48,28 +27,24 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     recording, stays.
 
     Raises:
-        BuildError: the folder cannot be written.
+        BuildError: the folder cannot be written, or another build of it is at work.
     """
-    created = [folder for folder in (target, *target.parents) if not folder.exists()]
+    created = [folder for folder in (target.parent, *target.parent.parents) if not folder.exists()]
+    work, moving = (target.with_name(f".{target.name}.{what}") for what in ("building", "moving"))
     try:
-        target.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with _alone(target):
+            shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
+            work.mkdir()
+            try:
+                yield work
+                _refuse_what_is_in_the_way(work, target)
+                _move(work, target, moving)
+            finally:
+                shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
-        raise BuildError(f"{target}: cannot write the build folder: {error.strerror}") from error
-    try:
-        yield work
-        previous = manifest_of(target).get("files", {})
-        made = [path.relative_to(work) for path in sorted(work.rglob("*")) if path.is_file()]
-        (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build
-        for name in made:
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            if name != Path(MANIFEST):
-                (work / name).replace(target / name)
-        for name in set(previous) - {str(m) for m in made}:
-            (target / name).unlink(missing_ok=True)
-        (work / MANIFEST).replace(target / MANIFEST)
+        raise BuildError(f"{target}: cannot write the build folder: {error.strerror or error}") from error
     finally:
-        shutil.rmtree(work, ignore_errors=True)
         for folder in created:
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
@@ -82,7 +57,7 @@ def report_folder(target: Path) -> Iterator[Path]:
     Raises:
         BuildError: it is a build folder, or cannot be written.
     """
-    if manifest_of(target):
+    if read_manifest(target):
         raise BuildError(f"{target}: --out: this is a build folder, and holds nothing but the build: take another one")
     try:
         target.mkdir(parents=True, exist_ok=True)
@@ -95,83 +70,79 @@ def report_folder(target: Path) -> Iterator[Path]:
         raise BuildError(f"{target}: cannot write the comparison: {error.strerror}") from error
 
 
-def manifest_of(folder: Path) -> dict[str, Any]:
-    """The manifest of a build folder; empty where there is none."""
-    try:
-        manifest: dict[str, Any] = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return manifest
-
-
-def listed_files(folder: Path) -> tuple[str, ...]:
-    """Files of a build folder as its manifest lists them; none where there is none."""
-    return tuple(manifest_of(folder).get("files", {}))
-
-
-def is_current(folder: Path, loaded: LoadedTask) -> bool:
-    """Whether a folder holds the finished build of this very task by these versions, every file as it was written."""
-    manifest = manifest_of(folder)
-    if manifest.get("task_sha256") != loaded.sha256() or manifest.get("versions") != versions():
-        return False
-    files: dict[str, dict[str, Any]] = manifest["files"]
-    return all((folder / name).is_file() and _sha256(folder / name) == facts["sha256"] for name, facts in files.items())
-
-
-def first_difference(folder: Path, again: Path) -> str | None:
-    """What tells a build folder from a second build of its task, in words; None where every byte is the same.
+@contextmanager
+def _alone(target: Path) -> Iterator[None]:
+    """Hold the lock of a build folder; it goes with the process, however that ends.
 
     Raises:
-        BuildError: the first one is no finished build.
+        BuildError: another process holds it.
     """
-    built = manifest_of(folder).get("files")
-    if built is None:
-        raise BuildError(f"{folder / MANIFEST}: missing or unreadable: not a finished build; build it first")
-    rebuilt = manifest_of(again)["files"]
-    for name in sorted({*built, *rebuilt}):
-        if name not in rebuilt:
-            return f"{name}: the second build has no such file"
-        if not (folder / name).is_file():
-            return f"{name}: missing"
-        digests = _sha256(folder / name), _sha256(again / name)
-        if digests[0] != digests[1]:
-            return f"{name}: sha256 {digests[0][:12]}, built again {digests[1][:12]}"
-    if (folder / MANIFEST).read_bytes() != (again / MANIFEST).read_bytes():
-        return f"{MANIFEST}: differs, though no file does: other versions"
-    return None
+    path = target.with_name(f".{target.name}.lock")
+    with path.open("a+", encoding="utf-8") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BuildError(f"{target}: another build of this folder is at work: wait for it") from None
+        if not path.exists() or path.stat().st_ino != os.fstat(lock.fileno()).st_ino:  # its holder has just ended
+            raise BuildError(f"{target}: another build of this folder has just ended: build again")
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
 
 
-def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:
-    """Digest every file in the folder; what is made later enters itself."""
-    files = {path.relative_to(folder).as_posix(): _facts(path) for path in sorted(folder.rglob("*")) if path.is_file()}
-    manifest = {
-        "schema": "scanwright/manifest/1",
-        "task": loaded.task.name,
-        "task_sha256": loaded.sha256(),
-        "versions": versions(),
-        "parts": parts,
-        "files": files,
-    }
-    write_json(folder / MANIFEST, manifest)
+def _refuse_what_is_in_the_way(work: Path, target: Path) -> None:
+    """Before anything moves: a file where a folder must be, or a folder where a file must be, stops the build.
+
+    Raises:
+        BuildError: there is one.
+    """
+    if target.exists() and not target.is_dir():
+        raise BuildError(f"{target}: cannot write the build folder: a file of that name is in the way")
+    for name in _files_in(work):
+        for parent in (target / name).parents:
+            if parent == target:
+                break
+            if parent.exists() and not parent.is_dir():
+                raise BuildError(f"{parent}: a file is where the build needs a folder: move it away")
+        if (target / name).is_dir():
+            raise BuildError(f"{target / name}: a folder is where the build needs a file: move it away")
 
 
-def enter(folder: Path, name: str) -> None:
-    """Digest a file that was made from a build into the manifest of that build; nothing to do where there is none."""
-    manifest = manifest_of(folder)
-    if manifest:
-        files = manifest["files"] | {name: _facts(folder / name)}
-        manifest["files"] = dict(sorted(files.items(), key=lambda entry: Path(entry[0])))
-        write_json(folder / MANIFEST, manifest)
+def _move(work: Path, target: Path, moving: Path) -> None:
+    """Put every file of `work` into `target`, the manifest last, and remove what only earlier builds had."""
+    made = _files_in(work)
+    known = {*listed_files(target), *_told(moving), *made}
+    write_json(moving, sorted(known))
+    target.mkdir(exist_ok=True)
+    (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build
+    for name in made:
+        if name != MANIFEST:
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            (work / name).replace(target / name)
+    for name in sorted(known - set(made)):
+        (target / name).unlink(missing_ok=True)
+    _drop_empty_folders(target, known)
+    if MANIFEST in made:
+        (work / MANIFEST).replace(target / MANIFEST)
+    moving.unlink(missing_ok=True)
 
 
-def write_json(path: Path, value: Any) -> None:
-    """One JSON file as all of them are written: two spaces, keys in their order, a line feed at the end."""
-    path.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+def _told(moving: Path) -> set[str]:
+    """What a build that was killed may have left in the folder."""
+    try:
+        told = json.loads(moving.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return set()
+    return {name for name in told if isinstance(name, str) and inside(name)} if isinstance(told, list) else set()
 
 
-def _facts(path: Path) -> dict[str, Any]:
-    return {"sha256": _sha256(path), "bytes": path.stat().st_size}
+def _drop_empty_folders(target: Path, names: Iterable[str]) -> None:
+    """Folders that held nothing but files of builds, and hold none any more."""
+    for folder in sorted({parent for name in names for parent in Path(name).parents if parent.parts}, reverse=True):
+        if (target / folder).is_dir() and not any((target / folder).iterdir()):
+            (target / folder).rmdir()
 
 
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _files_in(folder: Path) -> list[str]:
+    return [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file()]

@@ -12,7 +12,7 @@ from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import Map, Mesh
 from design.task.task import LoadedTask
-from scanwright.pipeline.folder import write_json
+from scanwright.pipeline.manifest import write_json
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:

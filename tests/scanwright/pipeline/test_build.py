@@ -2,7 +2,9 @@
 
 import hashlib
 import json
+import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +13,8 @@ from design.errors import BuildError
 from design.search.optimum import rounded_to_error
 from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
-from scanwright.pipeline.folder import first_difference, fresh_folder, is_current
+from scanwright.pipeline.folder import fresh_folder
+from scanwright.pipeline.manifest import first_difference, is_current
 
 PARTS = ("servo_shaft", "alignment_linkage", "slip_ring_adapter", "base_mount")
 FILES = {
@@ -164,6 +167,108 @@ def test_what_the_last_build_had_and_this_one_has_not_is_removed(tmp_path):
                 (work / name).write_text(name)
             (work / "manifest.json").write_text(json.dumps({"files": {name: {} for name in files}}))
     assert sorted(path.name for path in target.iterdir()) == ["a.txt", "manifest.json"]
+
+
+def _build_of(target, files):
+    with fresh_folder(target) as work:
+        for name in files:
+            (work / name).parent.mkdir(parents=True, exist_ok=True)
+            (work / name).write_text(name)
+        (work / "manifest.json").write_text(json.dumps({"files": {name: {} for name in files}}))
+
+
+def _files(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_a_manifest_that_names_files_elsewhere_deletes_none_of_them(tmp_path):
+    target, victim, other = tmp_path / "out" / "task", tmp_path / "victim.txt", tmp_path / "out" / "victim.txt"
+    _build_of(target, ["a.txt"])
+    for path in (victim, other):
+        path.write_text("somebody's")
+    named = ["../victim.txt", "../../victim.txt", str(victim), "parts/../../victim.txt", ""]
+    (target / "manifest.json").write_text(json.dumps({"files": {name: {} for name in named}}))
+    _build_of(target, ["b.txt"])
+    assert victim.exists()
+    assert other.exists()
+
+
+@pytest.mark.parametrize("manifest", ["[]", '{"files": []}', '{"files": {}}', "[" * 100_000, "\0", '{"files": null}'])
+def test_a_manifest_that_is_none_is_no_current_build(ceiling, manifest):
+    kept = (ceiling / "manifest.json").read_text()
+    (ceiling / "manifest.json").write_text(manifest)
+    current = is_current(ceiling, load_task(ceiling / "task.toml"))
+    (ceiling / "manifest.json").write_text(kept)
+    assert not current
+
+
+@pytest.mark.parametrize("key", ["versions", "code", "task_sha256"])
+def test_a_build_of_another_program_or_task_is_not_current(ceiling, key):
+    kept = (ceiling / "manifest.json").read_text()
+    (ceiling / "manifest.json").write_text(json.dumps(json.loads(kept) | {key: "other"}))
+    current = is_current(ceiling, load_task(ceiling / "task.toml"))
+    (ceiling / "manifest.json").write_text(kept)
+    assert not current
+
+
+STEPS = 40  # more than a build of three files has
+
+
+def _killed_at(step, target, files):
+    """Build in a child that dies, as by kill -9, before its n-th change of the disk; whether it got that far."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    left = step
+
+    def counted(change):
+        def done(*words, **options):
+            nonlocal left
+            left -= 1
+            if left < 0:
+                os._exit(9)
+            return change(*words, **options)
+
+        return done
+
+    for name in ("replace", "unlink", "rmdir", "mkdir", "write_text"):
+        setattr(Path, name, counted(getattr(Path, name)))
+    _build_of(target, files)
+    os._exit(0)
+
+
+def test_a_build_that_is_killed_at_any_step_leaves_nothing_unlisted_behind(tmp_path):
+    died = 0
+    for step in range(STEPS):
+        target = tmp_path / str(step) / "task"
+        _build_of(target, ["a.txt", "old/b.txt"])
+        (target / "mine.txt").write_text("somebody's")
+        died += _killed_at(step, target, ["a.txt", "new/c.txt"])
+        _build_of(target, ["d.txt"])
+        assert _files(tmp_path / str(step)) == ["task/d.txt", "task/manifest.json", "task/mine.txt"], step
+        assert {path.name for path in target.iterdir()} == {"d.txt", "manifest.json", "mine.txt"}, step
+    assert 15 < died < STEPS  # the last ones were over before they could be killed
+
+
+def test_two_builds_of_one_folder_do_not_mix(tmp_path):
+    with (
+        fresh_folder(tmp_path / "task") as work,
+        pytest.raises(BuildError, match="another build of this folder is at work"),
+        fresh_folder(tmp_path / "task"),
+    ):
+        pass
+    assert not work.exists()
+    _build_of(tmp_path / "task", ["a.txt"])
+    assert _files(tmp_path) == ["task/a.txt", "task/manifest.json"]
+
+
+def test_what_is_in_the_way_is_told_before_anything_moves(tmp_path):
+    target = tmp_path / "task"
+    _build_of(target, ["a.txt"])
+    (target / "parts").write_text("in the way")
+    with pytest.raises(BuildError, match="a file is where the build needs a folder"):
+        _build_of(target, ["parts/b.stl"])
+    assert _files(target) == ["a.txt", "manifest.json", "parts"]
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):

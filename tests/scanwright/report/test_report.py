@@ -34,7 +34,7 @@ from design.objective.score import quick_J
 from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 from design.task.task import load_task
 from scanwright.pipeline import records as writer
-from scanwright.pipeline.folder import is_current, manifest_of, write_json, write_manifest
+from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import scene as report_scene
 from scanwright.report.answer import hidden_by, sight_of
 from scanwright.report.page import report_html, write_report
@@ -217,12 +217,12 @@ def test_the_command_writes_what_the_build_wrote(folder, command):
 
 
 def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_path):
-    entered = manifest_of(folder)
+    entered = read_manifest(folder)
     again = tmp_path / "again"
     shutil.copytree(folder, again, ignore=shutil.ignore_patterns("manifest.json"))
     write_manifest(again, load_task(again / "task.toml"), [])
-    assert list(manifest_of(again)["files"]) == list(entered["files"])
-    assert manifest_of(again) == entered
+    assert list(read_manifest(again)["files"]) == list(entered["files"])
+    assert read_manifest(again) == entered
 
 
 def test_the_answer_says_what_the_files_say(page):
@@ -382,7 +382,7 @@ def test_the_table_of_settings_names_the_lowest(page):
 
 
 def test_the_manifest_in_the_page_is_that_of_the_folder(folder, page, text):
-    manifest = manifest_of(folder)
+    manifest = read_manifest(folder)
     rows = re.findall(r"<td>([^<]+)</td><td [^>]+>([\d,]+)</td><td><code>([0-9a-f]{64})</code>", text)
     files = {name: {"sha256": digest, "bytes": int(size.replace(",", ""))} for name, size, digest in rows}
     assert files == {name: facts for name, facts in manifest["files"].items() if name != "report.html"}

@@ -1,0 +1,167 @@
+"""The manifest of a build folder: every file with its digest, the task, the versions and the code that wrote them.
+
+Cheap to import: asking whether a build is current must not load what makes one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from design.errors import BuildError
+from design.task.task import LoadedTask
+
+MANIFEST = "manifest.json"
+WRITERS = (
+    "cadquery",
+    "cadquery-ocp",
+    "embreex",
+    "ezdxf",
+    "jinja2",
+    "manifold3d",
+    "matplotlib",
+    "numba",
+    "numpy",
+    "pillow",
+    "reportlab",
+    "scipy",
+    "shapely",
+    "tomli-w",
+    "trimesh",
+)
+"""What a byte of a build may depend on."""
+_CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
+_ROOMS = ("design", "cad", "scanwright")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of this program and of everything that writes bytes of a build."""
+    return {name: _version(name) for name in ("scanwright", *WRITERS)}
+
+
+@cache
+def code_digest() -> str:
+    """Digest of our own code, 12 hex digits: a checkout may be ahead of its version."""
+    digest = hashlib.sha256()
+    for room in _ROOMS:
+        spec = find_spec(room)
+        for root in [] if spec is None else sorted(spec.submodule_search_locations or []):
+            for path in sorted(path for path in Path(root).rglob("*") if path.suffix in _CODE):
+                digest.update(f"{room}/{path.relative_to(root).as_posix()}\n".encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a build folder; empty where there is none, or none that can be one."""
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    if not isinstance(manifest, dict) or not isinstance(manifest.get("files"), dict):
+        return {}
+    return manifest
+
+
+def listed_files(folder: Path) -> tuple[str, ...]:
+    """Files of a build folder as its manifest lists them, those inside of it only; none where there is none.
+
+    A name is data that somebody may have written: one that leads out of the folder names nothing of ours.
+    """
+    return tuple(name for name in read_manifest(folder).get("files", {}) if inside(name))
+
+
+def inside(name: str) -> bool:
+    """Whether a name of a file stays in the folder that it is taken from."""
+    path = PurePosixPath(name)
+    return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name
+
+
+def is_current(folder: Path, loaded: LoadedTask) -> bool:
+    """Whether a folder holds the finished build of this very task by this very program, every file as it was made."""
+    manifest = read_manifest(folder)
+    files = manifest.get("files")
+    if not files or manifest.get("task_sha256") != loaded.sha256():
+        return False
+    if manifest.get("versions") != versions() or manifest.get("code") != code_digest():
+        return False
+    return all(inside(name) and _is_as_written(folder / name, facts) for name, facts in files.items())
+
+
+def first_difference(folder: Path, again: Path) -> str | None:
+    """What tells a build folder from a second build of its task, in words; None where every byte is the same.
+
+    Raises:
+        BuildError: the first one is no finished build.
+    """
+    built = set(listed_files(folder))
+    if not read_manifest(folder):
+        raise BuildError(f"{folder / MANIFEST}: missing or unreadable: not a finished build; build it first")
+    rebuilt = set(listed_files(again))
+    for name in sorted(built | rebuilt):
+        if name not in rebuilt:
+            return f"{name}: the second build has no such file"
+        if not (folder / name).is_file():
+            return f"{name}: missing"
+        digests = _sha256(folder / name), _sha256(again / name)
+        if digests[0] != digests[1]:
+            return f"{name}: sha256 {digests[0][:12]}, built again {digests[1][:12]}"
+    if (folder / MANIFEST).read_bytes() != (again / MANIFEST).read_bytes():
+        return f"{MANIFEST}: differs, though no file does: other versions, or other code"
+    return None
+
+
+def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:
+    """Digest every file in the folder; what is made later enters itself."""
+    files = {path.relative_to(folder).as_posix(): _facts(path) for path in sorted(folder.rglob("*")) if path.is_file()}
+    manifest = {
+        "schema": "scanwright/manifest/1",
+        "task": loaded.task.name,
+        "task_sha256": loaded.sha256(),
+        "versions": versions(),
+        "code": code_digest(),
+        "parts": parts,
+        "files": files,
+    }
+    write_json(folder / MANIFEST, manifest)
+
+
+def enter(folder: Path, name: str) -> None:
+    """Digest a file that was made from a build into the manifest of that build; nothing to do where there is none."""
+    manifest = read_manifest(folder)
+    if manifest:
+        files = manifest["files"] | {name: _facts(folder / name)}
+        manifest["files"] = dict(sorted(files.items(), key=lambda entry: Path(entry[0])))
+        write_json(folder / MANIFEST, manifest)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """One JSON file as all of them are written: whole, two spaces, keys in their order, a line feed at the end."""
+    part = path.with_name(f"{path.name}.part")
+    part.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # an extra that this installation does without
+        return "none"
+
+
+def _is_as_written(path: Path, facts: Any) -> bool:
+    return path.is_file() and isinstance(facts, dict) and _sha256(path) == facts.get("sha256")
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    return {"sha256": _sha256(path), "bytes": path.stat().st_size}
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
