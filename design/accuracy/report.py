@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.methods import Point, Reference, on_front
+from design.accuracy.methods import Point, Reference, best_points
 from design.accuracy.stress import Row
 
 MARKS = "osD^vP*X"
@@ -20,7 +20,7 @@ def write_points(path: Path, points: list[Point], truth: Reference) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
     header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front failed"
     rows = []
-    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
         seconds = point.seconds or (np.nan,)
         numbers = [point.J, point.J_error, point.argmin_error_deg]
         numbers += [float(np.median(seconds)), min(seconds), max(seconds), point.peak_mb]

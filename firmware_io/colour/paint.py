@@ -23,7 +23,7 @@ from design import frames
 from design.angles import AngleSet
 from design.camera import Camera
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.clouds.point_file import PlyWriter, ply_comments, read_ply
+from firmware_io.clouds.ply import PlyWriter, ply_comments, read_ply
 from firmware_io.colour.camera_views import View, opened
 from firmware_io.recording.recording import Recording
 from firmware_io.samples import Floats, Times

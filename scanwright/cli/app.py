@@ -106,11 +106,11 @@ def _build(asked: LoadedTask, target: Path) -> tuple[Optimum, Chosen, tuple[Find
     from cad.kernel import require_kernel
     from cad.layout.deck import mount_offset_mm
     from design.angles import standard_settings
+    from design.concurrency.second_process import second_process
     from design.evaluation.density_picture import density_picture
     from design.scanner import scanner_of
     from design.search.optimum import optimum_of
     from design.search.with_parts import choose
-    from design.second_process import second_process
     from scanwright.pipeline import records as writer
     from scanwright.pipeline.folder import fresh_folder, write_manifest
     from scanwright.report.page import write_report
@@ -260,7 +260,7 @@ def evaluate(
     found = evaluation.evaluate(loaded, problem, setting, pole, _say)
     points = 0
     if cloud is not None:
-        from firmware_io.clouds.point_file import write_points
+        from firmware_io.clouds.ply import write_points
 
         beams = evaluation.simulated_beams(problem, setting)
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
@@ -288,7 +288,7 @@ def accuracy(
 ) -> None:
     """Report error against run time of every way to compute J, at the optimum of a task; of other choices too."""
     from design.accuracy import report as report
-    from design.accuracy.methods import as_log, measure, on_front
+    from design.accuracy.methods import as_log, best_points, measure
     from design.accuracy.stress import stress_rows
     from design.objective.problem import problem_of
     from design.search.optimum import optimum_of
@@ -317,7 +317,7 @@ def accuracy(
     report.write_points(folder / "work_precision.csv", points, truth)
     report.work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
     print(f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}")
-    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
         seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
         print(f"{'*' if front else ' '} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
     print(f"* nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}")
@@ -326,7 +326,7 @@ def accuracy(
 def _choices(loaded: LoadedTask, folder: Path) -> None:
     """Error against run time of every numerical choice that is not J."""
     from cad.kernel import require_kernel
-    from design.accuracy.trials import on_front, trials_picture, write_trials
+    from design.accuracy.trials import best_trials, trials_picture, write_trials
     from design.scanner import scanner_of
     from design.search.optimum import optimum_of
     from firmware_io.twins.dynamics import plant_of
@@ -345,8 +345,8 @@ def _choices(loaded: LoadedTask, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_trials(folder / "choices.csv", trials)
     trials_picture(folder / "choices.png", trials)
-    for trial in trials:
-        mark = "=" if trial.chosen else "*" if on_front(trial, trials) else " "
+    for trial, best in zip(trials, best_trials(trials), strict=True):
+        mark = "=" if trial.chosen else "*" if best else " "
         method = f"{trial.method}, {trial.setting}"
         price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
         print(f"{mark} {trial.choice:26} {method:50} {price}")
