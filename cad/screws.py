@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from design.catalogue.catalogue import Printer
+from design.catalogue.products import Printer
 
 
 @dataclass(frozen=True, slots=True)

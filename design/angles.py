@@ -1,6 +1,7 @@
 """The angle set: the one record that joins optimiser, parts and acquisition.
 
-Files carry degrees and millimetres; the methods return radians and metres. `design.md`'s frame chain:
+Files carry degrees and millimetres; the methods return radians and metres. The chain of
+frames (`docs/conventions.md`, Frames):
 
     T_world_laser(gamma) = T_world_rot(gamma) @ T_rot_laser
     T_world_rot(gamma)   = [Rx(alpha_rot) Ry(beta_rot) Rz(gamma + gamma_rot) | t_world_rot]

@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from design.errors import suggest
+from design.errors import TaskError, suggest
 
 
 class Record(BaseModel):
     """Immutable; a misspelt key is an error and not a default; NaN and infinity are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The table of a TOML file.
+
+    Raises:
+        TaskError: the file cannot be read or is not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
+    except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
+        raise TaskError(f"{path}: not a TOML file: {error}") from error
 
 
 def explain(error: ValidationError, source: Path | str, model: type[BaseModel]) -> str:

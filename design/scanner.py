@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from design.angles import AngleSet
-from design.catalogue.catalogue import Bearing, Belt, Catalogue, Lidar, Printer, Servo, SlipRing
-from design.task.deck_holes import Circle, Rectangle
+from design.catalogue.catalogue import Catalogue
+from design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
+from design.deck_holes import Circle, Rectangle
 
 
 @dataclass(frozen=True, slots=True)

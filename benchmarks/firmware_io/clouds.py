@@ -35,7 +35,7 @@ from firmware_io.assembly.axis_curve import interpolation_orders
 from firmware_io.assembly.deskew import place
 from firmware_io.assembly.deskew_kernel import place_block
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.clouds.point_file import PlyWriter
+from firmware_io.clouds.ply import PlyWriter
 from firmware_io.recording.recording import RecordingWriter
 from firmware_io.samples import AxisCurve, Block, Floats, JointLog, Scan, blocks, straight
 

@@ -13,7 +13,7 @@ import cadquery as cq
 from cad import solids
 from cad.layout.direct_stack import Stack
 from cad.screws import SCREWS
-from design.catalogue.catalogue import Bearing, Lidar, Servo
+from design.catalogue.products import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5
 EAR_ROOM = 3.6  # radius of the recess around a case hole

@@ -18,7 +18,7 @@ from cad.assembly.assembly import Assembly, turns
 from cad.findings import Finding
 from cad.geometry.holes import Piercing, Round
 from cad.screws import SCREWS, Screw, holding_holes, trap_of
-from design.catalogue.catalogue import Printer
+from design.catalogue.products import Printer
 from design.scanner import Scanner
 
 # ISO 4762 and ISO 4026

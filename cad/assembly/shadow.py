@@ -19,7 +19,8 @@ from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
 from design.scene import ray_caster
-from design.shadow import AXIS_STEPS, Mask, Refused, Shadow
+from design.search.with_parts import Refused
+from design.shadow import AXIS_STEPS, Mask, Shadow
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
@@ -32,7 +33,7 @@ BEAM_RAYS = 6
 
 @dataclass(frozen=True, slots=True)
 class PartsWorkshop:
-    """The `Workshop` of `design/shadow.py` for one set of products: `scanner.angles` are replaced by each setting."""
+    """The `Workshop` of the search, for one set of products: `scanner.angles` are replaced by each setting."""
 
     scanner: Scanner
     _made: dict[str, Assembly] = field(default_factory=dict, init=False, repr=False, compare=False)

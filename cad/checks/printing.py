@@ -19,7 +19,7 @@ from cad.checks.islands import islands_check
 from cad.geometry.holes import Round, rounds_of
 from cad.geometry.mesh import Mesh
 from cad.geometry.print_pose import PrintPose, print_pose
-from design.catalogue.catalogue import Printer
+from design.catalogue.products import Printer
 from design.frames import Array
 from design.scene import ray_caster
 

@@ -12,7 +12,7 @@ from cad.layout.direct_stack import Stack
 from cad.layout.head import Head
 from cad.layout.loads import RATED_AT_MM, Weight, rated_moment_nm, supported, weight_of
 from cad.screws import SCREWS
-from design.catalogue.catalogue import Product
+from design.catalogue.products import Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

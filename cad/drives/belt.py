@@ -26,7 +26,7 @@ from cad.layout.belt_stack import (
 from cad.layout.fits import Fit, OnSheet, no_wider, printed_seat, turned_spigot
 from cad.layout.mounted import Carried
 from cad.screws import Screw, trap_of
-from design.catalogue.catalogue import Bearing, Belt, Product
+from design.catalogue.products import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

@@ -16,7 +16,7 @@ from cad.layout.fits import OnSheet, printed_journal, printed_seat, turned_spigo
 from cad.layout.loads import ALUMINIUM_PA
 from cad.layout.mounted import Carried
 from cad.screws import SCREWS, Screw
-from design.catalogue.catalogue import Bearing, Belt, Product
+from design.catalogue.products import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

@@ -18,7 +18,7 @@ from cad.layout.fits import OnSheet
 from cad.layout.head import Head
 from cad.layout.mounted import Carried
 from cad.screws import Screw
-from design.catalogue.catalogue import Bearing, Belt, Product
+from design.catalogue.products import Bearing, Belt, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

@@ -18,7 +18,7 @@ from cad.drives.drive import Drive
 from cad.layout.balance import PART as COUNTERWEIGHT
 from cad.layout.balance import SCREW, Counterweight
 from cad.screws import INSERT_LENGTH, SCREWS
-from design.catalogue.catalogue import Bearing, Belt, Lidar, Servo, SlipRing
+from design.catalogue.products import Bearing, Belt, Lidar, Servo, SlipRing
 from design.scanner import Scanner
 
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"

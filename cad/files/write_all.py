@@ -19,9 +19,9 @@ from cad.geometry.mesh import Mesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.parts.fit_coupon import PART as FIT_COUPON
 from cad.parts.fit_coupon import coupon_of, fit_coupon
+from design.concurrency.second_process import Begin, in_turn
 from design.left_out import LeftOut
 from design.scanner import Scanner
-from design.second_process import Begin, in_turn
 
 
 @dataclass(frozen=True, slots=True)

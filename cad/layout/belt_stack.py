@@ -29,7 +29,7 @@ import numpy as np
 from cad.layout.direct_stack import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
 from cad.layout.head import BEARING_STEP, HUB_WALL, Head
 from cad.screws import SCREWS
-from design.catalogue.catalogue import Bearing, Belt, Flange, Rotor, Servo, SlipRing
+from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo, SlipRing
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner

@@ -17,10 +17,10 @@ from cad.layout.direct_stack import rotor_radius
 from cad.layout.head import Head
 from cad.layout.mounted import Carried
 from cad.screws import SCREWS, Screw
+from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
-from design.task.deck_holes import Circle, Rectangle
 
 FOOT_THICKNESS = 6.0
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs

@@ -28,7 +28,7 @@ import numpy as np
 from cad.layout.head import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, HUB_WALL, Axis, Head
 from cad.layout.loads import WAIST, bearing_of
 from cad.screws import SCREWS, Screw
-from design.catalogue.catalogue import Lidar, Servo
+from design.catalogue.products import Lidar, Servo
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner

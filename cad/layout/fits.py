@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from design.catalogue.catalogue import Bearing
+from design.catalogue.products import Bearing
 
 
 @dataclass(frozen=True, slots=True)

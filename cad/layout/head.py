@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from design.catalogue.catalogue import Bearing
+from design.catalogue.products import Bearing
 from design.frames import Array
 
 HUB_HEIGHT = 14.0

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from design.catalogue.catalogue import Bearing
+from design.catalogue.products import Bearing
 from design.scanner import Scanner
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from cad import solids
 from cad.layout.direct_stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, Stack
 from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
 from cad.solids import building, checked
-from design.catalogue.catalogue import Bearing, Servo
+from design.catalogue.products import Bearing, Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 

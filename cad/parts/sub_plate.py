@@ -17,7 +17,7 @@ from cad.layout.direct_stack import BODY_GAP, EAR_REACH, SUB_PLATE, ear_corner
 from cad.layout.head import Axis, Head
 from cad.screws import SCREWS
 from cad.solids import building, checked
-from design.catalogue.catalogue import Lidar
+from design.catalogue.products import Lidar
 from design.frames import Array
 from design.scanner import Scanner
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import roots_legendre
 
+from design.accuracy.front import undominated
 from design.density.ball_count import ball_count
 from design.density.beams import beam_directions_rot, polar_and_azimuth, simulated_scan
 from design.density.spin import ball_search, mean_count, zones
@@ -187,15 +188,11 @@ def measure(problem: Problem, angles_rad: Array, progress: Progress) -> tuple[Re
     return truth, points
 
 
-def on_front(points: list[Point], reference_error: float) -> list[bool]:
+def best_points(points: list[Point], reference_error: float) -> list[bool]:
     """Whether no other point is both faster and nearer; errors below the reference's own count as equal."""
-    cost = np.array([_median(p) for p in points])
-    error = np.array([p.J_error for p in points])
-    error = np.where(np.isnan(error), np.inf, np.maximum(error, reference_error))
-    return [
-        bool(np.isfinite(e) and not ((cost <= c) & (error <= e) & ((cost < c) | (error < e))).any())
-        for c, e in zip(cost, error, strict=True)
-    ]
+    costs = np.array([[_median(p), max(p.J_error, reference_error)] for p in points])
+    answered = np.isfinite(costs[:, 1])
+    return (undominated(np.where(answered[:, None], costs, np.inf)) & answered).tolist()
 
 
 def _point(

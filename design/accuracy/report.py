@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.methods import Point, Reference, as_log, measure, on_front
+from design.accuracy.methods import Point, Reference, as_log, best_points, measure
 from design.accuracy.stress import Row, stress_rows
 from design.objective.problem import problem_of
 from design.search.optimum import optimum_of
@@ -24,7 +24,7 @@ def write_points(path: Path, points: list[Point], truth: Reference) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
     header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front failed"
     rows = []
-    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
         seconds = point.seconds or (np.nan,)
         numbers = [point.J, point.J_error, point.argmin_error_deg]
         numbers += [float(np.median(seconds)), min(seconds), max(seconds), point.peak_mb]
@@ -112,7 +112,7 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
     write_points(folder / "work_precision.csv", points, truth)
     work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
     lines = [f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
-    for point, front in zip(points, on_front(points, truth.J_error), strict=True):
+    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
         seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
         mark = "*" if front else " "
         lines.append(f"{mark} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")

@@ -16,6 +16,8 @@ from typing import TypeVar
 import numpy as np
 from matplotlib.figure import Figure
 
+from design.accuracy.front import dominators
+
 T = TypeVar("T")
 REPEATS = 3
 MARKS = "osD^vP*X"
@@ -63,11 +65,11 @@ def timed(work: Callable[[], T], repeats: int = REPEATS) -> tuple[T, tuple[float
     return found, tuple(sorted(seconds))
 
 
-def on_front(trial: Trial, others: Sequence[Trial]) -> bool:
-    """Whether none of the same choice is as fast and nearer, or as near and faster."""
-    rivals = (other for other in others if other.choice == trial.choice and other is not trial)
-    cost, error = trial.median_s, trial.error
-    return not any(r.median_s <= cost and r.error <= error and (r.median_s < cost or r.error < error) for r in rivals)
+def best_trials(trials: Sequence[Trial]) -> list[bool]:
+    """Whether no other trial of the same choice is as fast and nearer, or as near and faster."""
+    costs = np.array([(trial.median_s, trial.error) for trial in trials])
+    choices = np.array([trial.choice for trial in trials])
+    return [not dominators(costs[choices == choice], cost).any() for choice, cost in zip(choices, costs, strict=True)]
 
 
 def write_trials(path: Path, trials: Sequence[Trial]) -> None:
@@ -76,9 +78,9 @@ def write_trials(path: Path, trials: Sequence[Trial]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header.split())
-        for t in trials:
+        for t, best in zip(trials, best_trials(trials), strict=True):
             seconds = [f"{s:.4g}" for s in (t.median_s, t.seconds[0], t.seconds[-1])]
-            marks = [str(on_front(t, trials)).lower(), str(t.chosen).lower()]
+            marks = [str(best).lower(), str(t.chosen).lower()]
             writer.writerow([t.choice, t.method, t.setting, f"{t.error:.4g}", t.unit, *seconds, t.size, *marks])
 
 

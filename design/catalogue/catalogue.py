@@ -1,269 +1,38 @@
-"""Products that a scanner is made of: lidars, servos, slip rings, bearings, belts, printers; ready-made ones beside it.
+"""The products that a scanner can be made of, by name: the shipped ones, and those of a user's own files.
 
 One TOML file per product. Every value is written with its source and whether it was verified:
 
     mass_g = { value = 370.0, source = "Hokuyo UTM-30LX data sheet", verified = true }
 
-so that a build can say which of its dimensions nobody has measured. Lengths are millimetres, masses grams.
-A user's own catalogue file adds products or replaces shipped ones of the same name.
+so that a build can say which of its dimensions nobody has measured. A user's own catalogue file adds products or
+replaces shipped ones of the same name.
 """
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
-import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import ValidationError
 
+from design.catalogue.products import (
+    Bearing,
+    Belt,
+    Lidar,
+    Multibeam,
+    Printer,
+    Product,
+    Provenance,
+    Servo,
+    SlipRing,
+)
 from design.errors import TaskError, suggest
-from design.frames import Array
-from design.record import Record, explain
+from design.record import explain, read_toml
 
 SHIPPED = Path(__file__).parent
-
-Pair = tuple[float, float]
-Triple = tuple[float, float, float]
-
-
-class Provenance(Record):
-    """Where a value comes from. `verified` means: two independent sources, or a drawing of the maker."""
-
-    source: str
-    verified: bool
-
-
-class Product(Record):
-    """Base of the catalogue records: name, maker, and the provenance of each value."""
-
-    kind: str
-    name: str
-    maker: str
-    _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
-
-    def provenance(self) -> dict[str, Provenance]:
-        """Source of each value, by field name."""
-        return self._provenance
-
-    def unverified(self) -> list[str]:
-        """Names of the values that nobody has verified."""
-        return [field for field, origin in self._provenance.items() if not origin.verified]
-
-    def lines(self) -> list[str]:
-        """Every value with its source, in words."""
-        values = [
-            f"  {' ' if origin.verified else '?'} {field} = {json.dumps(getattr(self, field))}   [{origin.source}]"
-            for field, origin in self._provenance.items()
-        ]
-        doubt = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
-        return [f"{self.name} ({self.maker})", *values, doubt]
-
-
-class Lidar(Product):
-    """A 2D lidar. Body frame: origin on the base at the optical axis, x to the front, z up; mm."""
-
-    kind: Literal["lidar"]
-    steps_per_turn: int = Field(gt=0)
-    first_step: int = Field(ge=0)
-    last_step: int = Field(ge=0)
-    front_step: int = Field(ge=0)
-    scan_rate_hz: float = Field(gt=0)
-    range_min_mm: float = Field(gt=0)
-    range_max_mm: float = Field(gt=0)
-    range_practical_mm: float | None = Field(default=None, gt=0, description="what users really get")
-    range_sigma_mm: float = Field(gt=0)
-    mass_g: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-    wavelength_nm: float | None = Field(default=None, gt=0)
-    body_mm: Triple
-    optical_height_mm: float = Field(gt=0)
-    window_z_mm: Pair
-    window_radius_mm: float = Field(gt=0)
-    mount_screw: Literal["M2", "M2.5", "M3", "M4"]
-    mount_holes_mm: tuple[Pair, ...] = Field(min_length=3)
-    mount_thread_depth_mm: float = Field(gt=0)
-    cable_y_mm: tuple[float, ...]
-    cable_z_mm: float
-    cable_diameter_mm: float = Field(gt=0)
-    cable_straight_mm: float = Field(ge=0)
-
-    @model_validator(mode="after")
-    def _steps_are_ordered(self) -> Lidar:
-        if not self.first_step < self.last_step < self.first_step + self.steps_per_turn:
-            raise ValueError(f"steps {self.first_step}..{self.last_step} do not fit {self.steps_per_turn} per turn")
-        if self.range_min_mm >= self.range_max_mm:
-            raise ValueError(f"range_min_mm {self.range_min_mm} is not below range_max_mm {self.range_max_mm}")
-        return self
-
-    def bearings_rad(self) -> Array:
-        """Angle of every beam about the scan-plane normal, 0 to the front, shape (beams,) (SCIP 2.0, p. 5)."""
-        steps = np.arange(self.first_step, self.last_step + 1)
-        return (steps - self.front_step) * (2 * np.pi / self.steps_per_turn)
-
-
-class Servo(Product):
-    """A servo. Frame: origin on the horn axis at the horn face, z out of the horn, +y to the horn's end; mm."""
-
-    kind: Literal["servo"]
-    position_step_deg: float = Field(gt=0)
-    angular_range_deg: float = Field(gt=0, le=360)
-    position_feedback_deg: float = Field(gt=0, le=360)
-    mass_g: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-    stall_torque_nm: float = Field(gt=0)
-    no_load_rpm: float = Field(gt=0)
-    radial_load_n: float | None = Field(default=None, gt=0)
-    axial_load_n: float | None = Field(default=None, gt=0)
-    backlash_deg: float | None = Field(default=None, ge=0)
-    case_min_mm: Triple
-    case_max_mm: Triple
-    horn_diameter_mm: float = Field(gt=0)
-    horn_thickness_mm: float = Field(gt=0)
-    horn_boss_diameter_mm: float = Field(ge=0)
-    horn_boss_height_mm: float = Field(ge=0)
-    horn_circle_mm: float = Field(gt=0)
-    horn_holes: int = Field(gt=1)
-    horn_first_hole_deg: float = Field(ge=0, lt=360, description="of one hole from +y, position at its centre")
-    horn_screw: Literal["M2", "M2.5", "M3"]
-    horn_thread_depth_mm: float = Field(gt=0)
-    case_screw: Literal["M2", "M2.5", "M3"]
-    case_holes_mm: tuple[Pair, ...] = Field(min_length=4)
-    case_holes_z_mm: float
-    case_rear_holes_mm: tuple[Pair, ...] = Field(min_length=4)
-    case_rear_holes_z_mm: float
-
-
-class Flange(Record):
-    """The flange of a capsule, by which its stator is held; mm."""
-
-    diameter_mm: float = Field(gt=0)
-    thickness_mm: float = Field(gt=0)
-    below_top_mm: float = Field(ge=0, description="of its face towards the rotor below the body's end there")
-    circle_mm: float = Field(gt=0)
-    holes: int = Field(gt=1)
-    hole_mm: float = Field(gt=0)
-    screw: Literal["M2.5", "M3", "M4", "M5"]
-
-
-class Rotor(Record):
-    """The stub of a capsule's rotor, out of which its leads come; mm."""
-
-    diameter_mm: float = Field(gt=0)
-    length_mm: float = Field(gt=0)
-
-
-class SlipRing(Product):
-    """A slip ring; `bore_mm = 0` is a capsule, `length_mm` that of its body, and it needs `flange` and `rotor`."""
-
-    kind: Literal["slip_ring"]
-    bore_mm: float = Field(ge=0)
-    outer_diameter_mm: float = Field(gt=0)
-    length_mm: float = Field(gt=0)
-    mass_g: float = Field(gt=0)
-    max_rpm: float | None = Field(default=None, gt=0)
-    circuits: str
-    price_usd: float | None = Field(default=None, gt=0)
-    # left out of the record where there is none, so that a ring with a bore keeps its digest
-    flange: Flange | None = Field(default=None, exclude_if=lambda value: value is None)
-    rotor: Rotor | None = Field(default=None, exclude_if=lambda value: value is None)
-
-    @model_validator(mode="after")
-    def _capsules_have_a_flange(self) -> SlipRing:
-        if self.bore_mm > 0:
-            return self
-        if self.flange is None or self.rotor is None:
-            raise ValueError("bore_mm = 0 is a capsule: tell its flange and rotor, or take a through bore (12.7 mm)")
-        if self.flange.circle_mm + self.flange.hole_mm > self.flange.diameter_mm:
-            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} leaves no edge around its holes")
-        if self.flange.circle_mm - self.flange.hole_mm < self.outer_diameter_mm:
-            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} puts its holes into outer_diameter_mm")
-        if self.flange.below_top_mm + self.flange.thickness_mm > self.length_mm:
-            raise ValueError(f"flange.below_top_mm {self.flange.below_top_mm:g} lies beyond length_mm")
-        if self.rotor.diameter_mm >= self.outer_diameter_mm:
-            raise ValueError(f"rotor.diameter_mm {self.rotor.diameter_mm:g} is not below outer_diameter_mm")
-        return self
-
-
-class Bearing(Product):
-    """A ball bearing, sealed on both sides."""
-
-    kind: Literal["bearing"]
-    bore_mm: float = Field(gt=0)
-    outer_mm: float = Field(gt=0)
-    width_mm: float = Field(gt=0)
-    mass_g: float = Field(gt=0)
-    static_load_n: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _rings_have_walls(self) -> Bearing:
-        if self.outer_mm < self.bore_mm + 8.0:
-            raise ValueError(f"outer_mm {self.outer_mm:g} leaves no ring around bore_mm {self.bore_mm:g}")
-        return self
-
-
-class Belt(Product):
-    """A closed toothed belt of one profile and width, in the lengths that shops keep."""
-
-    kind: Literal["belt"]
-    pitch_mm: float = Field(gt=0)
-    width_mm: float = Field(gt=0)
-    thickness_mm: float = Field(gt=0, description="with its teeth")
-    tooth_height_mm: float = Field(gt=0)
-    pitch_line_mm: float = Field(gt=0, description="from the tips of a pulley's teeth out to the belt's cords")
-    groove_radius_mm: float = Field(gt=0, description="of the pulley's groove")
-    teeth: tuple[int, ...] = Field(min_length=1, description="of the lengths in stock")
-    working_tension_n: float = Field(gt=0, description="that the teeth carry all their life")
-    stiffness_n: float = Field(gt=0, description="tension for a strain of 1")
-    mass_g: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _teeth_are_inside(self) -> Belt:
-        if self.tooth_height_mm >= self.thickness_mm or 2 * self.groove_radius_mm >= self.pitch_mm:
-            raise ValueError(f"tooth_height_mm {self.tooth_height_mm:g} or groove_radius_mm leaves no belt or no tooth")
-        return self
-
-
-class Multibeam(Product):
-    """A ready-made 3D lidar: layers at fixed elevations that turn about z, upright; azimuth 0 ahead, 90 to the left."""
-
-    kind: Literal["multibeam"]
-    elevations_deg: tuple[float, ...] = Field(min_length=2)
-    azimuth_deg: Pair
-    turn_rate_hz: float = Field(gt=0)
-    azimuth_step_deg: float = Field(gt=0, description="between two measurements of one layer at turn_rate_hz")
-    points_per_second: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _angles_rise(self) -> Multibeam:
-        if not (np.diff([-90.0, *self.elevations_deg, 90.0]) > 0).all():
-            raise ValueError("elevations_deg do not rise within -90 .. 90")
-        if not self.azimuth_step_deg <= self.azimuth_deg[1] - self.azimuth_deg[0] <= 360:
-            raise ValueError(f"azimuth_deg {list(self.azimuth_deg)} does not rise by azimuth_step_deg to 360")
-        return self
-
-
-class Printer(Product):
-    """How a part is made, and what that costs in millimetres."""
-
-    kind: Literal["printer"]
-    screw_clearance_mm: float = Field(ge=0, le=1)
-    fit_clearance_mm: float = Field(ge=0, le=1)
-    min_wall_mm: float = Field(gt=0)
-    bed_mm: Triple
-    density_g_cm3: float = Field(gt=0)
-    modulus_gpa: float = Field(gt=0, description="of elasticity, printed solid")
-    thread: Literal["cut", "insert", "nut"] = Field(
-        default="cut", description="what screws that end in a part hold on to"
-    )
-
 
 P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Belt, Printer, Multibeam)
 KINDS: dict[str, type[Product]] = {
@@ -372,20 +141,6 @@ def load_product(path: Path) -> Product:
         raise TaskError(explain(error, path, KINDS[kind])) from error
     product._provenance.update(provenance)
     return product
-
-
-def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The table of a TOML file.
-
-    Raises:
-        TaskError: the file cannot be read or is not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
-    except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
-        raise TaskError(f"{path}: not a TOML file: {error}") from error
 
 
 @cache

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from design.concurrency.parallel import in_chunks
 from design.frames import Array
-from design.parallel import in_chunks
 
 MOST_ROWS = 1440
 CELLS_PER_BALL = 3  # rows and cells across a ball radius: fewer test too many beams, more jump too often

@@ -64,6 +64,17 @@ def polar_of_planes(bearings_rad: Array, planes_rad: Array) -> Array:
     return np.arctan2(np.hypot(x, y), z)
 
 
+def line_spacing(beams: Array, plane_rad: ArrayLike) -> float:
+    """Widest distance between neighbouring lines of one family, across them, as a share of the axis step.
+
+    Args:
+        beams: in the rotation frame, shape (n, 3).
+        plane_rad: (alpha_laser, beta_laser) of the scan plane.
+    """
+    normal = frames.R_rot_laser(*np.asarray(plane_rad, dtype=float))[:, 2]
+    return float(np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal).max())
+
+
 def polar_and_azimuth(directions: Array) -> tuple[Array, Array]:
     """Angle from z and angle about z of unit vectors, (n, 3) -> (n,), (n,) [rad]; accurate close to the poles."""
     x, y, z = directions.T

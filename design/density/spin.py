@@ -7,7 +7,7 @@ of radius rho within the azimuth half-width `delta_b`,
     cos(rho) = cos(t) cos(t_b) + sin(t) sin(t_b) cos(delta_b),
 
 so it adds as many counts at azimuth p as lines lie in [p - p_b - delta_b, p - p_b + delta_b], and
-`count * delta_b / pi` in the mean over the start phase of the turn (design.md, Definitions).
+`count * delta_b / pi` in the mean over the start phase of the turn (docs/definitions.md, Density).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from design.concurrency.parallel import in_chunks
 from design.density.beams import Lines
 from design.frames import Array
-from design.parallel import in_chunks
 
 TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
 from design.density.spin import TIE, Zones, half_width
 from design.frames import Array
 from design.motion import Sweep
-from design.parallel import in_chunks
 
 
 @dataclass(frozen=True, slots=True)

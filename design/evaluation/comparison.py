@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from design.angles import STANDARD_DEG
-from design.catalogue.catalogue import Multibeam, SlipRing
+from design.catalogue.products import Multibeam, SlipRing
 from design.density.ball_count import ball_count
 from design.density.beams import Lines
 from design.evaluation.coverage import coverage

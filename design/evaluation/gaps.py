@@ -12,15 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from design.density.beams import Lines, beam_directions_rot, polar_and_azimuth
-from design.density.spin import zones
-from design.errors import TaskError
+from design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
 from design.frames import Array, R_rot_laser, R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.quadrature import rule_of
 from design.sphere.directions import weighted_samples
 
-MOST_LINES = 200_000
 SWEPT_DIRECTIONS = 20_000
 
 
@@ -65,7 +62,6 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
     u = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     beams = problem.beams_rot(angles_rad[2:])
     normal = R_rot_laser(angles_rad[2], angles_rad[3])[:, 2]
-    across = np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal)
     polar_rad, weights, families = (_around if problem.sweep is None else _within_limits)(problem, angles_rad)
     seen = families.any(axis=0)
     twice = families.all(axis=0)
@@ -76,7 +72,7 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
     misses = np.where(twice, 0.5 - apart / (2 * np.pi), 0.5) * seen
     return Gaps(
         blind_cones=_blind_cones(u, polar_and_azimuth(beams)[0]),
-        line_gap_deg=float(np.degrees(problem.lines.step_rad * across.max())),
+        line_gap_deg=float(np.degrees(problem.lines.step_rad * line_spacing(beams, angles_rad[2:]))),
         seen_twice=weight_twice / total,
         crossing_deg=float(np.degrees(weights @ (crossing * twice) / weight_twice)) if weight_twice > 0 else None,
         half_turn_misses=float(weights @ misses / total) if problem.sweep is None else None,
@@ -92,43 +88,6 @@ def empty_cap(scan: Array) -> BlindCone:
     widest = int(planes[:, 3].argmax())
     x, y, z = (float(value) + 0.0 for value in planes[widest, :3])
     return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
-
-
-def shortest_period_s(
-    problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int, nodes: int = NODES
-) -> float:
-    """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
-
-    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats. The region is looked at
-    on `nodes` circles about the axis: with fewer a thin spot between two of them may go unseen.
-
-    Raises:
-        TaskError: the region holds directions that no period brings that many beams to.
-    """
-    if least < 1:
-        raise TaskError(f"density {least}: ask for at least 1 beam per ball")
-    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, nodes)
-    polar_rad = rule.polar_rad[rule.fine > 0]
-
-    def enough(count: int) -> bool:
-        lines = Lines(count, 2 * np.pi / count)
-        flat = np.zeros(count * len(problem.bearings_rad) + 1)
-        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, flat)
-        return bool(found.least.min() >= least)
-
-    upper = 1
-    while not enough(upper):
-        upper *= 2
-        if upper > MOST_LINES:
-            raise TaskError(
-                f"density {least} per ball: not reached with {MOST_LINES} lines; part of the region is blind: "
-                "make it smaller, mask it, or take other angles"
-            )
-    lower = upper // 2
-    while upper - lower > 1:
-        middle = (upper + lower) // 2
-        lower, upper = (lower, middle) if enough(middle) else (middle, upper)
-    return upper / scan_rate_hz
 
 
 def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.catalogue.catalogue import Lidar
+from design.catalogue.products import Lidar
 from design.density.beams import scan_at
 from design.errors import TaskError
 from design.frames import Array

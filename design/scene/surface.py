@@ -9,7 +9,6 @@ import numpy as np
 
 from design.errors import TaskError
 from design.frames import Array, Rx, Ry, Rz
-from design.task.shapes import Placed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,25 +47,37 @@ def cell_directions(step_deg: float) -> Array:
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
 
 
-def surface_of(placed: Placed, folder: Path) -> Surface:
+def cast_surface(
+    path: Path,
+    unit_m: float,
+    sensor_m: tuple[float, float, float],
+    rpy_deg: tuple[float, float, float],
+    step_deg: float,
+) -> Surface:
     """Cast a ray at every cell.
+
+    Args:
+        path: of the mesh.
+        unit_m: length of one unit of the file.
+        sensor_m: the optical centre in the mesh.
+        rpy_deg: the axes of the world in the mesh: roll, pitch, yaw, the last about z.
+        step_deg: between the rays.
 
     Raises:
         TaskError: the mesh cannot be read, or is hit nowhere.
     """
     from design.scene.ray_caster import cast, load_scene  # loads the ray caster
 
-    directions = cell_directions(placed.step_deg)
-    roll, pitch, yaw = np.radians(placed.rpy_deg)
+    directions = cell_directions(step_deg)
+    roll, pitch, yaw = np.radians(rpy_deg)
     R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
-    path = folder / placed.file
     rays = directions.reshape(-1, 3) @ R_mesh_world.T
-    hits = cast(load_scene(path, placed.unit_m), np.array(placed.sensor_m), rays)
+    hits = cast(load_scene(path, unit_m), np.array(sensor_m), rays)
     if not np.isfinite(hits.range_m).any():
-        raise TaskError(f"{path}: sensor_m = {list(placed.sensor_m)}: no ray from there hits the mesh; unit_m right?")
+        raise TaskError(f"{path}: sensor_m = {list(sensor_m)}: no ray from there hits the mesh; unit_m right?")
     shape = directions.shape[:2]
     far = np.where(np.isfinite(hits.range_m), hits.range_m, 0.0)
-    points = np.array(placed.sensor_m) + far[:, None] * rays
+    points = np.array(sensor_m) + far[:, None] * rays
     return Surface(
         directions, hits.range_m.reshape(shape), hits.incidence_rad.reshape(shape), points.reshape(*shape, 3)
     )

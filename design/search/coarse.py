@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
 from design.density.spin import mean_count, zones
 from design.errors import TaskError
@@ -21,7 +22,6 @@ from design.frames import Array
 from design.objective.objectives import Objective
 from design.objective.problem import Problem
 from design.objective.quadrature import MANY_EDGES
-from design.parallel import in_chunks
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import BothWays, both_ways, gathered, lowest
 from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples

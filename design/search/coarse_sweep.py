@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot
 from design.density.sweep import mean_count_swept, zones_swept
 from design.errors import TaskError
 from design.frames import Array, R_world_rot
 from design.objective.objectives import Moment
 from design.objective.problem import Problem
-from design.parallel import in_chunks
 from design.search.coarse import MARGIN, Landscape, Progress
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import BothWays, lowest, one_way

@@ -1,7 +1,7 @@
 """Grid settings of the four angles, folded to the few that differ.
 
-The four angles act through two things only (design.md, Definitions): which polar angles the beams sweep, decided by
-the third row q of `R_rot_laser`, and where the axis u points. And with the same J for it,
+The four angles act through two things only (docs/definitions.md, Motion): which polar angles the beams sweep, decided
+by the third row q of `R_rot_laser`, and where the axis u points. And with the same J for it,
 
     (q0, q1) about u is (-q0, -q1) about -u       for any fan
     (q0, q1) about u is (q0, -q1) about u         for a symmetric fan

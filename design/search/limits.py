@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.density.beams import beam_directions_rot, polar_of_planes
+from design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
 from design.errors import TaskError
-from design.frames import Array, R_rot_laser
+from design.frames import Array
 from design.objective.problem import Problem
 from design.objective.score import Score
 from design.search.grid_classes import Folded, Mask
@@ -65,12 +65,8 @@ def blind_cones_deg(problem: Problem, planes_rad: Array) -> Array:
 
 def line_gaps_deg(problem: Problem, planes_rad: Array) -> Array:
     """Widest distance between neighbouring scan lines of one family, across them, of scan planes (n, 2), shape (n,)."""
-    gaps = []
-    for plane in planes_rad:
-        beams = beam_directions_rot(problem.bearings_rad, *plane)
-        normal = R_rot_laser(*plane)[:, 2]
-        gaps.append(np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal).max())
-    return np.degrees(problem.lines.step_rad * np.array(gaps))
+    spacings = [line_spacing(beam_directions_rot(problem.bearings_rad, *plane), plane) for plane in planes_rad]
+    return np.degrees(problem.lines.step_rad * np.array(spacings))
 
 
 def _only(planes: Folded, keep: Mask) -> Folded:

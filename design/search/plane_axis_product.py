@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from design.concurrency.parallel import in_chunks
 from design.frames import Array
 from design.objective.objectives import Moment, Objective
-from design.parallel import in_chunks
 from design.search.grid_classes import Mask
 
 PIECE = 128  # planes per piece of the product

@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from design.density.beams import Lines
+from design.density.spin import zones
 from design.errors import TaskError
-from design.evaluation.gaps import shortest_period_s
+from design.frames import Array
 from design.motion import Shortest, Spin
-from design.objective.problem import Problem, problem_of
+from design.objective.problem import NODES, Problem, problem_of
+from design.objective.quadrature import rule_of
 from design.objective.score import score
 from design.search.coarse import Progress
 from design.search.families import Family
@@ -17,6 +20,7 @@ from design.search.limits import line_gaps_deg
 from design.search.search import SearchResult, search
 from design.task.task import LoadedTask
 
+MOST_LINES = 200_000
 ROUNDS = 6  # the best settings of a slow turn are seldom those of a fast one: search again at the period found
 
 
@@ -52,6 +56,43 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
         except TaskError:  # none of the families of this period is the one that allows it: that one stays
             break
     return now, problem, result
+
+
+def shortest_period_s(
+    problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int, nodes: int = NODES
+) -> float:
+    """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
+
+    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats. The region is looked at
+    on `nodes` circles about the axis: with fewer a thin spot between two of them may go unseen.
+
+    Raises:
+        TaskError: the region holds directions that no period brings that many beams to.
+    """
+    if least < 1:
+        raise TaskError(f"density {least}: ask for at least 1 beam per ball")
+    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, nodes)
+    polar_rad = rule.polar_rad[rule.fine > 0]
+
+    def enough(count: int) -> bool:
+        lines = Lines(count, 2 * np.pi / count)
+        flat = np.zeros(count * len(problem.bearings_rad) + 1)
+        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, flat)
+        return bool(found.least.min() >= least)
+
+    upper = 1
+    while not enough(upper):
+        upper *= 2
+        if upper > MOST_LINES:
+            raise TaskError(
+                f"density {least} per ball: not reached with {MOST_LINES} lines; part of the region is blind: "
+                "make it smaller, mask it, or take other angles"
+            )
+    lower = upper // 2
+    while upper - lower > 1:
+        middle = (upper + lower) // 2
+        lower, upper = (lower, middle) if enough(middle) else (middle, upper)
+    return upper / scan_rate_hz
 
 
 def _at(loaded: LoadedTask, period_s: float) -> LoadedTask:

@@ -8,6 +8,7 @@ the work ends when no bound is below the best J found: what is left cannot win.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -21,12 +22,34 @@ from design.objective.score import Score, score
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.grid_classes import mirrors_of
-from design.shadow import AXIS_STEPS, Refused, Shadow, Workshop
+from design.shadow import AXIS_STEPS, Shadow
 from design.sphere.directions import sample_set
 from design.task.task import NAMES, AngleRanges, Limits
 
 SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
 MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A setting that cannot be built, and why."""
+
+    reason: str
+
+
+class Workshop(Protocol):
+    """Whoever knows the parts: `cad.assembly.shadow`, passed in, for `design` never imports `cad`.
+
+    Settings are (alpha_rot, beta_rot, alpha_laser, beta_laser) in radians.
+    """
+
+    def bound(self, setting_rad: Array) -> Shadow | Refused:
+        """What the parts hide at least, in closed form: `stator` is None, all of it holds at every axis angle."""
+        ...
+
+    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+        """What the parts hide, from the parts themselves."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +163,7 @@ def score_with(problem: Problem, angles_rad: Array, shadow: Shadow) -> Score:
 def equivalents(
     problem: Problem, angles_deg: tuple[float, float, float, float], ranges: AngleRanges
 ) -> list[tuple[float, float, float, float]]:
-    """The setting and those of equal J that the ranges of the task hold, itself first (design.md, Definitions)."""
+    """The setting and those of equal J that the ranges of the task hold, itself first (docs/definitions.md, Motion)."""
     a, b, c, d = angles_deg
     if problem.sweep is not None:
         return [angles_deg]

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from design.concurrency.parallel import in_chunks
 from design.frames import Array
-from design.parallel import in_chunks
 from design.scene.surface import Surface
 from design.task.shapes import All, Band, Box, Cone, Map, MaskRegion, Region
 from design.task.task import LoadedTask

@@ -8,9 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from design.catalogue.catalogue import read_toml
 from design.errors import TaskError
-from design.record import Record, explain
+from design.record import Record, explain, read_toml
 
 R = TypeVar("R", bound=Record)
 

@@ -17,14 +17,15 @@ from pydantic import Field, field_validator, model_validator
 
 from design.angles import AngleSet
 from design.camera import Camera
-from design.catalogue.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
+from design.catalogue.catalogue import Catalogue, load_catalogue
+from design.catalogue.products import Lidar, Printer, Servo, SlipRing
+from design.deck_holes import DeckHoles
 from design.errors import TaskError
 from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record
 from design.scanner import Scanner, scanner_of
-from design.scene.surface import Surface, surface_of
-from design.task.deck_holes import DeckHoles
+from design.scene.surface import Surface, cast_surface
 from design.task.named_record import named_record, names_in, valid_record
 from design.task.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
 
@@ -68,7 +69,7 @@ class AngleRanges(Record):
 
 
 class DensityRules(Record):
-    """How density is counted and judged; see `design.md`, Definitions."""
+    """How density is counted and judged; see `docs/definitions.md`, Density and Objective."""
 
     ball_radius_deg: Number = Field(default=2.0, ge=0.01, le=90)
     objective: Literal["log", "kl", "required", "homogeneity", "worst"] = "log"
@@ -219,7 +220,7 @@ def _load(task: Task, source: Path) -> LoadedTask:
         )
     regions = [*task.weight, *task.mask]
     maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, Map | Mesh))
-    surface = None if task.scene is None else surface_of(task.scene, source.parent)
+    surface = None if task.scene is None else _surface(task.scene, source.parent)
     return LoadedTask(task=task, source=source, products=products, maps=maps, surface=surface)
 
 
@@ -258,11 +259,15 @@ def check_products(task: Task, products: Catalogue, source: Path) -> None:
         raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
 
 
+def _surface(placed: Placed, folder: Path) -> Surface:
+    return cast_surface(folder / placed.file, placed.unit_m, placed.sensor_m, placed.rpy_deg, placed.step_deg)
+
+
 def _table(region: Map | Mesh, folder: Path) -> Array:
     """Weights of a map, or 1 where a mesh is hit and 0 where not."""
     if isinstance(region, Map):
         return _read_map(folder / region.file)
-    return np.isfinite(surface_of(region, folder).range_m).astype(float)
+    return np.isfinite(_surface(region, folder).range_m).astype(float)
 
 
 def _read_map(path: Path) -> Array:

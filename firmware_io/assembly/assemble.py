@@ -26,7 +26,7 @@ from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.assembly.turns import turn_starts
-from firmware_io.clouds.point_file import PlyWriter
+from firmware_io.clouds.ply import PlyWriter
 from firmware_io.recording.recording import Recording, open_recording
 from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
 

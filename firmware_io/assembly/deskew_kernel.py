@@ -17,9 +17,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from design.angles import AngleSet
+from design.concurrency.parallel import in_chunks
 from design.errors import RecordingError
 from design.frames import Array
-from design.parallel import in_chunks
 from firmware_io.assembly.beam_outcome import Bytes, Verdict
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import PosePieces, Trajectory, at_rest

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from design.errors import RecordingError
-from firmware_io.files import foreign
+from design.shadow import load_own_body
 from firmware_io.samples import Floats
 
 FILE_NAME = "own_body.npz"
@@ -67,28 +65,14 @@ class OwnBody:
 
 
 def own_body_beside(angles: Path) -> OwnBody | None:
-    """The mask in the folder of an angle set; None where there is none."""
-    path = angles.parent / FILE_NAME
-    return load_own_body(path) if path.is_file() else None
-
-
-def load_own_body(path: Path) -> OwnBody:
-    """Read `own_body.npz`.
+    """The mask in the folder of an angle set; None where there is none.
 
     Raises:
-        RecordingError: the file is missing, damaged, or its arrays do not fit each other.
+        BuildError: it is not as a build writes it.
     """
-    if path.is_file() and not zipfile.is_zipfile(path):
-        raise RecordingError(f"{path}: damaged, or no own-body mask at all; `scanwright build` writes one")
-    with foreign(f"{path}: cannot read the own-body mask", np.load, path) as arrays:
-        missing = sorted({"beams", "bearing_rad"} - set(arrays))
-        if missing:
-            raise RecordingError(f"{path}: no array '{missing[0]}'; `scanwright build` writes {FILE_NAME}")
-        bearing_rad, beams = np.asarray(arrays["bearing_rad"], float), np.asarray(arrays["beams"], bool)
-        stator = np.asarray(arrays["stator"], bool) if "stator" in arrays else np.zeros((beams.size, 0), bool)
-    if bearing_rad.ndim != 1 or bearing_rad.size < 2 or not np.all(np.diff(bearing_rad) > 0):
-        raise RecordingError(f"{path}: bearing_rad = shape {bearing_rad.shape}: two or more increasing bearings")
-    if beams.shape != bearing_rad.shape or stator.ndim != 2 or stator.shape[0] != beams.size:
-        shapes = f"beams {beams.shape}, stator {stator.shape}"
-        raise RecordingError(f"{path}: {shapes}: one row for each of {bearing_rad.size} bearings")
-    return OwnBody(bearing_rad, beams, stator)
+    path = angles.parent / FILE_NAME
+    if not path.is_file():
+        return None
+    shadow, bearing_rad = load_own_body(path)
+    stator = np.zeros((bearing_rad.size, 0), bool) if shadow.stator is None else shadow.stator
+    return OwnBody(bearing_rad, shadow.beams, stator)

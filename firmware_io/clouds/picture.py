@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from design import frames
 from design.errors import RecordingError
-from firmware_io.clouds.point_file import read_ply
+from firmware_io.clouds.ply import read_ply
 from firmware_io.files import whole_file
 from firmware_io.samples import Floats
 

@@ -25,7 +25,7 @@ from design.camera import Camera
 from design.errors import TaskError
 from design.task.task import LoadedTask
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.clouds.point_file import PlyWriter, ply_comments, read_ply
+from firmware_io.clouds.ply import PlyWriter, ply_comments, read_ply
 from firmware_io.colour.camera_views import View, opened, views_of
 from firmware_io.recording.recording import Recording, open_recording
 from firmware_io.samples import Floats, Times

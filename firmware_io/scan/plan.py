@@ -7,7 +7,8 @@ from datetime import datetime
 from pathlib import Path
 
 from design.angles import AngleSet, load_angles
-from design.catalogue.catalogue import Servo, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
 from design.motion import Motion, Spin
 from firmware_io.lidar.scip.parameters import StampAt

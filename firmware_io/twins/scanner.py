@@ -12,7 +12,8 @@ import numpy as np
 
 from design import frames
 from design.angles import AngleSet
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.errors import SceneError
 from design.scene.ray_caster import Scene, cast, load_scene, scene_of
 from firmware_io.ports import Ports

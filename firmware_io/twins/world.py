@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from design.angles import AngleSet
-from design.catalogue.catalogue import Lidar
+from design.catalogue.products import Lidar
 from design.frames import Array
 from design.scene.ray_caster import Hits, Scene, cast
 from firmware_io.samples import Floats, Times

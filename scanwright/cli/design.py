@@ -59,7 +59,7 @@ def evaluate(
     loaded, angles_deg = api.load_task(task), angles_in(angles)
     found = api.evaluate(loaded, angles_deg, pole=pole, lever=lever, say=say)
     if cloud is not None:
-        from firmware_io.clouds.point_file import write_points
+        from firmware_io.clouds.ply import write_points
 
         beams = found.beam_directions()
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])

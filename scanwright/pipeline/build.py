@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from design.second_process import second_process
+from design.concurrency.second_process import second_process
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest

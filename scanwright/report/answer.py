@@ -167,12 +167,6 @@ def _view(problem: Problem, setting: Array, found: Score) -> View:
     )
 
 
-def load_own_body(path: Path) -> tuple[Shadow, Array]:
-    """What the parts hide and the bearings of the beams [rad], from `own_body.npz`."""
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-        return Shadow(arrays["beams"], arrays["stator"]), arrays["bearing_rad"]
-
-
 def hidden_by(shadow: Shadow) -> Hidden:
     """The counts of a shadow."""
     share = shadow.hidden()

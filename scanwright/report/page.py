@@ -18,9 +18,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 from design.angles import AngleSet, load_angles
 from design.errors import BuildError
 from design.frames import Array
+from design.shadow import load_own_body
 from design.task.task import load_task
 from scanwright.pipeline.manifest import MANIFEST, enter
-from scanwright.report.answer import OFF_DEG, as_built, hidden_by, load_own_body, sight_of
+from scanwright.report.answer import OFF_DEG, as_built, hidden_by, sight_of
 from scanwright.report.pictures import AXIS, PLANE, landscape
 from scanwright.report.scene import LARGEST_BYTES, bodies_of, scene_of
 from scanwright.report.sphere import sphere_of

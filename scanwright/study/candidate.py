@@ -13,18 +13,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from design.catalogue.catalogue import Catalogue, SlipRing
+from design.catalogue.catalogue import Catalogue
+from design.catalogue.products import SlipRing
 from design.errors import ScanwrightError, TaskError
 from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps, shortest_period_s
+from design.evaluation.gaps import gaps
 from design.frames import Array
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
 from design.scanner import Scanner, scanner_of
 from design.search.families import Family
 from design.search.optimum import Optimum, angle_set, optimum_of
-from design.search.with_parts import choose
-from design.shadow import Refused, Workshop
+from design.search.shortest_period import shortest_period_s
+from design.search.with_parts import Refused, Workshop, choose
 from design.task.task import LoadedTask, Task
 from scanwright.study.answer.columns import tidy
 from scanwright.study.runner.store import Result

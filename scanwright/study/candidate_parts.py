@@ -11,7 +11,8 @@ from cad.kernel import require_kernel
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
-from design.shadow import Refused, Shadow
+from design.search.with_parts import Refused
+from design.shadow import Shadow
 from design.task.task import LoadedTask
 from scanwright.study.candidate import PartFacts, judged
 from scanwright.study.runner.store import Result

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from design.catalogue.catalogue import Catalogue, SlipRing
+from design.catalogue.catalogue import Catalogue
+from design.catalogue.products import SlipRing
 from design.errors import TaskError
 from design.motion import Spin, Sweep
 from design.record import explain

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from design.catalogue.catalogue import Catalogue, Lidar, Printer, Servo, SlipRing, load_catalogue
+from design.catalogue.catalogue import Catalogue, load_catalogue
+from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.errors import TaskError, suggest
 from design.motion import LONGEST_S
 from design.record import Record

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from cad.kernel import require_kernel
-from design.accuracy.trials import on_front, trials_picture, write_trials
+from design.accuracy.trials import best_trials, trials_picture, write_trials
 from design.search.optimum import optimum_of
 from design.task.task import LoadedTask
 from firmware_io.twins.dynamics import plant_of
@@ -32,8 +32,8 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
     write_trials(folder / "choices.csv", trials)
     trials_picture(folder / "choices.png", trials)
     lines = []
-    for trial in trials:
-        mark = "=" if trial.chosen else "*" if on_front(trial, trials) else " "
+    for trial, best in zip(trials, best_trials(trials), strict=True):
+        mark = "=" if trial.chosen else "*" if best else " "
         method = f"{trial.method}, {trial.setting}"
         price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
         lines.append(f"{mark} {trial.choice:26} {method:50} {price}")

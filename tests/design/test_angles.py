@@ -22,7 +22,7 @@ def angle_set(angles=(0, 0, 0, 0), **more):
 
 
 def full_table():
-    """The example of design.md, with every optional key in use."""
+    """Every optional key in use."""
     return {
         "schema": "scanwright/angles/1",
         "task": "ground_ahead",

@@ -5,7 +5,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import SHIPPED, Lidar, Printer, Product, Servo, SlipRing, load_catalogue, load_product
+from design.catalogue.catalogue import SHIPPED, load_catalogue, load_product
+from design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
 from design.errors import TaskError
 
 FILES = sorted(SHIPPED.glob("*.toml"))

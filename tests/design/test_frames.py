@@ -1,4 +1,4 @@
-"""Rotations obey the axioms of the group, and the chain says what design.md says."""
+"""Rotations obey the axioms of the group, and the chain says what docs/conventions.md says."""
 
 import numpy as np
 import pytest

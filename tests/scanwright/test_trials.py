@@ -6,7 +6,7 @@ from math import cos, pi
 import cadquery as cq
 import pytest
 
-from design.accuracy.trials import Trial, on_front
+from design.accuracy.trials import Trial, best_trials
 from firmware_io.twins.dynamics import plant_of
 from scanwright.trials import axis as axis
 from scanwright.trials import mesh as meshes
@@ -20,7 +20,7 @@ def trial(error, *seconds, choice="c"):
 def test_the_front_is_what_nothing_beats_within_one_choice():
     fast, near, slow, other = trial(1.0, 0.1), trial(0.1, 1.0), trial(1.0, 0.2), trial(0.01, 0.01, choice="d")
     everything = [fast, near, slow, other]
-    assert [on_front(t, everything) for t in everything] == [True, True, False, True]
+    assert best_trials(everything) == [True, True, False, True]
 
 
 @pytest.mark.parametrize("radius", [3.0, 40.0])

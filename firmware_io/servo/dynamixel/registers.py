@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from design.catalogue.catalogue import Servo as CatalogueServo
 from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo as CatalogueServo
 from design.errors import DeviceError
 
 RPM = 2 * math.pi / 60

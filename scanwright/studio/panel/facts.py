@@ -13,10 +13,10 @@ import numpy as np
 
 from design.angles import standard_settings
 from design.errors import TaskError
-from design.evaluation.gaps import shortest_period_s
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score, score, score_on
 from design.search.limits import blind_cones_deg, line_gaps_deg
+from design.search.shortest_period import shortest_period_s
 from design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design import frames
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.frames import Rx, Ry, Rz
 from design.scene.ray_caster import Scene, load_scene, scene_of
 from design.task.shapes import Placed

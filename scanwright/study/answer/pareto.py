@@ -1,4 +1,4 @@
-"""Who is beaten by whom: a row is dominated where another one is nowhere worse and somewhere better."""
+"""The front of a study: the rows that nothing beats, as they come."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from design.accuracy.front import dominators
 from design.frames import Array
 
 
@@ -29,7 +30,7 @@ class Front:
         """Show a row; whether it is on the front. Equal rows stand side by side, the same row but once."""
         if number in self.numbers or dominators(self.costs, cost).any():
             return False
-        stays = ~_beats(cost, self.costs)
+        stays = ~dominators(-self.costs, -cost)
         self.costs = np.vstack([self.costs[stays], cost])
         self.numbers = np.append(self.numbers[stays], number)
         return True
@@ -38,13 +39,3 @@ class Front:
         """The lowest number of a row that beats a cost, or the bound of one; None where none does."""
         beaten = dominators(self.costs, cost)
         return int(self.numbers[beaten].min()) if beaten.any() else None
-
-
-def dominators(costs: Array, cost: Array) -> Array:
-    """Which rows (n, columns) dominate one of shape (columns,): bool (n,)."""
-    return np.asarray((costs <= cost).all(axis=1) & (costs < cost).any(axis=1))
-
-
-def _beats(cost: Array, costs: Array) -> Array:
-    """Which rows one row dominates."""
-    return np.asarray((cost <= costs).all(axis=1) & (cost < costs).any(axis=1))

@@ -14,7 +14,8 @@ from cad.geometry.mesh import mesh_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
-from design.shadow import AXIS_STEPS, Refused, Shadow, Workshop, own_body_bytes
+from design.search.with_parts import Refused, Workshop
+from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 
 PITCHING = (-90, 0, 90, 0)
 

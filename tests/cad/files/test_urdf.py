@@ -10,7 +10,8 @@ from cad.files.parts import build_parts
 from cad.files.urdf import roll_pitch_yaw
 from cad.layout.deck import mount_offset_mm
 from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import Bearing, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Bearing
 from design.errors import BuildError
 from design.scanner import scanner_of
 

@@ -11,9 +11,9 @@ from cad.layout.direct_stack import stack_of
 from cad.parts.base_mount import base_mount, mount_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
+from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
 from design.scanner import scanner_of
-from design.task.deck_holes import Circle, Rectangle
 from design.task.task import load_task
 
 SCREW_HOLE = {"M3": 3.4, "M4": 4.4, "M5": 5.4, "M6": 6.4}  # with the 0.4 mm of fdm-0.4

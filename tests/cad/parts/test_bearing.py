@@ -19,7 +19,8 @@ from cad.layout.direct_stack import stack_of
 from cad.layout.loads import Weight, bearing_of, supported, waist_nm_per_rad
 from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
 from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import Bearing, Servo, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Bearing, Servo
 from design.errors import BuildError
 from design.scanner import scanner_of
 

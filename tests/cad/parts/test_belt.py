@@ -32,7 +32,8 @@ from cad.parts.bearing_tower import bearing_tower, tower_of
 from cad.screws import SCREWS
 from cad.solids import polygon, prism, upright
 from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import Servo, SlipRing, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo, SlipRing
 from design.errors import BuildError
 from design.scanner import scanner_of
 

@@ -22,7 +22,8 @@ from cad.parts.base_mount import base_mount, mount_of
 from cad.parts.sub_plate import ear_screws, sub_plate, sub_plate_of
 from cad.solids import box, building, checked
 from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import SlipRing, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import SlipRing
 from design.errors import BuildError
 from design.scanner import scanner_of
 from scanwright.studio.view.linkage_preview import draft_linkage

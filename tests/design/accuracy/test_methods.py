@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from design.accuracy.methods import METHODS, Point, by_ball_count, by_ball_search, on_front, reference
+from design.accuracy.methods import METHODS, Point, best_points, by_ball_count, by_ball_search, reference
 from design.accuracy.stress import stress_rows
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import zones
@@ -79,7 +79,7 @@ def point(seconds, error):
 
 def test_the_front_keeps_what_nothing_beats():
     points = [point(1, 1e-3), point(2, 1e-5), point(3, 1e-4), point(4, 1e-9), point(9, 1e-12), point(0.5, np.nan)]
-    assert on_front(points, 1e-8) == [True, True, False, True, False, False]
+    assert best_points(points, 1e-8) == [True, True, False, True, False, False]
 
 
 def test_the_stress_command_writes_its_table(tmp_path, monkeypatch, capsys):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.density.beams import Lines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
 from design.density.spin import ball_search, count_at, mean_count, zones
 from design.frames import R_world_rot

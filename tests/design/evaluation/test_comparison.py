@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import Multibeam, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Multibeam
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import ball_search, count_at
 from design.errors import BuildError

@@ -10,9 +10,10 @@ from scipy.spatial import ConvexHull
 from design.density.ball_count import ball_count
 from design.density.beams import Lines, beam_directions_rot, scan_lines, simulated_scan
 from design.errors import TaskError
-from design.evaluation.gaps import gaps, interlaced_period_s, shortest_period_s
+from design.evaluation.gaps import gaps, interlaced_period_s
 from design.frames import R_world_rot
 from design.objective.problem import problem_of
+from design.search.shortest_period import shortest_period_s
 from design.sphere.directions import spiral
 from design.task.task import load_task
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density.spin import zones
 from design.errors import TaskError

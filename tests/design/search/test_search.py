@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design import parallel
 from design.catalogue.catalogue import load_catalogue
+from design.concurrency import parallel
 from design.frames import R_world_rot
 from design.objective.problem import problem_of
 from design.objective.score import quick_J, score

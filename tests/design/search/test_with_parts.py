@@ -14,8 +14,8 @@ from design.objective.ball_search import start_phases
 from design.objective.problem import problem_of
 from design.objective.score import score
 from design.search.families import Family
-from design.search.with_parts import choose, equivalents, score_with
-from design.shadow import AXIS_STEPS, Refused, Shadow
+from design.search.with_parts import Refused, choose, equivalents, score_with
+from design.shadow import AXIS_STEPS, Shadow
 from design.sphere.directions import weighted_samples
 from design.task.task import AngleRanges, Limits, LoadedTask, Task
 

@@ -8,7 +8,7 @@ from matplotlib.image import imread
 from design.errors import RecordingError
 from firmware_io.assembly.assemble import cloud_fields
 from firmware_io.clouds.picture import cloud_picture
-from firmware_io.clouds.point_file import PlyWriter, read_ply
+from firmware_io.clouds.ply import PlyWriter, read_ply
 
 FIELDS = cloud_fields(has_intensity=True)
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, START_NS, Setup, Simulated, Truth, cast, simulate, write
 from design.camera import Camera
-from firmware_io.clouds.point_file import read_ply
+from firmware_io.clouds.ply import read_ply
 
 SETUP = Setup(beams=216, sweeps=((50.0, 360.0),), noise_m=0.01)
 SIZE = (400, 300)

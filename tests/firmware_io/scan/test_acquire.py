@@ -23,7 +23,7 @@ from design.errors import DeviceError, DeviceFaultError
 from design.motion import Spin, StopAndGo, Sweep
 from design.scene.ray_caster import cast
 from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.clouds.point_file import read_ply
+from firmware_io.clouds.ply import read_ply
 from firmware_io.recording.recording import open_recording
 from firmware_io.recording.repair import repair
 from firmware_io.samples import JointLog

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from design.catalogue.catalogue import Servo as CatalogueServo
 from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo as CatalogueServo
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo import guard
 from firmware_io.servo.dynamixel import bus as servo_bus

@@ -10,8 +10,8 @@ from hokuyolx import HokuyoLX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.catalogue.catalogue import Lidar as CatalogueLidar
 from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar as CatalogueLidar
 from design.errors import DeviceError
 from firmware_io.lidar.scip import protocol
 from firmware_io.twins.lidar import LidarTwin

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from design import frames
 from design.angles import STANDARD_DEG, AngleSet
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.errors import DeviceError
 from design.scene.ray_caster import Hits, cast, scene_of
 from firmware_io.assembly.deskew import place

@@ -11,12 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
+from design.accuracy.front import dominators
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.task.task import load_task
 from scanwright.study import session as sessions
 from scanwright.study.answer.columns import COLUMNS, costs
-from scanwright.study.answer.pareto import Front, dominators
+from scanwright.study.answer.pareto import Front
 from scanwright.study.answer.tables import FIELDS, write_tables
 from scanwright.study.candidate import bounds_of, digest, search_record, winner_task
 from scanwright.study.crossing import Crossing, _with_period

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from design import second_process as beside
 from design.angles import load_angles
+from design.concurrency import second_process as beside
+from design.concurrency.second_process import in_turn, second_process
 from design.errors import BuildError, TaskError
-from design.second_process import in_turn, second_process
 
 
 @pytest.mark.parametrize("cores", [1, 2])

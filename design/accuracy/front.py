@@ -1,0 +1,17 @@
+"""Who is beaten by whom: a row is dominated where another one is nowhere worse and somewhere better."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from design.frames import Array
+
+
+def dominators(costs: Array, cost: Array) -> Array:
+    """Which rows (n, columns) dominate one of shape (columns,), lower being better: bool (n,)."""
+    return np.asarray((costs <= cost).all(axis=1) & (costs < cost).any(axis=1))
+
+
+def undominated(costs: Array) -> Array:
+    """Which of the rows (n, columns) are dominated by none: bool (n,)."""
+    return np.array([not dominators(costs, cost).any() for cost in costs], dtype=bool)
