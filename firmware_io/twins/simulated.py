@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from design.angles import AngleSet
-from design.catalogue.catalogue import Lidar, load_catalogue
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.errors import DeviceError
 from design.motion import Motion, Spin, Sweep
 from design.scene.ray_caster import Scene
