@@ -2,6 +2,8 @@
 
 Every cell is a hexahedron of 20 nodes, its stiffness the sum over those of its small cubes that are inside the body
 (Parvizian, Duester, Rank 2007); a surface that cannot move is held by springs. Millimetres, newtons, MPa.
+
+Not scikit-fem 12: it sums over 1728 points for every cell, 3.1 s for 8 cells, where all 986 take 0.5 s here.
 """
 
 from __future__ import annotations
