@@ -95,8 +95,9 @@ def optimise(task: TaskLike, *, say: Say = _quiet) -> Optimum:
     Example:
         >>> import scanwright as sw
         >>> optimum = sw.optimise("ceiling")
-        >>> optimum.search.best[0].angles_deg  # alpha_rot, beta_rot, alpha_laser, beta_laser
-        (180.0, 0.0, -45.0, -35.0)
+        >>> alpha_rot, beta_rot, alpha_laser, beta_laser = optimum.search.best[0].angles_deg
+        >>> alpha_rot, beta_rot  # this task fixes them: it hangs upside down
+        (180.0, 0.0)
     """
     from design.search.optimum import optimum_of
 

@@ -1,0 +1,127 @@
+"""The Python interface: what a notebook does, and what importing it costs."""
+
+import doctest
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import scanwright as sw
+from design.errors import RecordingError, TaskError
+from scanwright import api
+
+TASK = {
+    "name": "ahead",
+    "sensor": "URG-04LX",
+    "servo": "AX-12A",
+    "motion": {"mode": "sweep", "limits_deg": [-90, 90], "period_s": 4.0, "accel_deg_s2": 400.0},
+    "angles": {"alpha_rot_deg": 0, "beta_rot_deg": 0, "alpha_laser_deg": 0, "beta_laser_deg": -60},
+    "density": {"ball_radius_deg": 3.0, "tolerance": 0.01},
+    "weight": [{"shape": "band", "theta_deg": [45, 135]}],
+}
+
+
+def loaded_after(code):
+    told = subprocess.run(
+        [sys.executable, "-c", f"{code}; import sys; print(*sys.modules)"], capture_output=True, text=True
+    )
+    assert told.returncode == 0, told.stderr
+    return set(told.stdout.split())
+
+
+def test_importing_scanwright_loads_nothing_heavy():
+    assert not loaded_after("import scanwright") & {"numpy", "scipy", "numba", "cadquery", "matplotlib", "pydantic"}
+
+
+def test_loading_a_task_loads_neither_kernel_nor_compiler_nor_pictures():
+    loaded = loaded_after("import scanwright as sw; sw.load_task('ceiling')")
+    assert not loaded & {"cadquery", "OCP", "scipy.spatial", "numba", "matplotlib", "trimesh"}
+
+
+def test_every_public_name_is_a_documented_function_and_no_other_is_there():
+    assert set(sw.__all__) == set(api.__all__)
+    for name in sw.__all__:
+        assert getattr(sw, name) is getattr(api, name)
+        assert callable(getattr(sw, name))
+        assert getattr(sw, name).__doc__, name
+    assert set(sw.__all__) <= set(dir(sw))
+    with pytest.raises(AttributeError, match="no attribute 'optimize'"):
+        _ = sw.optimize
+
+
+def test_the_examples_of_the_docstrings_run():
+    assert doctest.testmod(api).failed == 0
+
+
+def test_a_notebook_goes_from_a_table_to_arrays_without_a_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    angles = sw.optimise(TASK).angle_set()
+    figure = sw.draw_density(TASK, {"the only setting": (0, 0, 0, -60)})
+    recorded = sw.simulate(angles, noise_mm=0.0)
+    assert len(figure.axes) == 2  # the map and its bar
+    assert recorded.range_m.shape == recorded.bearing_rad.shape == recorded.joint_rad.shape == (40, 682)
+    # each beam through the frames by hand: nothing of the furnished room lies outside of its walls
+    T = angles.T_world_laser(recorded.joint_rad.ravel())
+    beams = np.stack([np.cos(recorded.bearing_rad), np.sin(recorded.bearing_rad)], axis=-1).reshape(-1, 2)
+    points = recorded.range_m.ravel()[:, None] * np.einsum("nij,nj->ni", T[:, :3, :2], beams) + T[:, :3, 3]
+    seen = np.isfinite(points).all(axis=1)
+    assert seen.mean() > 0.5
+    low, high = points[seen].min(axis=0), points[seen].max(axis=0)
+    assert (low > [-3.202, -2.402, -0.902]).all()
+    assert (high < [4.002, 3.202, 1.902]).all()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_linkage_comes_as_a_shape_of_cadquery():
+    import cadquery as cq
+
+    parts = sw.make_parts(TASK, sw.optimise(TASK).angle_set())
+    linkage = parts.made["alignment_linkage"]
+    assert isinstance(linkage, cq.Solid)
+    assert linkage.isValid()
+    assert 20e3 < linkage.Volume() < 200e3  # mm3
+
+
+def test_a_recording_comes_as_arrays(tmp_path):
+    from firmware_io.recording.recording import RecordingWriter
+    from firmware_io.samples import Scan
+
+    start_ns = 1_700_000_000_000_000_000
+    with RecordingWriter(tmp_path / "two.mcap", {}) as writer:
+        for k, beams in enumerate((3, 5)):
+            writer.joint(start_ns + k * 25_000_000, 0.1 * k)
+            writer.scan(
+                Scan(
+                    stamp_ns=start_ns + k * 25_000_000,
+                    angle_min_rad=-0.5,
+                    angle_increment_rad=0.25,
+                    time_increment_s=1e-3,
+                    scan_time_s=0.025,
+                    range_min_m=0.1,
+                    range_max_m=30.0,
+                    range_m=np.arange(1, beams + 1, dtype=np.float32),
+                    intensity=np.empty(0, np.float32),
+                )
+            )
+    arrays = sw.open_recording(tmp_path / "two.mcap").arrays()
+    np.testing.assert_array_equal(arrays.range_m, [[1, 2, 3, np.nan, np.nan], [1, 2, 3, 4, 5]])
+    np.testing.assert_allclose(arrays.bearing_rad[1], [-0.5, -0.25, 0.0, 0.25, 0.5])
+    np.testing.assert_array_equal(arrays.time_ns[1] - arrays.time_ns[1, 0], np.arange(5) * 1_000_000)
+    assert arrays.intensity.shape == (2, 0)
+    np.testing.assert_allclose(arrays.joint_rad[0, :3], [0.0, 0.004, 0.008], atol=1e-9)
+
+
+def test_wrong_input_is_one_line():
+    with pytest.raises(TaskError, match=r"task: sensr: unknown key; did you mean 'sensor'\?"):
+        sw.load_task({"name": "x", "sensr": "UTM-30LX"})
+    with pytest.raises(TaskError, match="four numbers in degrees"):
+        sw.evaluate("uniform", (0, 90, 0))
+    with pytest.raises(RecordingError, match=r"'\.txt' is no format of clouds"):
+        sw.read_cloud("cloud.txt")
+
+
+def test_clouds_go_out_and_in(tmp_path):
+    points = np.arange(12.0).reshape(4, 3)
+    assert sw.write_cloud(tmp_path / "cloud.ply", points) == []
+    np.testing.assert_array_equal(sw.read_cloud(tmp_path / "cloud.ply").points_m, points)
