@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from design.angles import AngleSet, load_angles
-from design.task.task import LoadedTask, load_task
+from design.angles import AngleSet
+from design.angles import load_angles as load_angles
+from design.task.task import LoadedTask
+from design.task.task import load_task as load_task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,29 +37,6 @@ if TYPE_CHECKING:
     from firmware_io.scan.acquire import ScanSummary
     from firmware_io.servo.dynamixel.driver import Servo
     from scanwright.pipeline.build import Build
-
-__all__ = [
-    "assemble",
-    "build",
-    "calibrate",
-    "check",
-    "compare",
-    "draw_density",
-    "evaluate",
-    "import_bag",
-    "load_angles",
-    "load_task",
-    "make_parts",
-    "open_lidar",
-    "open_recording",
-    "open_servo",
-    "optimise",
-    "read_cloud",
-    "register",
-    "scan",
-    "simulate",
-    "write_cloud",
-]
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A task: loaded, the name of a shipped one, a file, or a table with the keys of a task file."""

@@ -10,7 +10,7 @@ import sys
 import typer
 
 from scanwright.cli import clouds, design, devices, pages, parts
-from scanwright.cli.console import complain
+from scanwright.cli.console import complain, notes_of
 
 app = typer.Typer(
     help="One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar.",
@@ -30,5 +30,6 @@ def run() -> None:
     try:
         app(prog_name="scanwright")
     except ScanwrightError as error:
-        complain(str(error))
+        for line in (str(error), *notes_of(error)):
+            complain(line)
         sys.exit(2)

@@ -53,6 +53,11 @@ def complain(line: str) -> None:
     print(f"scanwright: {line}", file=sys.stderr)
 
 
+def notes_of(error: BaseException) -> list[str]:
+    """What else went wrong while an error was dealt with, such as a servo that could not be stopped."""
+    return list(getattr(error, "__notes__", ()))
+
+
 @contextmanager
 def on_duty() -> Iterator[None]:
     """Go first where the system allows it (times get blurred on a busy computer), and end well on every signal."""

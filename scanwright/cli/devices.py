@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import BuildFolder, complain, group, on_duty, say_in_place, show
+from scanwright.cli.console import BuildFolder, complain, group, notes_of, on_duty, say_in_place, show
 
 app = group()
 
@@ -96,9 +96,12 @@ def scan(
         try:
             with on_duty(), closing(watch):
                 recorded = acquire(plan, say_in_place, watch)
-        except KeyboardInterrupt:
-            kept = f"; what was recorded is in {plan.recording}" if plan.recording.exists() else ""
-            complain(f"stopped, both devices stand still{kept}")
+        except KeyboardInterrupt as stop:
+            unsafe = notes_of(stop)
+            for line in unsafe or ["stopped; the servo has answered that its torque is off"]:
+                complain(line)
+            if plan.recording.exists():
+                complain(f"what was recorded is in {plan.recording}")
             raise typer.Exit(130) from None
         say_in_place(f"recorded {recorded.duration_s:.1f} s, assembling")
         show(recorded.lines())

@@ -343,7 +343,19 @@ def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recordi
     assert summary.whole == (number == signal.SIGINT)
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert "stopped, both devices stand still" in complaints
+        assert "stopped; the servo has answered that its torque is off" in complaints
+
+
+def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, twins):
+    words = ("--lidar", twins.ports.lidar, "--servo", twins.ports.servo, "--turns", 100)
+    with program("scan", out, *words) as process:
+        wait_until(lambda: any(path.stat().st_size > 200_000 for path in (out / "recordings").glob("*.mcap")))
+        twins.servo.unplug()  # protocol 1.0 has no watchdog: it turns on
+        process.send_signal(signal.SIGINT)
+        _, complaints = process.communicate(timeout=30)
+    assert process.returncode in (2, 130)  # whether the cut bus or Ctrl-C is noticed first is chance
+    assert "could not be stopped: take its power" in complaints
+    assert "torque is off" not in complaints
 
 
 def test_only_scans_at_rest_are_taken_at_stops(out, twins):
