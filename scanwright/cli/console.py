@@ -14,6 +14,8 @@ from typing import Annotated, Any
 
 import typer
 
+from design.errors import require
+
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
 BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
@@ -56,6 +58,15 @@ def complain(line: str) -> None:
 def notes_of(error: BaseException) -> list[str]:
     """What else went wrong while an error was dealt with, such as a servo that could not be stopped."""
     return list(getattr(error, "__notes__", ()))
+
+
+def require_pages(work: str) -> None:
+    """Refuse work that opens a page where nothing is installed that could serve it.
+
+    Raises:
+        InstallError: a package of the extra `pages` is missing.
+    """
+    require("pages", f"{work} needs a page server", "msgspec", "viser", "websockets")
 
 
 @contextmanager
