@@ -24,9 +24,6 @@ def studio(
 ) -> None:
     """Drag the angles and paint what matters in a page of your browser, and see what it comes to."""
     from design.task.task import load_task
-    from scanwright.live.page_life import run_studio
-    from scanwright.studio.view.bodies import bodies_of
-    from scanwright.studio.view.preview_scan import glimpse
-    from scanwright.studio.view.workbench import Workbench
+    from scanwright.studio.session import run_studio
 
-    run_studio(load_task(task), Workbench(bodies_of, glimpse), port=port, out=out, say=say)
+    run_studio(load_task(task), port=port, out=out, say=say)
