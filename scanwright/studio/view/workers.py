@@ -17,7 +17,7 @@ from design.angles import Angles, AngleSet
 from design.errors import ScanwrightError
 from design.motion import Shortest, Sweep
 from design.objective.problem import Problem
-from design.scanner import Scanner, scanner_of
+from design.scanner import Scanner
 from design.second_process import kill, spawn_pool
 from design.task.task import NAMES, LoadedTask
 from scanwright.studio.state import Setting
@@ -63,7 +63,7 @@ class Order:
             slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
             motion=None if isinstance(task.motion, Shortest) else task.motion,
         )
-        return scanner_of(angles, task.printer, self.loaded.products, task.deck)
+        return self.loaded.scanner(angles)
 
 
 class Workers:
