@@ -41,13 +41,15 @@ from design.angles import Angles, AngleSet
 from design.task.task import load_task
 from firmware_io.samples import Scan
 from firmware_io.scan.live_feed import EVERY_S, Feed, Placing, growing
-from scanwright.live.gate import Gate, guarded_server
-from scanwright.live.page import LiveView
+from scanwright.live.cloud_view import CloudView
+from scanwright.serving.gate import Gate
+from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
-from scanwright.studio.panel.facts import judge_of
-from scanwright.studio.state import setting_of
+from scanwright.studio.panel.controls import put
+from scanwright.studio.state import Setting
 from scanwright.studio.view.latest_only import REST_S
-from scanwright.studio.view.workbench import Body, View, Workbench, scanner_at
+from scanwright.studio.view.scanner_bodies import make_bodies
+from scanwright.studio.view.workers import Order
 
 WHAT = ("moves", "rebuild", "live")
 HAND_HZ = 30.0
@@ -89,11 +91,11 @@ def moves(task: Path, count: int) -> None:
     """From slider to picture, for a hand that moves and never rests."""
     loaded = load_task(task)
     with guarded_server() as (server, gate):
-        studio = Studio(server, loaded, Workbench(_nothing, _nowhere), Path.cwd(), Path.cwd() / "out")
-        judge = judge_of(loaded, studio.judge.problem)
+        studio = Studio(server, loaded, Path.cwd(), Path.cwd() / "out")
+        put(studio.controls.scanner, False)
         compute = []
         with visitor(gate) as socket:
-            studio.move(setting_of((10, -50, -70, 60)))  # where every angle matters: what stays the same is not sent
+            studio.move(Setting((10, -50, -70, 60)))  # where every angle matters: what stays the same is not sent
             studio.judging.settled(60)
             told: SimpleQueue[tuple[float, str]] = SimpleQueue()
             facts = studio.controls.facts._impl.uuid
@@ -117,7 +119,7 @@ def moves(task: Path, count: int) -> None:
                 time.sleep(1 / HAND_HZ)
             for _ in range(20):
                 began = time.perf_counter()
-                judge.quick(studio.setting)
+                studio.judge.quick(studio.setting)
                 compute.append(time.perf_counter() - began)
         studio.close()
     ms = 1e3 * np.array(answered)
@@ -130,19 +132,17 @@ def moves(task: Path, count: int) -> None:
 
 def rebuild(task: Path, count: int) -> None:
     """From the hand that lets go to the new scanner, at settings all over the sliders."""
-    from scanwright.studio.view.bodies import bodies_of
-
     loaded = load_task(task)
     took: dict[str, list[float]] = {"turning": [], "standing": []}
     work: dict[str, list[float]] = {"turning": [], "standing": []}
     refused = 0
     with guarded_server() as (server, gate):
-        studio = Studio(server, loaded, Workbench(bodies_of, _nowhere), Path.cwd(), Path.cwd() / "out")
+        studio = Studio(server, loaded, Path.cwd(), Path.cwd() / "out")
         with visitor(gate) as socket:
             told: SimpleQueue[tuple[float, str]] = SimpleQueue()
             threading.Thread(target=_listen, args=(socket, "", told), daemon=True).start()
             studio.judging.settled(120)
-            studio.makers.settled(120)
+            studio.workers.settled(120)
             rng, angles = np.random.default_rng(0), np.array(studio.setting.angles_deg)
             for _ in range(count):
                 while not told.empty():
@@ -158,7 +158,7 @@ def rebuild(task: Path, count: int) -> None:
                 until = released + 30
                 while not studio.judging.settled(0) and time.perf_counter() < until:
                     time.sleep(0.01)
-                studio.makers.settled(30)
+                studio.workers.settled(30)
                 time.sleep(0.1)  # for what is on its way
                 arrived = {}
                 while not told.empty():
@@ -171,7 +171,8 @@ def rebuild(task: Path, count: int) -> None:
                     if half in arrived:  # parts that stay the same are not made again
                         times.append(arrived[half])
                         began = time.process_time()
-                        bodies_of(scanner_at(loaded, studio.setting), half == "turning")
+                        order = Order(loaded, studio.judge.problem, studio.setting, True, "")
+                        make_bodies(order.scanner(), half == "turning")
                         work[half].append(time.process_time() - began)
         studio.close()
     for half, times in took.items():
@@ -222,12 +223,11 @@ def live(seconds: float, rate_hz: float) -> None:
     receiving, sending = multiprocessing.Pipe(duplex=False)
     finished: list[float] = []
     with guarded_server() as (server, gate):
-        view = LiveView(server, "bench")
+        view = CloudView(server, "bench")
 
         def watch() -> None:
             for more in growing(receiving, Placing(angles, None)):
-                view.lost = more.lost
-                view.add(more.points_m, more.intensity, more.time_s)
+                view.add(more)
                 finished.append(time.perf_counter())
 
         with visitor(gate) as socket:
@@ -287,14 +287,6 @@ def visitor(gate: Gate) -> Iterator[Any]:
     ) as socket:
         socket.send(msgspec.msgpack.encode(CAMERA))
         yield socket
-
-
-def _nothing(_scanner: Any, _turning: bool) -> tuple[Body, ...]:
-    return ()
-
-
-def _nowhere(_view: View) -> Any:
-    return np.empty((0, 3), np.float32)
 
 
 if __name__ == "__main__":

@@ -15,12 +15,9 @@ from pathlib import Path
 from benchmarks.scanwright.screens import CHROMIUM, COLOURS, HERE, PHONE, beside, on_screen
 from design.angles import load_angles
 from design.task.task import load_task
-from scanwright.live.gate import guarded_server
+from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
-from scanwright.studio.state import setting_of
-from scanwright.studio.view.bodies import bodies_of
-from scanwright.studio.view.preview_scan import glimpse
-from scanwright.studio.view.workbench import Workbench
+from scanwright.studio.state import Setting
 
 WIDE = (1200, 720)
 PATIENCE_S = 300.0
@@ -36,10 +33,10 @@ def main() -> None:
         sys.exit("chromium is not installed")
     angles = load_angles(build / "angles.json").angles_deg
     with guarded_server() as (server, gate), sync_playwright() as driver:
-        studio = Studio(server, load_task(build / "task.toml"), Workbench(bodies_of, glimpse), Path.cwd(), build.parent)
-        studio.move(setting_of((angles.alpha_rot, angles.beta_rot, angles.alpha_laser, angles.beta_laser)))
+        studio = Studio(server, load_task(build / "task.toml"), Path.cwd(), build.parent)
+        studio.move(Setting((angles.alpha_rot, angles.beta_rot, angles.alpha_laser, angles.beta_laser)))
         studio.judging.settled(PATIENCE_S)
-        studio.makers.settled(PATIENCE_S)
+        studio.workers.settled(PATIENCE_S)
         chromium = driver.chromium.launch(executable_path=program, args=CHROMIUM)
         pictures = []
         for width, height in (WIDE, PHONE):

@@ -1,6 +1,6 @@
 """Error against run time of the numerical choices beside J: one record, its table and its picture.
 
-The rooms that make a choice measure it (`scanwright.trials.mesh`, `scanwright.trials.solver`,
+The rooms that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright.trials.solver`,
 `scanwright.trials.axis`); the front door brings the trials here.
 """
 

@@ -37,8 +37,7 @@ def second_process() -> Iterator[Begin]:
     if _cores() < 2 or multiprocessing.current_process().daemon:
         yield in_turn
         return
-    # spawned and not forked: a fork of a process with threads may lock up
-    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _deaf)
+    pool = spawn_pool()
 
     def beside(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
         future = pool.submit(work, *args, **kwargs)
@@ -54,9 +53,7 @@ def second_process() -> Iterator[Begin]:
     try:
         yield beside
     finally:
-        for process in list((getattr(pool, "_processes", None) or {}).values()):
-            process.kill()
-        pool.shutdown(cancel_futures=True)
+        kill(pool)
 
 
 def in_turn(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
@@ -72,6 +69,19 @@ def in_turn(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable
         return work(*given, **named)
 
     return result
+
+
+def spawn_pool() -> ProcessPoolExecutor:
+    """One process that stays, for calls of functions of modules; it is deaf to Ctrl-C, which ends its owner."""
+    # spawned and not forked: a fork of a process with threads may lock up
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _deaf)
+
+
+def kill(pool: ProcessPoolExecutor) -> None:
+    """End the process at once, its work done or not."""
+    for process in list((getattr(pool, "_processes", None) or {}).values()):
+        process.kill()
+    pool.shutdown(cancel_futures=True)
 
 
 def _cores() -> int:

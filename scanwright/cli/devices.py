@@ -80,7 +80,7 @@ def scan(
     from firmware_io.scan.acquire import acquire
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
-    from scanwright.live.feed import live_page
+    from scanwright.live.scan_page import live_page
 
     plan = plan_scan(
         out,

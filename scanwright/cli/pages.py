@@ -28,9 +28,6 @@ def studio(
 
     require_kernel("studio")
     from design.task.task import load_task
-    from scanwright.live.page_life import run_studio
-    from scanwright.studio.view.bodies import bodies_of
-    from scanwright.studio.view.preview_scan import glimpse
-    from scanwright.studio.view.workbench import Workbench
+    from scanwright.studio.session import run_studio
 
-    run_studio(load_task(task), Workbench(bodies_of, glimpse), port=port, out=out, say=say)
+    run_studio(load_task(task), port=port, out=out, say=say)

@@ -45,7 +45,7 @@ def build(
 def report(out: BuildFolder) -> None:
     """Write report.html of a build folder from the files in it: the answer, 3D view, checks, parts, steps, drawings."""
     require("cad", "report needs jinja2", "jinja2")
-    from scanwright.report.page import write_report
+    from scanwright.pipeline.records import write_report
 
     print(f"wrote {write_report(out)}")
 

@@ -1,1 +1,1 @@
-"""The page that shows a scan while it grows, and the gate that every live page stands behind."""
+"""The page of `scan --live`: the cloud while it grows."""

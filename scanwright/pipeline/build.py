@@ -110,7 +110,6 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     from design.search.optimum import angle_set, optimum_of
     from design.search.with_parts import choose
     from scanwright.pipeline import records
-    from scanwright.report.page import write_report
 
     with fresh_folder(target) as work, second_process() as begin:
         begin(import_module, "cadquery")  # it loads while the search runs
@@ -142,5 +141,5 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *exported.left_out])
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         say("writing report.html")
-        write_report(work)
+        records.write_report(work)
     return Made(optimum, chosen, (*parts.findings, *exported.findings))

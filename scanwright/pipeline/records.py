@@ -12,7 +12,7 @@ from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import Map, Mesh
 from design.task.task import LoadedTask
-from scanwright.pipeline.manifest import write_json
+from scanwright.pipeline.manifest import enter, write_json
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
@@ -46,6 +46,20 @@ def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
     """`left_out.json`: what the task made superfluous."""
     entries = [{"what": x.what, "why": x.why, "saved": x.saved, "unit": x.unit} for x in left_out]
     write_json(folder / "left_out.json", {"schema": "scanwright/left_out/1", "left_out": entries})
+
+
+def write_report(folder: Path) -> Path:
+    """`report.html` of a build folder from the files in it, and its digest into the manifest.
+
+    Raises:
+        TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
+        BuildError: another file is not as a build writes it.
+    """
+    from scanwright.report.page import REPORT, report_html
+
+    (folder / REPORT).write_text(report_html(folder), encoding="utf-8")
+    enter(folder, REPORT)
+    return folder / REPORT
 
 
 def _bring(folder: Path, source: Path, prefix: str) -> str:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from design.angles import AngleSet, standard_settings
-from design.errors import BuildError
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
 from design.frames import Array
@@ -26,7 +21,7 @@ OFF_DEG = 1.0  # what a printed and screwed mount may be off by
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Seen:
     """What one setting sees, without parts.
 
     Attributes:
@@ -49,18 +44,18 @@ class Standard:
     Attributes:
         J: rounded to its error.
         factor: of the beams per ball of the scanner over its own, on the geometric mean; None where J is no logarithm.
-        view: what it sees.
+        seen: what it sees.
     """
 
     name: str
     J: float
     J_error: float
     factor: float | None
-    view: View
+    seen: Seen
 
 
 @dataclass(frozen=True, slots=True)
-class Cone:
+class ConeOnMap:
     """A blind cone, its axis as the density map has it: theta from up, phi from ahead to the left."""
 
     half_angle_deg: float
@@ -69,8 +64,8 @@ class Cone:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """What a setting sees: computed from `task.toml` and `angles.json`, as `scanwright evaluate` does, without parts.
+class Answer:
+    """What a setting sees, computed from `task.toml` and `angles.json`, as `scanwright evaluate` does, without parts.
 
     Attributes:
         own: of the setting itself.
@@ -78,9 +73,9 @@ class Sight:
         worst: the largest of `rises` as the share of beams per direction that it costs; None where J is no logarithm.
     """
 
-    own: View
+    own: Seen
     standard: tuple[Standard, ...]
-    cones: tuple[Cone, ...]
+    cones: tuple[ConeOnMap, ...]
     masked_fraction: float
     lines: int
     beams: int
@@ -99,39 +94,22 @@ class Hidden:
     share: float
 
 
-@contextmanager
-def as_built(path: Path) -> Iterator[None]:
-    """Tell a file that no build wrote from a bug.
-
-    Raises:
-        BuildError: reading the file failed inside the block.
-    """
-    try:
-        yield
-    except (OSError, EOFError, ValueError, LookupError, TypeError, BadZipFile) as error:
-        raise BuildError(f"{path}: not as a build writes it ({error}): build the folder again") from error
-
-
-def sight_of(loaded: LoadedTask, angles: AngleSet) -> Sight:
-    """What the angle set sees on its task, and the standard alignments beside it.
-
-    Raises:
-        TaskError: no direction of the task has a weight.
-    """
-    problem, setting = problem_as_built(loaded, angles), setting_of(angles)
+def answer(problem: Problem, angles: AngleSet) -> Answer:
+    """What the angle set sees on its task (`problem_as_built`), and the standard alignments beside it."""
+    setting = mounting_rad(angles)
     logarithmic = problem.objective.name == "log"
     standard = []
     for name, other in standard_settings().items():
         found = score(problem, other)
         factor = float(np.exp(found.J - angles.J)) if logarithmic and angles.J is not None else None
         J, J_error = rounded_to_error(found.J, found.J_error)
-        standard.append(Standard(name, J, J_error, factor, _view(problem, other, found)))
+        standard.append(Standard(name, J, J_error, factor, _seen(problem, other, found)))
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
-    return Sight(
-        own=_view(problem, setting, score(problem, setting)),
+    return Answer(
+        own=_seen(problem, setting, score(problem, setting)),
         standard=tuple(standard),
         cones=tuple(
-            _cone(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(problem, setting).blind_cones
+            _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(problem, setting).blind_cones
         ),
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
@@ -153,13 +131,13 @@ def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
     return problem_of(loaded)
 
 
-def setting_of(angles: AngleSet) -> Array:
+def mounting_rad(angles: AngleSet) -> Array:
     """(alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
     return np.radians([getattr(angles.angles_deg, name) for name in NAMES])
 
 
-def _view(problem: Problem, setting: Array, found: Score) -> View:
-    return View(
+def _seen(problem: Problem, setting: Array, found: Score) -> Seen:
+    return Seen(
         blind_fraction=coverage(problem, setting).blind_fraction,
         blind_weight=found.blind_weight,
         least=found.least,
@@ -173,6 +151,8 @@ def hidden_by(shadow: Shadow) -> Hidden:
     return Hidden(len(share), int((share == 1).sum()), int(((share > 0) & (share < 1)).sum()), float(share.mean()))
 
 
-def _cone(axis: Array, half_angle_deg: float) -> Cone:
+def _on_map(axis: Array, half_angle_deg: float) -> ConeOnMap:
     x, y, z = np.round(axis, 9) + 0.0  # straight up and straight back have one name each
-    return Cone(half_angle_deg, float(np.degrees(np.arccos(np.clip(z, -1, 1)))), float(np.degrees(np.arctan2(y, x))))
+    return ConeOnMap(
+        half_angle_deg, float(np.degrees(np.arccos(np.clip(z, -1, 1)))), float(np.degrees(np.arctan2(y, x)))
+    )

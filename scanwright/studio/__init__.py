@@ -1,1 +1,1 @@
-"""Live pages: the studio, in which a person drags the angles, and the view of a scan while it is taken."""
+"""The studio: a page in which a person drags the angles or paints what matters, and sees what it comes to."""

@@ -1,7 +1,7 @@
 """The studio: a person drags the angles or paints what matters, and sees at once what it comes to.
 
 Three threads follow the hand, each doing only the newest wish: one judges the setting (J, gaps, the colours of the
-sphere), one takes paint into the task, the makers' have parts and scans made in other processes. The search and a build
+sphere), one takes paint into the task, the workers have parts and scans made in other processes. The search and a build
 run beside them. Everybody who has the page sees and moves the same setting.
 """
 
@@ -17,23 +17,29 @@ from typing import Any
 import numpy as np
 import viser
 
-from design.angles import standard_settings
+from design.angles import STANDARD_DEG, standard_settings
 from design.errors import ScanwrightError, TaskError
-from design.frames import Array
-from design.objective.problem import problem_of
 from design.search.optimum import optimum_of
 from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.serving.style import note_html
 from scanwright.studio.panel import panel_html
-from scanwright.studio.panel.controls import BRUSHES, NO_SCENE, TASK_SCENE, Controls, lay_out, put, scenes_of
-from scanwright.studio.panel.facts import Facts, Judge, judge_of
-from scanwright.studio.panel.kept_settings import Kept
+from scanwright.studio.panel.controls import (
+    BRUSHES,
+    NO_SCENE,
+    TASK_SCENE,
+    Controls,
+    name_of_copy,
+    put,
+    scan_scenes,
+)
+from scanwright.studio.panel.facts import Facts, Judge
+from scanwright.studio.panel.kept_settings import KeptSettings
 from scanwright.studio.panel.saving import Saving
-from scanwright.studio.state import Dab, Setting, painted, setting_of
-from scanwright.studio.view.latest_only import Newest
-from scanwright.studio.view.makers import Makers, Order, Shows
-from scanwright.studio.view.sphere import direction_hit, highest_density
-from scanwright.studio.view.stage import SIDES, Stage
-from scanwright.studio.view.workbench import Body, Workbench
+from scanwright.studio.state import Dab, Setting, painted
+from scanwright.studio.view.coloured_sphere import direction_hit, highest_density
+from scanwright.studio.view.latest_only import LatestOnly
+from scanwright.studio.view.view_3d import SIDES, View3D
+from scanwright.studio.view.workers import Order, Workers
 
 SEARCH_STEPS = 9  # lines that a search says
 STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
@@ -50,42 +56,38 @@ class Canvas:
 class Studio:
     """One page. `saved_to` is the only folder it writes task files to, `out` holds the builds."""
 
-    def __init__(
-        self, server: viser.ViserServer, loaded: LoadedTask, bench: Workbench, saved_to: Path, out: Path
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, loaded: LoadedTask, saved_to: Path, out: Path) -> None:
         self._server, self._first = server, loaded
         self._canvas = Canvas(loaded, ())
-        self.judge: Judge = judge_of(loaded, problem_of(loaded))
+        self.judge = Judge.for_task(loaded)
         self.facts: Facts | None = None
-        start = setting_of(np.degrees(standard_settings()["rolling"]))
-        self.stage = Stage(server)
+        self.view = View3D(server)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
         self._tasks = [own, *(name for name in names if name != own)]
-        self.controls: Controls = lay_out(server.gui, loaded, self._tasks, start)
-        self.kept = Kept(self.controls, self.move)
+        self.controls = Controls(server.gui, loaded, self._tasks, Setting(STANDARD_DEG["rolling"]))
+        self.kept = KeptSettings(self.controls, self.move, self.judge)
         self.saving = Saving(self.controls, saved_to, out)
-        self.judging: Newest[Setting] = Newest("judge", self._follow, self._rest)
-        self.painting: Newest[Canvas] = Newest("paint", self._take, self._rejudge)
-        self.makers = Makers(bench, Shows(self._show_bodies, self._show_points, self._show_making))
+        self.judging: LatestOnly[Setting] = LatestOnly("judge", self._follow, self._rest)
+        self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, self._rejudge)
+        self.workers = Workers(self.view, self._say_making)
         self._connect()
         self._taken()
-        self._rejudge(self._canvas)
 
     def close(self) -> None:
         """End the threads, the processes and a build that runs."""
         self.saving.close()
-        for worker in (self.painting, self.judging, self.makers):
+        for worker in (self.painting, self.judging, self.workers):
             worker.close()
 
     @property
     def setting(self) -> Setting:
         """Where the sliders stand."""
-        return setting_of([slider.value for slider in self.controls.angles])
+        return Setting.within_bounds(slider.value for slider in self.controls.angles)
 
     def say(self, text: str, bad: bool = False) -> None:
         """One line under the facts."""
-        self.controls.note.content = panel_html.note_html(text, bad=bad) if text else ""
+        self.controls.note.content = note_html(text, bad=bad)
 
     def move(self, setting: Setting) -> None:
         """Move the sliders."""
@@ -96,7 +98,7 @@ class Studio:
     def dab(self, ray_origin: Any, ray_direction: Any) -> None:
         """Touch the sphere with the brush where a ray from the camera meets it."""
         c = self.controls
-        hit = direction_hit(ray_origin, ray_direction, inside=self.stage.inside)
+        hit = direction_hit(ray_origin, ray_direction, inside=self.view.inside)
         if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
             return
         radius_deg = float(np.clip(c.radius.value, 1, 60))
@@ -105,13 +107,13 @@ class Studio:
             return
         x, y, z = (float(value) for value in hit)
         value = float(np.clip(c.weight.value, 0.01, 1000.0))
-        self._repaint((*dabs, Dab((x, y, z), radius_deg, c.brush.value, value)))  # type: ignore[arg-type]
+        self._repaint((*dabs, Dab((x, y, z), radius_deg, c.brush.value, value)))
 
     def _painted(self) -> LoadedTask:
         return painted(self._canvas.base, self._canvas.dabs)
 
     def _keep(self) -> None:
-        self.say(f"kept as {self.kept.keep(self.judge, self.setting)}: see Compare")
+        self.say(f"kept as {self.kept.keep(self.setting)}: see Compare")
 
     def _connect(self) -> None:
         c = self.controls
@@ -155,7 +157,7 @@ class Studio:
     def _follow(self, setting: Setting) -> None:
         judge = self.judge
         self._tell(judge.quick(setting))
-        self.stage.colour(judge.problem, setting, self._highest)
+        self.view.colour(judge.problem, setting, self._highest)
 
     def _rest(self, setting: Setting) -> None:
         self._order()
@@ -177,8 +179,8 @@ class Studio:
         loaded = self._first if name in (str(self._first.source), self._first.task.name) else load_task(Path(name))
         self._canvas = Canvas(loaded, ())
         self.kept.clear()
-        self.controls.scene.options = scenes_of(loaded)
-        put(self.controls.name, f"{loaded.task.name}_mine"[:64])
+        self.controls.scene.options = scan_scenes(loaded)
+        put(self.controls.name, name_of_copy(loaded))
         self.painting.wish(self._canvas)
 
     def _repaint(self, dabs: tuple[Dab, ...]) -> None:
@@ -189,7 +191,7 @@ class Studio:
     def _take(self, canvas: Canvas) -> None:
         try:
             loaded = painted(canvas.base, canvas.dabs)
-            judge = judge_of(loaded, problem_of(loaded))
+            judge = Judge.for_task(loaded)
         except ScanwrightError as error:
             self.say(str(error), bad=True)
             return
@@ -200,19 +202,19 @@ class Studio:
         settings = [*standard_settings().values(), self.setting.angles_rad]
         self._highest = max(highest_density(self.judge.problem, angles) for angles in settings)
         self.controls.scale.content = panel_html.scale_html(self._highest)
-        self.stage.outline(self.judge.problem)
+        self.view.outline(self.judge.problem)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
         count = len(self._canvas.dabs)
-        self.controls.painted.content = panel_html.note_html(f"{count} dabs on the task, {masks} of them hide")
+        self.controls.painted.content = note_html(f"{count} dabs on the task, {masks} of them hide")
         self.judging.wish(self.setting)
 
     def _rejudge(self, _: Canvas) -> None:
         """The settings that were kept, by the task as it is now."""
-        self.kept.judge(self.judge)
+        self.kept.rejudge(self.judge)
 
     def _arm(self) -> None:
         """Take the brush in hand, or put it away so that dragging turns the view again."""
-        sphere = self.stage.sphere
+        sphere = self.view.sphere
         sphere.remove_click_callback()
         sphere.remove_drag_callback()
         if not self.controls.painting.value:
@@ -229,31 +231,25 @@ class Studio:
 
     def _look(self) -> None:
         if self.controls.look.value in SIDES:
-            self.stage.look(self.controls.look.value)
+            self.view.look(self.controls.look.value)
 
     # Other processes and long work
 
     def _order(self) -> None:
         scene = {NO_SCENE: "", TASK_SCENE: "task"}.get(self.controls.scene.value, "room")
         loaded, problem = self.judge.loaded, self.judge.problem
-        self.makers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
+        self.workers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
 
-    def _show_bodies(self, setting: Setting, turning: bool, bodies: tuple[Body, ...]) -> None:
-        self.stage.show_bodies(setting, turning, bodies)
-
-    def _show_points(self, _: Setting, points_m: Array) -> None:
-        self.stage.show_points(points_m)
-
-    def _show_making(self, text: str, bad: bool) -> None:
-        self.controls.making.content = panel_html.note_html(text, bad=bad) if text else ""
+    def _say_making(self, text: str, bad: bool) -> None:
+        self.controls.making.content = note_html(text, bad=bad)
 
     def _show_scanner(self) -> None:
-        self.stage.show_scanner(self.controls.scanner.value)
+        self.view.show_scanner(self.controls.scanner.value)
         self._order()
 
     def _change_scene(self) -> None:
         if self.controls.scene.value == NO_SCENE:
-            self.stage.show_points(np.empty((0, 3)))
+            self.view.show_points(np.empty((0, 3)))
         self._order()
 
     def _optimise(self) -> None:
@@ -275,7 +271,7 @@ class Studio:
                 optimum = optimum_of(painted(canvas.base, canvas.dabs), told)
                 if canvas == self._canvas:
                     self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
-                    self.move(setting_of(optimum.search.best[0].angles_deg))
+                    self.move(Setting.within_bounds(optimum.search.best[0].angles_deg))
                     self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}")
             except TaskError as error:
                 self.say(str(error), bad=True)

@@ -1,4 +1,4 @@
-"""What a person makes of a task in the studio: paint on the sphere, angles, a name; and the file of it.
+"""What a person makes of a task in the studio: angles, and paint on the sphere.
 
 Paint is laid down in dabs. Each is a cone that joins the task's regions as the last one, so what is painted last wins,
 as in every task file: nothing of the studio is lost when the file is written, and the file says nothing else.
@@ -6,21 +6,21 @@ as in every task file: nothing of the studio is lost when the file is written, a
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-import tomli_w
 from pydantic import ValidationError
 
 from design.errors import TaskError
 from design.frames import Array
 from design.record import explain
-from design.task.shapes import Cone, Map, MaskRegion, Mesh, Region
-from design.task.task import NAMES, LoadedTask, Task, load_task
+from design.task.shapes import Cone, MaskRegion, Region
+from design.task.task import LoadedTask
 
+BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
+"""Of the mounting angles: what a task file may say."""
 MOST_DABS = 60
 """Beyond it J takes its time: every edge of a region is a break of its quadrature."""
 DECIMALS = 4
@@ -30,36 +30,33 @@ Brush = Literal["matters", "does not matter", "hidden"]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """The four mounting angles in degrees; `bound` holds where a task file could name them."""
+    """The four mounting angles.
 
-    alpha_rot_deg: float
-    beta_rot_deg: float
-    alpha_laser_deg: float
-    beta_laser_deg: float
+    Attributes:
+        angles_deg: in the order of `design.task.task.NAMES`.
+    """
 
-    @property
-    def angles_deg(self) -> tuple[float, float, float, float]:
-        """In the order of `design.task.task.NAMES`."""
-        return self.alpha_rot_deg, self.beta_rot_deg, self.alpha_laser_deg, self.beta_laser_deg
+    angles_deg: tuple[float, float, float, float]
+
+    @classmethod
+    def within_bounds(cls, angles_deg: Iterable[float]) -> Setting:
+        """Four numbers as a setting, each within what a task file may say and rounded to its 0.01 deg.
+
+        Raises:
+            ValueError: they are not four finite numbers.
+        """
+        given = np.array([float(angle) for angle in angles_deg])
+        if given.shape != (4,) or not np.isfinite(given).all():
+            raise ValueError(f"{given.tolist()}: not four finite angles")
+        alpha_rot, beta_rot, alpha_laser, beta_laser = (
+            round(float(np.clip(angle, -bound, bound)), 2) + 0.0 for angle, bound in zip(given, BOUNDS_DEG, strict=True)
+        )
+        return cls((alpha_rot, beta_rot, alpha_laser, beta_laser))
 
     @property
     def angles_rad(self) -> Array:
         """The same in radians, shape (4,)."""
         return np.radians(self.angles_deg)
-
-
-def setting_of(angles_deg: Any) -> Setting:
-    """Four numbers as a setting, each within what a task file may say and rounded to its 0.01 deg.
-
-    Raises:
-        ValueError: one of them is no finite number.
-    """
-    bounds = (180.0, 90.0, 90.0, 90.0)
-    angles = [float(angle) for angle in angles_deg]
-    if len(angles) != len(bounds) or not np.isfinite(angles).all():
-        raise ValueError(f"{angles}: not four finite angles")
-    clipped = [round(float(np.clip(a, -b, b)), 2) + 0.0 for a, b in zip(angles, bounds, strict=True)]
-    return Setting(*clipped)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,62 +100,3 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         raise TaskError(explain(error, "paint", Cone)) from error
     changed = task.model_copy(update={"weight": (*task.weight, *weights), "mask": (*task.mask, *masks)})
     return replace(loaded, task=changed)
-
-
-def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None) -> str:
-    """The task file as it stands in a folder: what is at its default is left out, file names lead from there.
-
-    Args:
-        loaded: the task.
-        folder: where the text is to be written.
-        name: of the task.
-        fixed: angles to write as values in place of the ranges to search.
-
-    Raises:
-        TaskError: the name cannot be one.
-    """
-    table = loaded.task.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | {"name": name}
-    table["motion"] = loaded.task.motion.model_dump(mode="json")
-
-    def led(file: str) -> str:
-        return os.path.relpath(loaded.source.parent / file, folder)
-
-    for key in ("weight", "mask"):
-        for i, region in enumerate(getattr(loaded.task, key)):
-            if isinstance(region, Map | Mesh):
-                table[key][i]["file"] = led(region.file)
-    if loaded.task.scene is not None:
-        table["scene"]["file"] = led(loaded.task.scene.file)
-    if loaded.task.catalogue:
-        table["catalogue"] = [led(extra) for extra in loaded.task.catalogue]
-    if fixed is not None:
-        table["angles"] = table.get("angles", {}) | {
-            f"{angle}_deg": value for angle, value in zip(NAMES, fixed.angles_deg, strict=True)
-        }
-    try:
-        Task.model_validate(table)
-    except ValidationError as error:
-        raise TaskError(explain(error, f"{name}.toml", Task)) from error
-    return tomli_w.dumps(table)
-
-
-def save_task(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None, *, overwrite: bool) -> Path:
-    """Write `name.toml` into a folder and read it back; nothing is written anywhere else.
-
-    Raises:
-        TaskError: the name is not one of a task, the file exists and is not to be overwritten, or what was written
-            does not read as a task.
-    """
-    text = task_text(loaded, folder, name, fixed)  # refuses a name that leads elsewhere
-    path = folder / f"{name}.toml"
-    if path.is_symlink():
-        raise TaskError(f"{path}: a link that leads elsewhere: take another name")
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise TaskError(f"{path}: exists; tick 'overwrite', or take another name") from error
-    except OSError as error:
-        raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
-    load_task(path)
-    return path

@@ -21,7 +21,7 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
         BuildError: a part cannot be made.
     """
     from cad.assembly.assembly import make_parts
-    from scanwright.trials.mesh import mesh_trials
+    from cad.geometry.mesh_trials import mesh_trials
 
     optimum = optimum_of(loaded, say)
     solids = make_parts(loaded.scanner(optimum.angle_set())).made

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from design.angles import standard_settings
 from design.errors import TaskError
-from design.objective.problem import NODES, Problem
+from design.objective.problem import NODES, Problem, problem_of
 from design.objective.score import Score, score, score_on
 from design.search.limits import blind_cones_deg, line_gaps_deg
 from design.search.shortest_period import shortest_period_s
@@ -66,6 +64,16 @@ class Judge:
     problem: Problem
     standard: dict[str, float]
 
+    @classmethod
+    def for_task(cls, loaded: LoadedTask) -> Judge:
+        """Judge the standard alignments once; they stay while the task does.
+
+        Raises:
+            TaskError: no direction of the task has a weight.
+        """
+        problem = problem_of(loaded)
+        return cls(loaded, problem, {name: score(problem, angles).J for name, angles in standard_settings().items()})
+
     def quick(self, setting: Setting) -> Facts:
         """While the hand moves."""
         return self._facts(setting, score_on(self.problem, setting.angles_rad, DRAG_NODES), exact=False)
@@ -107,9 +115,3 @@ class Judge:
             return shortest_period_s(self.problem, setting.angles_rad, rate_hz, self._least, nodes)
         except TaskError:  # part of the region is out of reach at any speed
             return math.nan
-
-
-def judge_of(loaded: LoadedTask, problem: Problem) -> Judge:
-    """Judge the standard alignments once; they stay while the task does."""
-    standard = {name: score(problem, np.asarray(angles)).J for name, angles in standard_settings().items()}
-    return Judge(loaded, problem, standard)

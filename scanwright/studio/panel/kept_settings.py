@@ -5,39 +5,41 @@ from __future__ import annotations
 from collections.abc import Callable
 from threading import Lock
 
-import numpy as np
-
-from design.angles import standard_settings
+from design.angles import STANDARD_DEG
 from design.errors import TaskError
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.controls import Controls, put
 from scanwright.studio.panel.facts import Facts, Judge
-from scanwright.studio.state import Setting, setting_of
+from scanwright.studio.state import Setting
 
-NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
-class Kept:
-    """The table under Compare."""
+class KeptSettings:
+    """The table under Compare.
 
-    def __init__(self, controls: Controls, move: Callable[[Setting], None]) -> None:
+    Settings are kept and removed by the threads of the page while another one judges them by a changed task: whoever
+    judges has the table to itself, so that nothing vanishes and all stand there by the same task.
+    """
+
+    def __init__(self, controls: Controls, move: Callable[[Setting], None], judge: Judge) -> None:
         self._controls, self._move = controls, move
         self._facts: dict[str, Facts] = {}
-        self._lock = Lock()
+        self._table = Lock()
+        self.rejudge(judge)
 
-    def keep(self, judge: Judge, setting: Setting) -> str:
+    def keep(self, setting: Setting) -> str:
         """Put a setting into the table; its name there.
 
         Raises:
             TaskError: the table is full.
         """
-        facts = judge.settled(judge.exact(setting))
-        with self._lock:
-            name = next((letter for letter in NAMES if letter not in self._facts), None)
+        with self._table:
+            name = next((letter for letter in LETTERS if letter not in self._facts), None)
             if name is None:
-                raise TaskError(f"compare: {len(NAMES)} settings are kept: remove some first")
-            self._facts[name] = facts
-        self._show()
+                raise TaskError(f"compare: {len(LETTERS)} settings are kept: remove some first")
+            self._facts[name] = self._judge.settled(self._judge.exact(setting))
+            self._show()
         put(self._controls.kept, name)
         return name
 
@@ -53,25 +55,25 @@ class Kept:
             TaskError: it is a standard alignment.
         """
         name = self._controls.kept.value
-        if name in standard_settings():
+        if name in STANDARD_DEG:
             raise TaskError(f"compare: {name} stays: it is what others are compared with")
-        with self._lock:
+        with self._table:
             self._facts.pop(name, None)
-        self._show()
+            self._show()
 
     def clear(self) -> None:
         """Forget all: another task asks for other angles."""
-        with self._lock:
+        with self._table:
             self._facts = {}
 
-    def judge(self, judge: Judge) -> None:
-        """Judge all again, by a task that has changed."""
-        settings = {name: facts.setting for name, facts in self._facts.items()}
-        settings |= {name: setting_of(np.degrees(angles)) for name, angles in standard_settings().items()}
-        facts = {name: judge.exact(setting) for name, setting in settings.items()}
-        with self._lock:
-            self._facts = facts
-        self._show()
+    def rejudge(self, judge: Judge) -> None:
+        """Judge all again, and from now on, by a task that has changed."""
+        with self._table:
+            self._judge = judge
+            settings = {name: facts.setting for name, facts in self._facts.items()}
+            settings |= {name: Setting(angles_deg) for name, angles_deg in STANDARD_DEG.items()}
+            self._facts = {name: judge.exact(setting) for name, setting in settings.items()}
+            self._show()
 
     def _show(self) -> None:
         self._controls.table.content = panel_html.kept_html(self._facts)

@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 from html import escape
 
+from scanwright.serving.style import COLOUR_STOPS
 from scanwright.studio.panel.facts import WALL_M, Facts
-from scanwright.studio.view.sphere import COLOUR_STOPS, LEAST_OF_HIGHEST
+from scanwright.studio.view.coloured_sphere import LEAST_OF_HIGHEST
 
 CELL = "padding:1px 6px 1px 0;white-space:nowrap"
 NUMBER = f"{CELL};text-align:right;font-variant-numeric:tabular-nums"
@@ -68,12 +69,6 @@ def scale_html(highest: float) -> str:
         f"<span>mean beams per ball, logarithmic</span><span>{highest:,.0f}</span></div>"
         "<div>pale: none; white edge: what matters; red: hidden by the robot; green: axis and fan</div></div>"
     )
-
-
-def note_html(text: str, *, bad: bool = False) -> str:
-    """One line for a person; red where something is refused."""
-    colour = ";color:#c92a2a" if bad else ""
-    return f'<div style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere{colour}">{escape(text)}</div>'
 
 
 def _against(J: float, other: float, log: bool) -> str:

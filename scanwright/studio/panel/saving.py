@@ -6,10 +6,11 @@ from pathlib import Path
 
 from design.errors import TaskError
 from design.task.task import LoadedTask
-from scanwright.studio.panel.building import Building, build_command
+from scanwright.serving.style import note_html
+from scanwright.studio.panel.build_process import BuildProcess
 from scanwright.studio.panel.controls import Controls, put
-from scanwright.studio.panel.panel_html import note_html
-from scanwright.studio.state import Setting, save_task, task_text
+from scanwright.studio.state import Setting
+from scanwright.studio.task_file import save_task, task_text
 
 
 class Saving:
@@ -17,7 +18,7 @@ class Saving:
 
     def __init__(self, controls: Controls, folder: Path, out: Path) -> None:
         self._controls, self._folder, self._out = controls, folder, out
-        self._building: Building | None = None
+        self._building: BuildProcess | None = None
 
     def save(self, loaded: LoadedTask, setting: Setting) -> Path:
         """Write the task file, with the angles fixed at the setting where that is ticked.
@@ -56,7 +57,7 @@ class Saving:
             end = f"built {self._out / path.stem}: open its report.html" if code == 0 else f"build ended: {line}"
             c.built.content = note_html(end, bad=code != 0)
 
-        self._building = Building(build_command(path, self._out), told, done)
+        self._building = BuildProcess(path, self._out, told, done)
 
     def close(self) -> None:
         """End a build that runs."""

@@ -12,7 +12,7 @@ T = TypeVar("T")
 REST_S = 0.25  # without a wish: the hand has let go
 
 
-class Newest(Generic[T]):
+class LatestOnly(Generic[T]):
     """A thread that does the newest wish, and once no other has come for a while, what belongs to the rest.
 
     A wish that comes while another is being done waits; one that waits is replaced by the next.

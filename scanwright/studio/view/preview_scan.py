@@ -9,33 +9,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design import frames
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.frames import Rx, Ry, Rz
+from design.frames import Array, Rx, Ry, Rz
+from design.scanner import Scanner
 from design.scene.ray_caster import Scene, load_scene, scene_of
 from design.task.shapes import Placed
 from firmware_io.twins.world import furnished_room, measure, range_model, see
-from scanwright.studio.view.workbench import View
 
+MOST_RAYS = 150_000  # what a page draws at once
 SEED = 0
 
 
-def glimpse(view: View) -> NDArray[np.float32]:
-    """Points of one full scan with the noise of the data sheet, in the world [m], shape (n, 3).
+def preview_scan(scanner: Scanner, joint_rad: Array, placed: Placed | None, folder: Path) -> NDArray[np.float32]:
+    """Points of one full scan with the noise of the data sheet, thinned evenly to what a page can draw.
+
+    Args:
+        scanner: its optical centre is the origin of the world.
+        joint_rad: axis angle of each line, shape (lines,).
+        placed: the scene; None for a furnished room.
+        folder: that the scene's file is named from.
+
+    Returns:
+        In the world [m], shape (n, 3).
 
     Raises:
         SceneError: the scene cannot be read.
-        TaskError: the lidar is not in the catalogue.
     """
-    lidar = load_catalogue().get(view.angles.sensor, Lidar)
-    bearing_rad = lidar.bearings_rad()[:: view.every]
-    beams = np.tile(bearing_rad, len(view.joint_rad))
-    joint_rad = np.repeat(view.joint_rad, len(bearing_rad))
-    hits = see(_scene(view.scene, view.folder), view.angles, beams, joint_rad)
+    lidar, angles = scanner.lidar, scanner.angles
+    thin = int(np.ceil(np.sqrt(joint_rad.size * len(lidar.bearings_rad()) / MOST_RAYS)))
+    joint_rad, bearing_rad = joint_rad[::thin], lidar.bearings_rad()[::thin]
+    beams = np.tile(bearing_rad, len(joint_rad))
+    joint_rad = np.repeat(joint_rad, len(bearing_rad))
+    hits = see(_scene(placed, folder), angles, beams, joint_rad)
     range_m = measure(hits, range_model(lidar), np.random.default_rng(SEED)).range_m
     back = np.isfinite(range_m)
     in_plane = np.stack([np.cos(beams), np.sin(beams)], axis=-1)[back]
-    T = view.angles.T_world_laser(joint_rad[back])
+    T = angles.T_world_laser(joint_rad[back])
     return (range_m[back, None] * np.einsum("nij,nj->ni", T[:, :3, :2], in_plane) + T[:, :3, 3]).astype(np.float32)
 
 

@@ -24,7 +24,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.left_out import LeftOut
 from design.motion import Sweep
 from design.scanner import scanner_of
-from scanwright.studio.view.bodies import bodies_of
+from scanwright.studio.view.scanner_bodies import make_bodies
 
 SHIPPED = [(-180, 55, 80, -75), (0, 90, 0, -90)]  # ground_ahead, rolling
 STEEL, PLASTIC, ALUMINIUM = 7.85e-3, 1.24e-3, 2.7e-3  # g/mm3
@@ -188,7 +188,7 @@ def test_an_ear_over_the_index_mark_carries_it():
 
 def test_both_halves_of_the_studio_together_name_it_once():
     scanner = scanner_for(*SHIPPED[1])
-    names = [body.name for turning in (True, False) for body in bodies_of(scanner, turning)]
+    names = [body.name for turning in (True, False) for body in make_bodies(scanner, turning)]
     assert names.count("counterweight") == 1 and len(names) == len(set(names))
 
 

@@ -11,6 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cad.assembly.linkage_preview import draft_linkage
 from cad.checks.printing import thin_walls
 from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
@@ -25,7 +26,6 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import SlipRing
 from design.errors import BuildError
 from design.scanner import scanner_of
-from scanwright.studio.view.linkage_preview import draft_linkage
 
 degrees = st.floats(-90, 90)
 turns = st.floats(-180, 180)

@@ -10,10 +10,10 @@ import pytest
 from design.angles import Angles, AngleSet
 from firmware_io.assembly.deskew import deskew
 from firmware_io.samples import JointLog, Scan
-from firmware_io.scan.live_feed import MOST_SCANS, Batch, Feed, Placing, growing
-from scanwright.live import page
-from scanwright.live.gate import guarded_server
-from scanwright.live.page import LiveView
+from firmware_io.scan.live_feed import MOST_SCANS, Batch, Feed, Growth, Placing, growing
+from scanwright.live import cloud_view
+from scanwright.live.cloud_view import CloudView
+from scanwright.serving.page_server import guarded_server
 
 ANGLES = AngleSet(
     task="live",
@@ -59,7 +59,7 @@ def test_points_of_the_view_are_those_of_the_frame_chain():
         feed.scan(scan)
     feed.told("a line")
     feed.close()
-    reader.join(20)
+    reader.join(120)
     expected = np.concatenate([deskew(scan, log, ANGLES) for scan in scans])
     expected = expected[np.isfinite(expected[:, 0])]
     points = np.concatenate([more.points_m for more in found])
@@ -104,17 +104,17 @@ def test_angles_that_come_twice_or_late_do_no_harm():
 
 
 def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
-    monkeypatch.setattr(page, "CHUNK_POINTS", 500)
-    monkeypatch.setattr(page, "MOST_POINTS", 2000)
+    monkeypatch.setattr(cloud_view, "CHUNK_POINTS", 500)
+    monkeypatch.setattr(cloud_view, "MOST_POINTS", 2000)
     rng = np.random.default_rng(0)
     with guarded_server() as (server, _):
-        view = LiveView(server, "scan of live")
+        view = CloudView(server, "scan of live")
         for index in range(30):
             points = rng.normal(0, 1 + index, (100, 3)).astype(np.float32)
-            view.add(points, np.zeros(100, np.float32), np.full(100, index, np.float32))
+            view.add(Growth(points, np.zeros(100, np.float32), np.full(100, index, np.float32), (), 0))
         view.by.value = "time"
-        view.lost = 7
-        view.add(np.empty((0, 3), np.float32), np.empty(0, np.float32), np.empty(0, np.float32))
+        nothing = np.empty(0, np.float32)
+        view.add(Growth(nothing.reshape(0, 3), nothing, nothing, ("a line",), 7))
         shown = sum(len(chunk.points_m) for chunk in view.chunks)
         assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])

@@ -35,13 +35,14 @@ from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 from design.task.task import load_task
 from scanwright.pipeline import records as writer
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
-from scanwright.report import scene as report_scene
-from scanwright.report.answer import hidden_by, sight_of
-from scanwright.report.page import report_html, write_report
-from scanwright.report.scene import bodies_of, scene_of
-from scanwright.report.sphere import SHADES, STEP_DEG, sphere_of
-from scanwright.report.steps import steps_html
-from scanwright.report.where import Body, Pictures, named_in
+from scanwright.pipeline.records import write_report
+from scanwright.report import page as report_page
+from scanwright.report.answer import answer, hidden_by, problem_as_built
+from scanwright.report.assembly_steps import steps_html
+from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
+from scanwright.report.density_sphere import SHADES, STEP_DEG, density_sphere
+from scanwright.report.page import report_html
+from scanwright.report.scanner_scene import load_glb, placed_bodies, scanner_scene
 
 SECTIONS = [
     "answer",
@@ -56,8 +57,8 @@ SECTIONS = [
     "left-out",
     "again",
 ]
-PAGE = Path(report_scene.__file__).parent
-CODE = [PAGE / name for name in ("page.js", "three.js", "scanner.js", "sphere.js")]
+PAGE = Path(report_page.__file__).parent
+CODE = [PAGE / name for name in ("page.js", "webgl.js", "scanner.js", "sphere.js")]
 VOID = {"meta", "link", "img", "input", "br"}
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 EVIL = "</script><script>alert(1)</script>"
@@ -242,26 +243,26 @@ def test_the_answer_says_what_the_files_say(page):
 
 
 def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
-    sight = sight_of(load_task(Path("ground_ahead")), ANGLES)
-    rolling, pitching = sight.standard
+    said = answer(problem_as_built(load_task(Path("ground_ahead")), ANGLES), ANGLES)
+    rolling, pitching = said.standard
     assert rolling.factor == pytest.approx(1, abs=1e-3)
     assert pitching.factor == pytest.approx(np.exp(pitching.J - ANGLES.J), abs=1e-3)
     # a blind cone of 45 deg, smaller by the ball of 2 deg; the mask covers part of it
     everywhere = (1 - np.cos(np.radians(43))) / 2
-    assert 0 < sight.own.blind_fraction < everywhere
-    assert sight.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
-    assert sight.own.line_gap_deg == rolling.view.line_gap_deg == pytest.approx(0.5)
-    assert sight.own == rolling.view != pitching.view
-    assert sight.worst == pytest.approx(1 - np.exp(-max(sight.rises.values())), abs=1e-12)
+    assert 0 < said.own.blind_fraction < everywhere
+    assert said.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
+    assert said.own.line_gap_deg == rolling.seen.line_gap_deg == pytest.approx(0.5)
+    assert said.own == rolling.seen != pitching.seen
+    assert said.worst == pytest.approx(1 - np.exp(-max(said.rises.values())), abs=1e-12)
     problem = problem_of(load_task(Path("ground_ahead")))
     off = [quick_J(problem, np.radians([0, 90 + d, 0, -90]), NODES) for d in (-1, 0, 1)]
-    assert sight.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
+    assert said.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
 
 
 def test_other_motions_and_objectives_make_no_claim_of_factors():
     loaded = load_task(Path("indoor_urg"))
     angles = ANGLES.model_copy(update={"sensor": "URG-04LX", "motion": loaded.task.motion, "J": None})
-    assert all(standard.factor is None for standard in sight_of(loaded, angles).standard)
+    assert all(standard.factor is None for standard in answer(problem_as_built(loaded, angles), angles).standard)
 
 
 def test_what_is_in_the_files_stays_text(page, text):
@@ -316,8 +317,18 @@ def world_points(body, key):
     return points @ T[:3, :3].T + T[:3, 3]
 
 
+def drawn(folder, angles, hidden):
+    """What the page draws of a folder."""
+    assembly, exploded = (load_glb(folder / name) for name in ("assembly.glb", "exploded.glb"))
+    return scanner_scene(assembly, exploded, angles, hidden)
+
+
+def sphere(loaded, axes):
+    return density_sphere(problem_as_built(loaded, ANGLES), ANGLES, axes, loaded.task.angles.step_deg)
+
+
 def test_the_scene_stands_in_the_world_and_turns_about_the_axis(folder):
-    shown = scene_of(folder, ANGLES, own_body())
+    shown = drawn(folder, ANGLES, own_body())
     base, lidar = shown["bodies"]
     assert [base["name"], base["turns"], lidar["name"], lidar["turns"]] == ["base_mount", False, "lidar_body", True]
     np.testing.assert_allclose(base["colour"], [0.735, 0, 1], atol=3e-3)  # sRGB of half the light
@@ -339,7 +350,7 @@ def test_the_scene_stands_in_the_world_and_turns_about_the_axis(folder):
 
 def test_the_fan_knows_what_is_hidden_at_every_axis_step(folder):
     shadow, bearings = own_body()
-    fan = scene_of(folder, ANGLES, (shadow, bearings))["fan"]
+    fan = drawn(folder, ANGLES, (shadow, bearings))["fan"]
     np.testing.assert_allclose(np.frombuffer(b64decode(fan["bearings"]), "<f4"), bearings, atol=1e-6)
     hidden = np.zeros((len(bearings), fan["steps"]), bool)
     for beam, bits in fan["hidden"].items():
@@ -352,7 +363,7 @@ def test_the_fan_knows_what_is_hidden_at_every_axis_step(folder):
 
 def test_a_sweep_stays_within_its_limits(folder):
     sweep = ANGLES.model_copy(update={"motion": Sweep(limits_deg=(-90, 80), period_s=12.0)})
-    shown = scene_of(folder, sweep, None)
+    shown = drawn(folder, sweep, None)
     assert (shown["limits_deg"], shown["to_and_fro"], shown["period_s"]) == ([-90, 80], True, 12.0)
     assert shown["fan"] is None
 
@@ -367,11 +378,11 @@ def test_the_code_of_the_page_asks_for_what_is_there(folder, page):
     code = (PAGE / "scanner.js").read_text()
     for path in CODE:
         assert set(re.findall(r'element\("([\w-]+)"\)', path.read_text())) <= set(page.ids)
-    shown = scene_of(folder, ANGLES, own_body())
+    shown = drawn(folder, ANGLES, own_body())
     assert set(re.findall(r"scene\.(\w+)", code)) <= shown.keys()
     assert set(re.findall(r"scene\.fan\.(\w+)", code)) <= shown["fan"].keys()
     assert set(re.findall(r"\bbody\.(\w+)", code)) <= {*shown["bodies"][0], "array", "count", "type"}
-    ball = sphere_of(load_task(Path("ground_ahead")), ANGLES, None).data()
+    ball = sphere(load_task(Path("ground_ahead")), None).data()
     assert set(re.findall(r"scene\.(\w+)", (PAGE / "sphere.js").read_text())) <= ball.keys()
 
 
@@ -414,14 +425,14 @@ def cell(direction):
 
 def test_the_pictures_of_the_sphere_show_what_is_where():
     loaded = load_task(Path("ground_ahead"))
-    ball = sphere_of(loaded, ANGLES, AXES)
-    assert [view.title for view in ball.views] == [
+    ball = sphere(loaded, AXES)
+    assert [shown.title for shown in ball.maps] == [
         "density of this scanner",
         "density of rolling",
         "density of pitching",
         "J over the direction of the axis",
     ]
-    own, rolling, pitching, axes = (picture(view.picture) for view in ball.views)
+    own, rolling, pitching, axes = (picture(shown.picture) for shown in ball.maps)
     assert own.tobytes() == rolling.tobytes() != pitching.tobytes()
     shades = {tuple((np.array(colormaps["cividis"](i / (SHADES - 1))[:3]) * 255).round()) for i in range(SHADES)}
     bright = max(shades, key=sum)
@@ -442,16 +453,16 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
 def test_axes_that_nobody_searched_stay_white():
     loaded = load_task(Path("ground_ahead"))
     few = AXES[np.abs(AXES[:, 0] - 60) <= 15]
-    axes = picture(sphere_of(loaded, ANGLES, few).views[-1].picture)
+    axes = picture(sphere(loaded, few).maps[-1].picture)
     assert axes.getpixel(cell(R_world_rot(np.radians(60), 0.0)[:, 2])) != (255, 255, 255)
     assert axes.getpixel(cell(R_world_rot(np.radians(-60), 0.0)[:, 2])) == (255, 255, 255)
-    assert len(sphere_of(loaded, ANGLES, AXES[:1]).views) == 3
+    assert len(sphere(loaded, AXES[:1]).maps) == 3
 
 
 def test_a_check_knows_its_bodies():
     names = ["alignment_linkage", "base_mount", "lidar_body", "lidar_cap", "ring_rotor", "servo_case", "servo_horn"]
     turning = {"alignment_linkage", "lidar_body", "lidar_cap", "ring_rotor", "servo_horn"}
-    bodies = {name: Body(np.zeros((1, 3, 3)), name in turning) for name in [*names, "servo_shaft"]}
+    bodies = {name: PlacedBody(np.zeros((1, 3, 3)), name in turning) for name in [*names, "servo_shaft"]}
     bought = {"UTM-30LX": "lidar", "MX-64R": "servo", "UH1256": "slip ring"}
     for where, expected in {
         "base_mount": {"base_mount"},
@@ -465,17 +476,17 @@ def test_a_check_knows_its_bodies():
         "fdm-0.4": set(),
         "": set(),
     }.items():
-        assert set(named_in(where, bodies, bought)) == expected, where
+        assert set(bodies_named(where, bodies, bought)) == expected, where
 
 
 def test_the_picture_of_a_check_is_dark_where_its_body_is(folder):
-    bodies = bodies_of(folder / "assembly.glb")
-    pictures = Pictures(bodies)
+    bodies = placed_bodies(load_glb(folder / "assembly.glb"))
+    pictures = CheckPictures(bodies)
     yaw, pitch = np.radians(40), np.radians(22)
     right = np.array([-np.sin(yaw), np.cos(yaw), 0])
     up = np.array([-np.cos(yaw) * np.sin(pitch), -np.sin(yaw) * np.sin(pitch), np.cos(pitch)])
     for name, body in bodies.items():
-        shot = np.asarray(picture(pictures.of((name,))), float)
+        shot = np.asarray(picture(pictures.picture((name,))), float)
         named = shot[:, :, 0] - shot[:, :, 2] > 60
         rows, columns = np.nonzero(named)
         every = np.concatenate([b.triangles_m.reshape(-1, 3) for b in bodies.values()])

@@ -12,11 +12,11 @@ from matplotlib.image import imread
 from design.angles import load_angles
 from design.search.optimum import optimum_of
 from design.task.task import load_task
-from scanwright.live.gate import guarded_server
+from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
-from scanwright.studio.state import painted, setting_of
-from scanwright.studio.view import sphere
-from scanwright.studio.view.workbench import Body, Workbench
+from scanwright.studio.state import Setting, painted
+from scanwright.studio.view import coloured_sphere, workers
+from scanwright.studio.view.scanner_bodies import BodyMesh
 
 HARMLESS = ("THREE.Clock", "GPU stall", "GL Driver Message", "inside passive event listener")
 
@@ -25,11 +25,11 @@ def box(_scanner, turning):
     """A stand-in for the kernel."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32) / 30
     faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]], np.uint32)
-    return (Body("box", corners + (0.1 if turning else -0.1), faces, (200, 90, 20)),)
+    return (BodyMesh("box", corners + (0.1 if turning else -0.1), faces, (200, 90, 20)),)
 
 
-def dots(view):
-    return np.tile(np.linspace(-0.5, 0.5, len(view.joint_rad), dtype=np.float32)[:, None], 3)
+def dots(_scanner, joint_rad, _placed, _folder):
+    return np.tile(np.linspace(-0.5, 0.5, len(joint_rad), dtype=np.float32)[:, None], 3)
 
 
 @contextmanager
@@ -37,8 +37,10 @@ def opened(folder, text):
     """The studio of a task, without the kernel, as it is started in a folder."""
     (folder / "small.toml").write_text(text)
     with guarded_server() as (server, gate), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sphere, "TILES", 300)  # drawn without a graphics card here
-        studio = Studio(server, load_task(folder / "small.toml"), Workbench(box, dots), folder, folder / "out")
+        patch.setattr(coloured_sphere, "TILES", 300)  # drawn without a graphics card here
+        patch.setattr(workers, "make_bodies", box)
+        patch.setattr(workers, "preview_scan", dots)
+        studio = Studio(server, load_task(folder / "small.toml"), folder, folder / "out")
         try:
             yield studio, gate
         finally:
@@ -96,7 +98,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
 
     # a slider moves J to the value that evaluate prints
     enter(page, 1, -50.0)
-    until(lambda: studio.facts.exact and studio.facts.setting == setting_of((0, -50, 0, -90)))
+    until(lambda: studio.facts.exact and studio.facts.setting == Setting((0, -50, 0, -90)))
     code, printed, _ = command("evaluate", folder / "small.toml", "--angles=0,-50,0,-90")
     J = printed.split()[1]
     assert code == 0 and f"{studio.facts.J:.5f}" == J
@@ -116,22 +118,22 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     dab = studio.judge.loaded.task.weight[1]
     assert dab.half_angle_deg == 12.0 and dab.value == 50.0
     found = studio.setting
-    assert studio.facts.J < studio.judge.exact(setting_of(before)).J - 0.01
+    assert studio.facts.J < studio.judge.exact(Setting(before)).J - 0.01
     studio.controls.look.value = "hidden"  # what is not drawn costs no time
 
     # side by side, and back
     page.get_by_role("button", name="Keep this setting").click()
     page.get_by_text("kept as A").wait_for()
     enter(page, 0, 10.0)
-    until(lambda: studio.setting.alpha_rot_deg == 10.0)
+    until(lambda: studio.setting.angles_deg[0] == 10.0)
     tab(page, "Compare")
     page.get_by_role("button", name="Restore").click()
     until(lambda: studio.setting == found)
 
     # the scanner and a scan are shown
-    assert studio.makers.settled(60)
+    assert studio.workers.settled(60)
     studio.controls.scene.value = "furnished room"
-    until(lambda: studio.stage.points > 0)
+    until(lambda: studio.view.points > 0)
 
     # a saved task is what was on the page
     tab(page, "Save")

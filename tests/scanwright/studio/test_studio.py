@@ -5,6 +5,7 @@ import os
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,15 +17,28 @@ from design.objective.problem import problem_of
 from design.objective.score import score
 from design.sphere.directions import spiral
 from design.task.task import load_task
+from firmware_io.twins.world import furnished_room
 from scanwright.studio.panel import panel_html
-from scanwright.studio.panel.facts import judge_of
-from scanwright.studio.state import MOST_DABS, Dab, painted, save_task, setting_of, task_text
-from scanwright.studio.view.latest_only import Newest
-from scanwright.studio.view.makers import Makers, Order, Shows
-from scanwright.studio.view.sphere import BLIND, RADIUS_M, density_colours, direction_hit, edges, highest_density, tiles
-from scanwright.studio.view.workbench import Body, Workbench
+from scanwright.studio.panel.facts import Judge
+from scanwright.studio.panel.kept_settings import KeptSettings
+from scanwright.studio.state import MOST_DABS, Dab, Setting, painted
+from scanwright.studio.task_file import save_task, task_text
+from scanwright.studio.view import workers
+from scanwright.studio.view.coloured_sphere import (
+    BLIND,
+    RADIUS_M,
+    density_colours,
+    direction_hit,
+    edges,
+    hexagons,
+    highest_density,
+)
+from scanwright.studio.view.latest_only import LatestOnly
+from scanwright.studio.view.preview_scan import MOST_RAYS, preview_scan
+from scanwright.studio.view.scanner_bodies import BodyMesh
+from scanwright.studio.view.workers import Order, Workers
 
-SETTING = setting_of((0, -55, -80, 75))
+SETTING = Setting((0.0, -55.0, -80.0, 75.0))
 
 
 @pytest.fixture
@@ -71,7 +85,7 @@ def test_a_saved_task_reads_back_as_what_was_on_the_page(tmp_path_factory, small
     folder = tmp_path_factory.mktemp("saved")
     (folder / "small.toml").write_text(small_task)
     now = painted(load_task(folder / "small.toml"), (Dab((x, y, 1.0), radius, "matters", value),))
-    setting = setting_of(angles)
+    setting = Setting.within_bounds(angles)
     again = load_task(save_task(now, folder, "mine", setting, overwrite=False))
     fixed = [again.task.angles.limits(name) for name in ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")]
     assert fixed == [(angle, angle) for angle in setting.angles_deg]
@@ -121,7 +135,7 @@ def test_every_shipped_task_can_be_saved(tmp_path):
 
 def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(loaded):
     problem = problem_of(loaded)
-    judge = judge_of(loaded, problem)
+    judge = Judge.for_task(loaded)
     truth = score(problem, SETTING.angles_rad)
     exact, quick = judge.exact(SETTING), judge.quick(SETTING)
     assert (exact.J, exact.J_error, exact.exact) == (truth.J, truth.J_error, True)
@@ -133,7 +147,7 @@ def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(
 def test_colours_are_pale_exactly_where_no_beam_comes(loaded):
     from design.evaluation.coverage import mean_density_at
 
-    problem, directions = problem_of(loaded), tiles().directions
+    problem, directions = problem_of(loaded), hexagons().directions
     highest = highest_density(problem, SETTING.angles_rad)
     colours = density_colours(problem, SETTING.angles_rad, directions, highest)
     blind = mean_density_at(problem, SETTING.angles_rad, directions) <= 1e-9
@@ -171,7 +185,7 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
         if wish == "bad":
             raise RuntimeError("a fault of one wish")
 
-    newest = Newest("test", work, rested.append, rest_s=0.01)
+    newest = LatestOnly("test", work, rested.append, rest_s=0.01)
     newest.wish(0)
     assert begun.wait(10)
     for wish in range(1, 50):
@@ -189,40 +203,78 @@ def bodies(scanner, turning):
     while not turning and not Path(os.environ["SCANWRIGHT_TEST_GO"]).exists():
         time.sleep(0.01)
     corners = np.eye(3, dtype=np.float32) * np.float32(scanner.angles.angles_deg.beta_rot)
-    return (Body("turning" if turning else "standing", corners, np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
+    return (BodyMesh("turning" if turning else "standing", corners, np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
 
 
-def points(view):
-    return np.full((len(view.joint_rad), 3), view.every, np.float32)
+def points(_scanner, joint_rad, _placed, _folder):
+    return np.zeros((len(joint_rad), 3), np.float32)
 
 
 def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp_path, monkeypatch):
     monkeypatch.setenv("SCANWRIGHT_TEST_GO", str(tmp_path / "go"))
-    shown, notes = {}, []
+    monkeypatch.setattr(workers, "make_bodies", bodies)
+    monkeypatch.setattr(workers, "preview_scan", points)
+    shown, said = {}, []
     problem = problem_of(loaded)
 
-    def show(name, value):
-        shown[name] = value
-        if shown.keys() >= {True, "points"}:  # what turns, and the scan, did not wait for what stands
-            (tmp_path / "go").touch()
+    class View:
+        def show_bodies(self, _, turning, made):
+            self._show(turning, made[0].vertices_m.max() if made else None)
 
-    shows = Shows(
-        bodies=lambda _, turning, made: show(turning, made[0].vertices_m.max() if made else None),
-        points=lambda _, points_m: show("points", points_m.shape),
-        note=lambda text, bad: notes.append((text, bad)),
-    )
-    makers = Makers(Workbench(bodies, points), shows)
+        def show_points(self, points_m):
+            self._show("points", points_m.shape)
+
+        def _show(self, name, value):
+            shown[name] = value
+            if shown.keys() >= {True, "points"}:  # what turns, and the scan, did not wait for what stands
+                (tmp_path / "go").touch()
+
+    all_three = Workers(View(), lambda text, bad: said.append((text, bad)))
     try:
-        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, "room"))
-        assert makers.settled(60)
+        all_three.order(Order(loaded, problem, Setting((0, 40, 0, 0)), True, "room"))
+        assert all_three.settled(60)
         assert shown == {True: 40, False: 40, "points": (80, 3)}
-        assert notes[-1] == ("", False)
-        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 13)), True, ""))
-        assert makers.settled(60)
-        assert notes[-1] == ("alignment_linkage: no room", True)
+        assert said[-1] == ("", False)
+        all_three.order(Order(loaded, problem, Setting((0, 40, 0, 13)), True, ""))
+        assert all_three.settled(60)
+        assert said[-1] == ("alignment_linkage: no room", True)
         assert shown[True] is shown[False] is None  # and no other setting's parts stay
-        makers.order(Order(loaded, problem, setting_of((0, 40, 0, 0)), True, ""))
-        assert makers.settled(60)
-        assert (shown[True], notes[-1]) == (40, ("", False))
+        all_three.order(Order(loaded, problem, Setting((0, 40, 0, 0)), True, ""))
+        assert all_three.settled(60)
+        assert (shown[True], said[-1]) == (40, ("", False))
     finally:
-        makers.close()
+        all_three.close()
+
+
+def test_the_preview_draws_as_many_points_as_a_page_can_and_stands_on_the_walls_of_the_room(loaded, tmp_path):
+    order = Order(loaded, problem_of(loaded), SETTING, True, "room")
+    joint_rad = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
+    seen = preview_scan(order.scanner(), joint_rad, None, tmp_path)
+    assert 10_000 < len(seen) <= MOST_RAYS
+    low, high = furnished_room().reshape(-1, 3).min(axis=0), furnished_room().reshape(-1, 3).max(axis=0)
+    assert ((seen > low - 0.2) & (seen < high + 0.2)).all()
+
+
+def test_what_is_kept_while_the_others_are_judged_again_stays_and_is_judged_by_the_same_task(loaded):
+    hidden = painted(loaded, (Dab((1.0, 0.0, -1.0), 20.0, "hidden"),))
+    before, after = Judge.for_task(loaded), Judge.for_task(hidden)
+    judging, kept_one = threading.Event(), threading.Event()
+
+    class Slow:
+        settled = staticmethod(after.settled)
+
+        def exact(self, setting):
+            judging.set()
+            kept_one.wait(0.5)  # one that waits for this may be kept only after it
+            return after.exact(setting)
+
+    controls = SimpleNamespace(table=SimpleNamespace(), kept=SimpleNamespace(value=""))
+    kept = KeptSettings(controls, lambda _: None, before)
+    thread = threading.Thread(target=kept.rejudge, args=(Slow(),))
+    thread.start()
+    assert judging.wait(10)
+    name = kept.keep(SETTING)
+    kept_one.set()
+    thread.join(20)
+    assert controls.kept.options == ("rolling", "pitching", name) and ">A<" in controls.table.content
+    assert f"{after.exact(SETTING).J:.4f}" in controls.table.content

@@ -1,9 +1,6 @@
 """Who may talk to a live page: the one who has its address, from this computer, in small and known messages.
 
-viser serves its page and its websocket from one asyncio server of the `websockets` library and knows no visitors. So
-that server is opened through here: on a socket that is bound to 127.0.0.1 before viser sees it, with a check of every
-request before it is answered and of every message before viser reads it. One server and one port: no relay whose
-hidden port a page in the browser could find. Refused are
+Every request is checked before it is answered, and every message before viser reads it. Refused are
 
 - a request without the token, which the address carries once and a cookie (HttpOnly, SameSite=Strict) afterwards;
 - another Host than this computer's: a name that was bent to 127.0.0.1 (DNS rebinding);
@@ -22,17 +19,13 @@ import math
 import secrets
 import socket
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 import msgspec
-import rich
-import viser
-import viser._messages as wire
-import websockets.asyncio.server as library
+import viser.infra
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
@@ -42,16 +35,8 @@ from design.errors import TaskError
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
 MOST_VISITORS = 8
 MOST_TEXT = 200
-KNOWN = {
-    kind.__name__: kind
-    for kind in (
-        wire.ViewerCameraMessage,
-        wire.GuiUpdateMessage,
-        wire.SceneNodeClickMessage,
-        wire.SceneNodeDragMessage,
-        wire.ScenePointerMessage,
-    )
-}
+SAID = "ViewerCameraMessage", "GuiUpdateMessage", "SceneNodeClickMessage", "SceneNodeDragMessage", "ScenePointerMessage"
+KNOWN: dict[str, Any] = {kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in SAID}
 """What a page may say; everything else is dropped and counted."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
@@ -134,7 +119,7 @@ class Gate:
         except (msgspec.MsgspecError, KeyError, TypeError, AttributeError, RecursionError, ValueError):
             return False
         # viser writes whatever attribute of a control a message names: only its value is the page's to change
-        return fits and (kind is not wire.GuiUpdateMessage or set(told["updates"]) == {"value"})
+        return fits and (kind is not KNOWN["GuiUpdateMessage"] or set(told["updates"]) == {"value"})
 
     def _headers(self) -> dict[str, str]:
         own = " ".join(f"ws://{host}" for host in sorted(self._hosts))
@@ -150,70 +135,6 @@ class Gate:
             "X-Content-Type-Options": "nosniff",
             "Cache-Control": "no-store",
         }
-
-
-@contextmanager
-def guarded_server(port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
-    """A viser server that listens behind a gate while the body runs; `port` 0 is any that is free.
-
-    Raises:
-        TaskError: the port is taken.
-    """
-    gate = Gate(port)
-    rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
-    opening = library.serve
-    library.serve = _opening(gate, opening)  # type: ignore[assignment, misc]
-    try:
-        server = viser.ViserServer(host="127.0.0.1", port=gate.port, verbose=False)
-    finally:
-        library.serve = opening  # type: ignore[misc]
-    if not gate.opened:  # viser serves in another way than it did: never without the gate
-        server.stop()
-        raise RuntimeError("viser did not open its server through websockets.asyncio.server.serve")
-    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-    try:
-        yield server, gate
-    finally:
-        server.stop()
-        gate.socket.close()
-
-
-def _opening(gate: Gate, opening: Callable[..., Any]) -> Callable[..., Any]:
-    """`websockets.asyncio.server.serve` as viser is to find it."""
-
-    class Guarded(ServerConnection):
-        async def recv(self, decode: bool | None = None) -> Any:
-            while True:
-                data = await super().recv(decode)
-                if gate.admits(data):
-                    return data
-                gate.refused["unknown message"] += 1
-
-    def serve(
-        handler: Callable[[ServerConnection], Awaitable[None]],
-        _host: str,
-        _port: int,
-        *,
-        process_request: Answer,
-        **options: Any,
-    ) -> Any:
-        async def counted(connection: ServerConnection) -> None:
-            gate.visitors += 1
-            try:
-                await handler(connection)
-            finally:
-                gate.visitors -= 1
-
-        gate.opened = True
-        return opening(
-            counted,
-            sock=gate.socket,
-            process_request=gate.answering(process_request),
-            create_connection=Guarded,
-            **(options | {"max_size": MOST_BYTES}),
-        )
-
-    return serve
 
 
 def _bound(port: int) -> socket.socket:

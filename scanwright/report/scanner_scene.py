@@ -17,8 +17,7 @@ from design.angles import AngleSet
 from design.frames import Array, apply
 from design.motion import Sweep
 from design.shadow import AXIS_STEPS, Shadow
-from scanwright.report.answer import as_built
-from scanwright.report.where import Body
+from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
 FULL_TURN_DEG = (0.0, 360.0)
@@ -28,24 +27,36 @@ Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  
 FRAMES = ("rot", "laser")
 
 
-def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | None) -> dict[str, Any]:
+def load_glb(path: Path) -> Any:
+    """A scene of trimesh, as `cad` writes it.
+
+    Raises:
+        ValueError: a frame of the scanner is missing.
+    """
+    import trimesh
+
+    scene = trimesh.load_scene(path, process=False)
+    if missing := set(FRAMES) - set(scene.graph.nodes):
+        raise ValueError(f"no frame {' and '.join(sorted(missing))}")
+    return scene
+
+
+def scanner_scene(
+    assembly: Any, exploded: Any | None, angles: AngleSet, own_body: tuple[Shadow, Array] | None
+) -> dict[str, Any]:
     """What the page draws, ready for JSON.
 
     Args:
-        folder: build folder with `assembly.glb`; without `exploded.glb` nothing explodes.
+        assembly: of `assembly.glb`.
+        exploded: of `exploded.glb`; without it nothing explodes.
         angles: for the motion.
         own_body: what the parts hide, and the bearings of the beams [rad]; without it there is no fan.
-
-    Raises:
-        BuildError: a file is not as a build writes it.
     """
-    assembly, exploded = _load(folder / "assembly.glb"), folder / "exploded.glb"
-    apart = _load(exploded) if exploded.is_file() else None
     turning = assembly.graph.transforms.successors("rot")
     bodies, together, spread = [], [], []
     for node in sorted(assembly.graph.nodes_geometry):
         T_world_body, mesh = _pose(assembly, node), assembly.geometry[assembly.graph.get(node)[1]]
-        T_apart = T_world_body if apart is None else _pose(apart, node)
+        T_apart = T_world_body if exploded is None else _pose(exploded, node)
         together.append(apply(T_world_body, mesh.vertices))
         spread.append(apply(T_apart, mesh.vertices))
         vertices, number = np.unique(mesh.vertices, axis=0, return_inverse=True)  # they differ in their normals
@@ -55,8 +66,8 @@ def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | No
                 "name": node,
                 "turns": node in turning,
                 "colour": _srgb(mesh.visual.material.baseColorFactor),
-                "matrix": _columns(T_world_body),
-                "apart": _columns(T_apart),
+                "matrix": _column_by_column(T_world_body),
+                "apart": _column_by_column(T_apart),
                 "vertices": _packed(vertices, "<f4"),
                 "faces": _packed(number.reshape(-1)[mesh.faces], "<u4" if wide else "<u2"),
                 "wide": wide,
@@ -70,41 +81,26 @@ def scene_of(folder: Path, angles: AngleSet, own_body: tuple[Shadow, Array] | No
         "bodies": bodies,
         "fit": _fit(together),
         "fit_apart": _fit(spread),
-        "explodes": apart is not None,
-        "axis": _columns(T_world_rot),
-        "axis_inverse": _columns(np.linalg.inv(T_world_rot)),
+        "explodes": exploded is not None,
+        "axis": _column_by_column(T_world_rot),
+        "axis_inverse": _column_by_column(np.linalg.inv(T_world_rot)),
         "reach": round(reach, 6),
         "limits_deg": list(angles.motion.limits_deg if isinstance(angles.motion, Sweep) else FULL_TURN_DEG),
         "period_s": A_TURN_S if angles.motion is None else angles.motion.duration_s,
         "to_and_fro": isinstance(angles.motion, Sweep),
-        "laser": _columns(T_world_laser),
+        "laser": _column_by_column(T_world_laser),
         "fan": None if own_body is None else _fan(*own_body),
     }
 
 
-def bodies_of(path: Path) -> dict[str, Body]:
-    """The bodies of `assembly.glb` as they stand in the world.
-
-    Raises:
-        BuildError: the file is not as a build writes it.
-    """
-    assembly = _load(path)
+def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
+    """The bodies of `assembly.glb` as they stand in the world."""
     turning = assembly.graph.transforms.successors("rot")
     bodies = {}
     for node in sorted(assembly.graph.nodes_geometry):
         mesh = assembly.geometry[assembly.graph.get(node)[1]]
-        bodies[node] = Body(apply(_pose(assembly, node), mesh.vertices)[mesh.faces], node in turning)
+        bodies[node] = PlacedBody(apply(_pose(assembly, node), mesh.vertices)[mesh.faces], node in turning)
     return bodies
-
-
-def _load(path: Path) -> Any:
-    import trimesh
-
-    with as_built(path):
-        scene = trimesh.load_scene(path, process=False)
-        if missing := set(FRAMES) - set(scene.graph.nodes):
-            raise ValueError(f"no frame {' and '.join(sorted(missing))}")
-    return scene
 
 
 def _pose(scene: Any, node: str) -> Array:
@@ -134,7 +130,7 @@ def _srgb(linear: ArrayLike) -> list[float]:
     return np.round(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055), 3).tolist()
 
 
-def _columns(matrix: Array) -> list[float]:
+def _column_by_column(matrix: Array) -> list[float]:
     return (np.round(matrix, 9).T.ravel() + 0.0).tolist()
 
 

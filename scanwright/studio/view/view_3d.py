@@ -9,9 +9,10 @@ import viser
 
 from design.frames import Array, R_world_rot
 from design.objective.problem import Problem
+from scanwright.serving.style import Colours, ramp
 from scanwright.studio.state import Setting
-from scanwright.studio.view.sphere import RADIUS_M, Colours, density_colours, edges, ramp, tiles
-from scanwright.studio.view.workbench import Body
+from scanwright.studio.view.coloured_sphere import RADIUS_M, density_colours, edges, hexagons
+from scanwright.studio.view.scanner_bodies import BodyMesh
 
 Look = Literal["from inside", "from outside", "hidden"]
 SIDES: dict[Look, Literal["front", "back"]] = {"from inside": "back", "from outside": "front", "hidden": "back"}
@@ -20,7 +21,7 @@ WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
 POINT_M = 0.012
 
 
-class Stage:
+class View3D:
     """The scene of one page."""
 
     def __init__(self, server: viser.ViserServer) -> None:
@@ -38,7 +39,7 @@ class Stage:
         self._scanner = self._scene.add_frame("/scanner", show_axes=False)
         self._scene.add_label("/ahead", "ahead", position=(1.12 * RADIUS_M, 0.0, 0.0))
         self._scene.add_label("/left", "left", position=(0.0, 1.12 * RADIUS_M, 0.0))
-        self.tiles = tiles()
+        self.tiles = hexagons()
         self.sphere = self._scene.add_batched_meshes_simple(
             "/sphere",
             self.tiles.corners_m,
@@ -101,7 +102,7 @@ class Stage:
             else:
                 self._scene.remove_by_name(node)
 
-    def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[Body, ...]) -> None:
+    def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Put up the half of the scanner that turns, or the one that stands, in place of what stood there."""
         half = "turning" if turning else "standing"
         self._scanner.wxyz = _wxyz(R_world_rot(*setting.angles_rad[:2]))

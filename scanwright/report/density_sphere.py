@@ -6,8 +6,6 @@ a build have the same colours.
 
 from __future__ import annotations
 
-import io
-from base64 import b64encode
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +20,8 @@ from design.angles import AngleSet, standard_settings
 from design.evaluation.coverage import mean_density_at
 from design.frames import Array, R_world_rot
 from design.objective.problem import Problem
-from design.task.task import LoadedTask
-from scanwright.report.answer import problem_as_built, setting_of
+from scanwright.report.answer import mounting_rad
+from scanwright.report.data_uri import png_uri
 
 STEP_DEG = 0.5
 DARKEST = 300  # times fewer beams than the most: the same as in density.png
@@ -41,7 +39,7 @@ Indices = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class SphereMap:
     """One picture of the sphere.
 
     Attributes:
@@ -58,46 +56,44 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere:
+class DensitySphere:
     """The pictures of one build.
 
     Attributes:
-        views: at least one.
+        maps: at least one.
         axis_world: direction of the rotation axis.
         look_deg: yaw and pitch of the camera at the start, somewhat beside the middle of what counts.
     """
 
-    views: tuple[View, ...]
+    maps: tuple[SphereMap, ...]
     axis_world: tuple[float, ...]
     look_deg: tuple[float, float]
 
     def data(self) -> dict[str, Any]:
         """What the page needs beside the pictures, ready for JSON."""
-        views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.views]
+        views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.maps]
         return {"axis": list(self.axis_world), "look_deg": list(self.look_deg), "views": views}
 
 
-def sphere_of(loaded: LoadedTask, angles: AngleSet, axes: Array | None) -> Sphere:
+def density_sphere(problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float) -> DensitySphere:
     """Density of the scanner and of the standard alignments on one scale, J over the axes, and where the axis points.
 
     Args:
-        loaded: the task.
+        problem: the task, `problem_as_built`.
         angles: what was built.
         axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
-
-    Raises:
-        TaskError: no direction of the task has a weight.
+        step_deg: of the grid that was searched.
     """
-    problem, setting = problem_as_built(loaded, angles), setting_of(angles)
+    setting = mounting_rad(angles)
     directions, shape = _directions()
     weight = problem.field.weight_at(directions).reshape(shape)
     masked = problem.field.masked_at(directions).reshape(shape)
-    views = _densities(problem, {"this scanner": setting} | standard_settings(), directions, weight, masked)
+    maps = _densities(problem, {"this scanner": setting} | standard_settings(), directions, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
-        views.append(_over_axes(axes, loaded.task.angles.step_deg, directions, shape))
+        maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
     solid_angle = np.sqrt(1 - directions[:, 2] ** 2)
-    return Sphere(tuple(views), axis, _look((weight.ravel() * solid_angle) @ directions))
+    return DensitySphere(tuple(maps), axis, _look((weight.ravel() * solid_angle) @ directions))
 
 
 def _look(middle: Array) -> tuple[float, float]:
@@ -119,7 +115,7 @@ def _directions() -> tuple[Array, tuple[int, int]]:
 
 def _densities(
     problem: Problem, settings: dict[str, Array], directions: Array, weight: Array, masked: NDArray[np.bool_]
-) -> list[View]:
+) -> list[SphereMap]:
     maps = {
         name: mean_density_at(problem, angles, directions).reshape(weight.shape) for name, angles in settings.items()
     }
@@ -127,12 +123,12 @@ def _densities(
     scale = LogNorm(max(1.0, highest / DARKEST), max(highest, 2.0), clip=True)
     words = f"{scale.vmin:,.0f} beams or fewer", f"{scale.vmax:,.0f}"
     return [
-        View(f"density of {name}", *words, _png(_framed(_shades(density, scale, density < 1e-9), weight, masked)))
+        SphereMap(f"density of {name}", *words, _png(_framed(_shades(density, scale, density < 1e-9), weight, masked)))
         for name, density in maps.items()
     ]
 
 
-def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int, int]) -> View:
+def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int, int]) -> SphereMap:
     """Lowest J about the nearest axis of the grid; nothing where none is near."""
     known = axes[np.isfinite(axes[:, 2])]
     known = known[np.argsort(known[:, 2], kind="stable")]
@@ -143,7 +139,7 @@ def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int
     best, worst = float(known[0, 2]), float(np.quantile(known[:, 2], WORST))
     scale = Normalize(-max(worst, best + 1e-9), -best, clip=True)
     far = (distance > 0.75 * np.radians(step_deg)).reshape(shape)
-    return View(
+    return SphereMap(
         "J over the direction of the axis", f"J {worst:.3f} or more", f"{best:.3f}", _png(_shades(-J, scale, far))
     )
 
@@ -178,9 +174,7 @@ def _wider(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _png(indices: Indices) -> str:
     image = Image.fromarray(indices)
     image.putpalette(_palette())
-    stream = io.BytesIO()
-    image.save(stream, format="PNG", optimize=True)
-    return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
+    return png_uri(image)
 
 
 def _palette() -> list[int]:

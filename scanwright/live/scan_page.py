@@ -13,6 +13,8 @@ from design.angles import load_angles
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Watch, growing
 
+ALONE_S = 10.0
+
 
 @contextmanager
 def live_page(folder: Path, *, wanted: bool) -> Iterator[Watch]:
@@ -34,9 +36,17 @@ def live_page(folder: Path, *, wanted: bool) -> Iterator[Watch]:
 
 
 def _show(receiving: Connection, folder: Path) -> None:
-    """What the page's process does."""
-    from scanwright.live.page_life import run_live
+    """What the page's process does: show the cloud, and once it is full, wait until nobody looks at it."""
+    from scanwright.live.cloud_view import CloudView
+    from scanwright.serving.page_server import guarded_server, wait_until_alone
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     placing = Placing(load_angles(folder / "angles.json"), own_body_beside(folder / "angles.json"))
-    run_live(growing(receiving, placing), f"scan of {folder.name}")
+    with guarded_server() as (server, gate):
+        view = CloudView(server, f"scan of {folder.name}")
+        print(f"open {gate.address}", flush=True)
+        for growth in growing(receiving, placing):
+            view.add(growth)
+        view.tell("the scan is done; this page ends when you close it")
+        if gate.visitors:
+            wait_until_alone(gate, ALONE_S)

@@ -6,8 +6,6 @@ read in grey. They are cast like beams, in a parallel projection from where the 
 
 from __future__ import annotations
 
-import io
-from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,6 +15,7 @@ from PIL import Image
 
 from design.frames import Array
 from design.scene import ray_caster
+from scanwright.report.data_uri import png_uri
 
 SIZE = 200, 150  # pixels, wide and high
 FINER = 2  # rays per pixel and side
@@ -30,14 +29,14 @@ PREFIXES = {"lidar": "lidar_", "slip ring": "ring_"}
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class PlacedBody:
     """One body of the scanner as it stands: corners of its triangles [m], shape (t, 3, 3), and whether it turns."""
 
     triangles_m: Array
     turns: bool
 
 
-def named_in(where: str, bodies: Mapping[str, Body], bought: Mapping[str, str]) -> tuple[str, ...]:
+def bodies_named(where: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]) -> tuple[str, ...]:
     """Names of the bodies that a check's `where` is about, in alphabetical order; none where it is no place.
 
     Args:
@@ -64,17 +63,17 @@ def named_in(where: str, bodies: Mapping[str, Body], bought: Mapping[str, str]) 
     return tuple(sorted(found))
 
 
-class Pictures:
+class CheckPictures:
     """Pictures of one scanner, each drawn once."""
 
-    def __init__(self, bodies: Mapping[str, Body]) -> None:
+    def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
         self._bodies = bodies
         corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
         self._origins, self._direction = _rays(corners)
         self._nearest, self._shade = self._cast(tuple(bodies))
         self._drawn: dict[tuple[str, ...], str] = {}
 
-    def of(self, names: tuple[str, ...]) -> str:
+    def picture(self, names: tuple[str, ...]) -> str:
         """The scanner with some of its bodies in front, PNG as a data address."""
         if names not in self._drawn:
             self._drawn[names] = self._draw(names)
@@ -89,10 +88,7 @@ class Pictures:
         colour = np.where(front, strong, np.where(named, THROUGH * strong + (1 - THROUGH) * pale, pale))
         width, height = SIZE
         fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
-        image = Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS)
-        stream = io.BytesIO()
-        image.save(stream, format="PNG", optimize=True)
-        return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
+        return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))
 
     def _cast(self, names: tuple[str, ...]) -> tuple[Array, NDArray[np.float64]]:
         """Distance along each ray to the first of some bodies, inf where there is none, and its brightness 0 to 1."""

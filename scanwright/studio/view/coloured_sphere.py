@@ -13,28 +13,18 @@ from design.frames import Array
 from design.objective.problem import Problem
 from design.sphere.directions import spiral
 from design.sphere.regions import Field
+from scanwright.serving.style import Colours, ramp
 
 TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second
 RADIUS_M = 0.5
 OVERLAP = 1.25  # of the hexagons, so that no seam shows
 BLIND = (236, 236, 240)
 LEAST_OF_HIGHEST = 300  # the scale of `density.png`
-COLOUR_STOPS = (  # dark to light, readable in grey and for the colour-blind: a few stops of cividis
-    (0, 34, 78),
-    (50, 69, 108),
-    (102, 105, 112),
-    (150, 144, 119),
-    (205, 189, 104),
-    (253, 231, 55),
-)
 EDGE_STEP_DEG = 1.0
-EDGE_LIFT = 0.996  # of the radius: edges are drawn just inside the tiles, and just outside
-
-Colours = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Tiles:
+class Hexagons:
     """Hexagons of equal area.
 
     Attributes:
@@ -50,7 +40,7 @@ class Tiles:
     wxyz: Array
 
 
-def tiles() -> Tiles:
+def hexagons() -> Hexagons:
     """The sphere of `RADIUS_M` in tiles."""
     directions = spiral(TILES)
     side = OVERLAP * RADIUS_M * np.sqrt(4 * np.pi / TILES / (1.5 * 3**0.5))
@@ -60,7 +50,7 @@ def tiles() -> Tiles:
     x, y, z = directions.T  # the spiral never reaches -z, where this has no value
     w = np.sqrt((1 + z) / 2)
     wxyz = np.stack([w, -y / (2 * w), x / (2 * w), np.zeros(TILES)], axis=1)
-    return Tiles(directions, rim, np.array(faces, np.uint32), wxyz)
+    return Hexagons(directions, rim, np.array(faces, np.uint32), wxyz)
 
 
 def highest_density(problem: Problem, angles_rad: Array) -> float:
@@ -77,14 +67,6 @@ def density_colours(problem: Problem, angles_rad: Array, directions: Array, high
     lowest = max(1.0, highest / LEAST_OF_HIGHEST)
     level = np.log(np.clip(density, lowest, highest) / lowest) / max(np.log(highest / lowest), 1e-9)
     return np.where(density[:, None] > 1e-9, ramp(level), np.array(BLIND, np.uint8))
-
-
-def ramp(level: Array) -> Colours:
-    """Colours of levels 0 .. 1, shape (n, 3); NaN counts as 0."""
-    stops = np.array(COLOUR_STOPS, dtype=float)
-    at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
-    columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
-    return np.stack(columns, axis=1).astype(np.uint8)
 
 
 def edges(field: Field) -> tuple[Array, Array]:

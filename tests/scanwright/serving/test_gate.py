@@ -11,7 +11,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from design.errors import TaskError
-from scanwright.live.gate import MOST_VISITORS, guarded_server
+from scanwright.serving.gate import MOST_VISITORS
+from scanwright.serving.page_server import guarded_server
 
 CAMERA = {
     "type": "ViewerCameraMessage",

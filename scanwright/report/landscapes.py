@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from base64 import b64encode
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,6 +10,7 @@ from matplotlib.figure import Figure
 from design.angles import AngleSet, standard_settings
 from design.evaluation.landscape_picture import draw_landscape
 from design.frames import Array
+from scanwright.report.data_uri import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")
 AXIS = ("alpha_rot", "beta_rot")
@@ -37,4 +37,4 @@ def landscape(rows: Array, names: tuple[str, str], angles: AngleSet, label: str)
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
-    return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
+    return data_uri(stream.getvalue())

@@ -8,12 +8,11 @@ from typing import Literal
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
-from scanwright.studio.panel.panel_html import note_html
-from scanwright.studio.view.sphere import Colours, ramp
+from firmware_io.samples import Float32s
+from firmware_io.scan.live_feed import Growth
+from scanwright.serving.style import Colours, note_html, ramp
 
-Float32s = NDArray[np.float32]
 ColourBy = Literal["height", "intensity", "time"]
 COLOUR_BY: tuple[ColourBy, ...] = ("height", "intensity", "time")
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
@@ -30,7 +29,7 @@ class _Chunk:
     handle: viser.PointCloudHandle
 
 
-class LiveView:
+class CloudView:
     """The page of one scan."""
 
     def __init__(self, server: viser.ViserServer, title: str) -> None:
@@ -38,7 +37,7 @@ class LiveView:
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
         self._spans: dict[ColourBy, tuple[float, float]] = {}
-        self.points, self.forgotten, self.lost = 0, 0, 0
+        self.points, self.forgotten = 0, 0
         server.initial_camera.position = (-4.0, -3.0, 3.0)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.scene.add_frame("/scanner", axes_length=0.3, axes_radius=0.01)
@@ -50,19 +49,26 @@ class LiveView:
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
 
-    def add(self, points_m: Float32s, intensity: Float32s, time_s: Float32s) -> None:
-        """Points that are new: (n, 3), (n,), (n,)."""
-        if len(points_m):
-            self._spread({"height": points_m[:, 2], "intensity": intensity, "time": time_s})
-            self._append(points_m, {"height": points_m[:, 2], "intensity": intensity, "time": time_s})
-            self.points += len(points_m)
+    def add(self, growth: Growth) -> None:
+        """Show what is new, and say what the scan said."""
+        if len(growth.points_m):
+            values: dict[ColourBy, Float32s] = {
+                "height": growth.points_m[:, 2],
+                "intensity": growth.intensity,
+                "time": growth.time_s,
+            }
+            self._spread(values)
+            self._append(growth.points_m, values)
+            self.points += len(growth.points_m)
             while sum(len(chunk.points_m) for chunk in self.chunks) > MOST_POINTS:
                 oldest = self.chunks.popleft()
                 self.forgotten += len(oldest.points_m)
                 oldest.handle.remove()
         left = f"; the view forgot the oldest {self.forgotten:,}" if self.forgotten else ""
-        left += f"; it left out {self.lost:,} scans, the recording none" if self.lost else ""
+        left += f"; it left out {growth.lost:,} scans, the recording none" if growth.lost else ""
         self.facts.content = note_html(f"{self.points:,} points{left}")
+        for line in growth.lines:
+            self.tell(line)
 
     def tell(self, line: str) -> None:
         """Speed, rates, dropped and bad packets, as the scan says them."""

@@ -11,18 +11,15 @@ from threading import Thread
 STEPS = 50  # lines that a build of ground_ahead says; others say a few more or less
 
 
-def build_command(task_file: Path, out: Path) -> list[str]:
-    """What a person would type, with this very interpreter; -P: no module of the folder it runs in."""
-    return [sys.executable, "-P", "-m", "scanwright", "build", str(task_file), "--out", str(out)]
-
-
-class Building:
+class BuildProcess:
     """One build that runs; `told` gets the share done and the last line, `done` the exit code and the last line."""
 
     def __init__(
-        self, command: list[str], told: Callable[[float, str], None], done: Callable[[int, str], None]
+        self, task_file: Path, out: Path, told: Callable[[float, str], None], done: Callable[[int, str], None]
     ) -> None:
         self._told, self._done = told, done
+        # what a person would type, with this very interpreter; -P: no module of the folder it runs in
+        command = [sys.executable, "-P", "-m", "scanwright", "build", str(task_file), "--out", str(out)]
         self._process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )

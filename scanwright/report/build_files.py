@@ -1,0 +1,58 @@
+"""Readers of a build folder's files: what is missing is None, what no build wrote is one line for a person."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+from zipfile import BadZipFile
+
+import numpy as np
+
+from design.errors import BuildError
+from design.frames import Array
+from scanwright.report.data_uri import data_uri
+
+T = TypeVar("T")
+
+
+def read(path: Path, reader: Callable[[Path], T]) -> T | None:
+    """What a reader makes of a file; None where there is none.
+
+    Raises:
+        BuildError: the file is not as a build writes it.
+    """
+    if not path.is_file():
+        return None
+    try:
+        return reader(path)
+    except (OSError, EOFError, ValueError, LookupError, TypeError, BadZipFile) as error:
+        raise BuildError(f"{path}: not as a build writes it ({error}): build the folder again") from error
+
+
+def read_text(path: Path) -> str:
+    """UTF-8."""
+    return path.read_text(encoding="utf-8")
+
+
+def read_json(path: Path) -> Any:
+    """Whatever the file holds."""
+    return json.loads(read_text(path))
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Rows of a CSV file by the names of its columns."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def read_columns(path: Path, columns: tuple[str, ...]) -> Array:
+    """Columns of a table of numbers, shape (rows, columns)."""
+    return np.array([[float(row[column]) for column in columns] for row in read_table(path)]).reshape(-1, len(columns))
+
+
+def read_picture(path: Path) -> str:
+    """A picture as a data address."""
+    return data_uri(path.read_bytes(), path.suffix)

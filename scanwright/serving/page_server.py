@@ -1,0 +1,94 @@
+"""A page is served through its gate, says its address, and ends when its last visitor has been gone for a while.
+
+viser serves its page and its websocket from one asyncio server of the `websockets` library and knows no visitors. So
+that server is opened through here: on a socket that is bound to 127.0.0.1 before viser sees it, each connection behind
+the gate. One server and one port: no relay whose hidden port a page in the browser could find.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import rich
+import viser
+import websockets.asyncio.server as library
+from websockets.asyncio.server import ServerConnection
+
+from scanwright.serving.gate import MOST_BYTES, Answer, Gate
+
+
+@contextmanager
+def guarded_server(port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
+    """A viser server that listens behind a gate while the body runs; `port` 0 is any that is free.
+
+    Raises:
+        TaskError: the port is taken.
+    """
+    gate = Gate(port)
+    rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
+    # viser 1.1 takes a host and a port (`ViserServer`, `viser.infra.WebsockServer`), no socket and no check of its own
+    opening = library.serve
+    library.serve = _opening(gate, opening)  # type: ignore[assignment, misc]
+    try:
+        server = viser.ViserServer(host="127.0.0.1", port=gate.port, verbose=False)
+    finally:
+        library.serve = opening  # type: ignore[misc]
+    if not gate.opened:  # viser serves in another way than it did: never without the gate
+        server.stop()
+        raise RuntimeError("viser did not open its server through websockets.asyncio.server.serve")
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+    try:
+        yield server, gate
+    finally:
+        server.stop()
+        gate.socket.close()
+
+
+def _opening(gate: Gate, opening: Callable[..., Any]) -> Callable[..., Any]:
+    """`websockets.asyncio.server.serve` as viser is to find it."""
+
+    class Guarded(ServerConnection):
+        async def recv(self, decode: bool | None = None) -> Any:
+            while True:
+                data = await super().recv(decode)
+                if gate.admits(data):
+                    return data
+                gate.refused["unknown message"] += 1
+
+    def serve(
+        handler: Callable[[ServerConnection], Awaitable[None]],
+        _host: str,
+        _port: int,
+        *,
+        process_request: Answer,
+        **options: Any,
+    ) -> Any:
+        async def counted(connection: ServerConnection) -> None:
+            gate.visitors += 1
+            try:
+                await handler(connection)
+            finally:
+                gate.visitors -= 1
+
+        gate.opened = True
+        return opening(
+            counted,
+            sock=gate.socket,
+            process_request=gate.answering(process_request),
+            create_connection=Guarded,
+            **(options | {"max_size": MOST_BYTES}),
+        )
+
+    return serve
+
+
+def wait_until_alone(gate: Gate, alone_s: float) -> None:
+    """Return when no page has been open for that long."""
+    seen_s = time.monotonic()
+    while time.monotonic() - seen_s < alone_s:
+        time.sleep(min(0.5, alone_s / 4))
+        if gate.visitors:
+            seen_s = time.monotonic()

@@ -1,0 +1,36 @@
+"""How live pages look: a line of text for a person, and the scale of colours."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.frames import Array
+
+COLOUR_STOPS = (  # dark to light, readable in grey and for the colour-blind: a few stops of cividis
+    (0, 34, 78),
+    (50, 69, 108),
+    (102, 105, 112),
+    (150, 144, 119),
+    (205, 189, 104),
+    (253, 231, 55),
+)
+
+Colours = NDArray[np.uint8]
+
+
+def ramp(level: Array) -> Colours:
+    """Colours of levels 0 .. 1, shape (n, 3); NaN counts as 0."""
+    stops = np.array(COLOUR_STOPS, dtype=float)
+    at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
+    columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
+    return np.stack(columns, axis=1).astype(np.uint8)
+
+
+def note_html(text: str, *, bad: bool = False) -> str:
+    """One line for a person, nothing where it is empty; red where something is refused."""
+    colour = ";color:#c92a2a" if bad else ""
+    line = f'<div style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere{colour}">{escape(text)}</div>'
+    return line if text else ""

@@ -1,0 +1,42 @@
+"""One sitting at the studio: its page is served until nobody has looked at it for some minutes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from design.task.task import LoadedTask
+from scanwright.serving.page_server import guarded_server, wait_until_alone
+from scanwright.studio.page import Studio
+
+ALONE_S = 300.0
+
+
+def run_studio(
+    loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str], None], alone_s: float = ALONE_S
+) -> None:
+    """Serve the studio of a task, and print its address.
+
+    Task files are saved to the folder that this was started in.
+
+    Args:
+        loaded: the task that is opened first.
+        port: of 127.0.0.1; 0 is any that is free.
+        out: folder that holds the builds.
+        say: is told of progress, and at the end what was refused.
+        alone_s: the time without a visitor after which it ends.
+
+    Raises:
+        TaskError: the port is taken, or the task has no region.
+    """
+    with guarded_server(port) as (server, gate):
+        say("reading the task (the first run compiles the numerics: some 20 s)")
+        studio = Studio(server, loaded, Path.cwd(), out)
+        try:
+            print(f"open {gate.address}", flush=True)
+            print(f"Ctrl-C ends it; without a visitor it ends by itself after {alone_s / 60:g} minutes", flush=True)
+            wait_until_alone(gate, alone_s)
+        finally:
+            studio.close()
+        for why, count in gate.refused.items():
+            say(f"refused {count:,}: {why}")

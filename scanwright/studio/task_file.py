@@ -1,0 +1,74 @@
+"""The task file of what a person made in the studio: one folder is written to, and no other."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import tomli_w
+from pydantic import ValidationError
+
+from design.errors import TaskError
+from design.record import explain
+from design.task.shapes import Map, Mesh
+from design.task.task import NAMES, LoadedTask, Task, load_task
+from scanwright.studio.state import Setting
+
+
+def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None) -> str:
+    """The task file as it stands in a folder: what is at its default is left out, file names lead from there.
+
+    Args:
+        loaded: the task.
+        folder: where the text is to be written.
+        name: of the task.
+        fixed: angles to write as values in place of the ranges to search.
+
+    Raises:
+        TaskError: the name cannot be one.
+    """
+    table = loaded.task.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | {"name": name}
+    table["motion"] = loaded.task.motion.model_dump(mode="json")
+
+    def led(file: str) -> str:
+        return os.path.relpath(loaded.source.parent / file, folder)
+
+    for key in ("weight", "mask"):
+        for i, region in enumerate(getattr(loaded.task, key)):
+            if isinstance(region, Map | Mesh):
+                table[key][i]["file"] = led(region.file)
+    if loaded.task.scene is not None:
+        table["scene"]["file"] = led(loaded.task.scene.file)
+    if loaded.task.catalogue:
+        table["catalogue"] = [led(extra) for extra in loaded.task.catalogue]
+    if fixed is not None:
+        table["angles"] = table.get("angles", {}) | {
+            f"{angle}_deg": value for angle, value in zip(NAMES, fixed.angles_deg, strict=True)
+        }
+    try:
+        Task.model_validate(table)
+    except ValidationError as error:
+        raise TaskError(explain(error, f"{name}.toml", Task)) from error
+    return tomli_w.dumps(table)
+
+
+def save_task(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None, *, overwrite: bool) -> Path:
+    """Write `name.toml` into a folder and read it back; nothing is written anywhere else.
+
+    Raises:
+        TaskError: the name is not one of a task, the file exists and is not to be overwritten, or what was written
+            does not read as a task.
+    """
+    text = task_text(loaded, folder, name, fixed)  # refuses a name that leads elsewhere
+    path = folder / f"{name}.toml"
+    if path.is_symlink():
+        raise TaskError(f"{path}: a link that leads elsewhere: take another name")
+    try:
+        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise TaskError(f"{path}: exists; tick 'overwrite', or take another name") from error
+    except OSError as error:
+        raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
+    load_task(path)
+    return path

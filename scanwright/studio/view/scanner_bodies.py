@@ -1,0 +1,54 @@
+"""The scanner as the studio draws it: bodies with colours, coarsely meshed, made as fast as the kernel allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.frames import Array
+from design.scanner import Scanner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyMesh:
+    """One body of the scanner, in the rotation frame at gamma = 0.
+
+    Attributes:
+        name: of the part.
+        vertices_m: shape (n, 3).
+        faces: shape (m, 3).
+        colour: sRGB, 0 .. 255.
+    """
+
+    name: str
+    vertices_m: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    colour: tuple[int, int, int]
+
+
+def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
+    """The parts that turn with the horn, or those that stand still: two halves for two cores.
+
+    The linkage, which takes the kernel longer than all others together, is a draft of the same shapes.
+
+    Raises:
+        BuildError: the kernel is missing, or a part cannot be made.
+    """
+    from cad.assembly.assembly import make_parts, turns
+    from cad.assembly.linkage_preview import coarse, draft_linkage
+    from cad.layout.linkage import PART
+
+    assembly = make_parts(scanner, lambda name: name != PART and turns(name) == turning)
+    meshes = {name: coarse(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    if turning:
+        meshes[PART] = draft_linkage(assembly.linkage)
+    return tuple(_body(name, *mesh) for name, mesh in meshes.items())
+
+
+def _body(name: str, vertices_mm: Array, faces: Array) -> BodyMesh:
+    from cad.assembly.assembly import colour_of
+
+    red, green, blue = (round(255 * c) for c in colour_of(name))
+    return BodyMesh(name, (vertices_mm * 1e-3).astype(np.float32), faces.astype(np.uint32), (red, green, blue))

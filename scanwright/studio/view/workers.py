@@ -1,0 +1,171 @@
+"""The processes that make parts and scans for the page: newest wish first, and none of it in the page's own process.
+
+Three workers run side by side, each with a process that stays, since the CAD kernel holds the interpreter: what turns
+with the horn, what stands still, and scans. None waits for another, and each does only the newest order.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import ParamSpec, TypeVar
+
+from design.angles import Angles, AngleSet
+from design.concurrency.second_process import kill, spawn_pool
+from design.errors import ScanwrightError
+from design.motion import Shortest, Sweep
+from design.objective.problem import Problem
+from design.scanner import Scanner
+from design.task.task import NAMES, LoadedTask
+from scanwright.studio.state import Setting
+from scanwright.studio.view.latest_only import LatestOnly
+from scanwright.studio.view.preview_scan import preview_scan
+from scanwright.studio.view.scanner_bodies import make_bodies
+from scanwright.studio.view.view_3d import View3D
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What is to be made.
+
+    Attributes:
+        loaded: the task.
+        problem: its numbers.
+        setting: the angles.
+        bodies: whether those of the scanner are wanted.
+        scene: whose scan is wanted: "" none, "task" the task's, else the furnished room.
+    """
+
+    loaded: LoadedTask
+    problem: Problem
+    setting: Setting
+    bodies: bool
+    scene: str
+
+    def scanner(self) -> Scanner:
+        """The scanner of the setting, its optical centre at the world's origin.
+
+        Raises:
+            TaskError: a product is not in the catalogue.
+        """
+        task = self.loaded.task
+        angles = AngleSet(
+            task=task.name,
+            angles_deg=Angles(**dict(zip(NAMES, self.setting.angles_deg, strict=True))),
+            sensor=task.sensor,
+            servo=task.servo,
+            slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
+            motion=None if isinstance(task.motion, Shortest) else task.motion,
+        )
+        return self.loaded.scanner(angles)
+
+
+class Workers:
+    """Orders in, bodies and points into the view; `say` gets what is being made and whether it was refused."""
+
+    def __init__(self, view: View3D, say: Callable[[str, bool], None]) -> None:
+        self._view = view
+        self._shown: dict[bool, Scanner] = {}
+        said = _Said(say)
+        self._workers = (
+            _Worker("what turns", lambda worker, order: self._half(worker, order, turning=True), said),
+            _Worker("what stands", lambda worker, order: self._half(worker, order, turning=False), said),
+            _Worker("scan", self._scan, said),
+        )
+
+    def order(self, order: Order) -> None:
+        """Make this, and nothing that was ordered before and has not begun."""
+        for worker in self._workers:
+            worker.orders.wish(order)
+
+    def settled(self, timeout_s: float) -> bool:
+        """Wait until all is made; False where that takes longer."""
+        end = time.monotonic() + timeout_s
+        return all(worker.orders.settled(max(0.0, end - time.monotonic())) for worker in self._workers)
+
+    def close(self) -> None:
+        """End the processes at once: nobody waits for what they make."""
+        for worker in self._workers:
+            worker.close()
+
+    def _half(self, worker: _Worker, order: Order, *, turning: bool) -> None:
+        try:
+            scanner = order.scanner()
+            if not order.bodies or self._shown.get(turning) == scanner:
+                return
+            bodies = worker.ask("making the parts ...", make_bodies, scanner, turning)
+        except ScanwrightError:
+            self._shown.pop(turning, None)
+            self._view.show_bodies(order.setting, turning, ())  # what stood there was another setting's
+            raise
+        self._view.show_bodies(order.setting, turning, bodies)
+        self._shown[turning] = scanner
+
+    def _scan(self, worker: _Worker, order: Order) -> None:
+        if not order.scene:
+            return
+        problem, placed = order.problem, order.loaded.task.scene if order.scene == "task" else None
+        joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+        folder = order.loaded.source.parent
+        self._view.show_points(
+            worker.ask("casting the scan ...", preview_scan, order.scanner(), joint_rad, placed, folder)
+        )
+
+
+class _Worker:
+    """A process that stays, and the thread that hands it the newest order."""
+
+    def __init__(self, name: str, work: Callable[[_Worker, Order], None], said: _Said) -> None:
+        self._name, self._work, self._said = name, work, said
+        self._pool, self._open = spawn_pool(), True
+        self.orders: LatestOnly[Order] = LatestOnly(name, self._follow)
+
+    def ask(self, word: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Have the process call a function, and say so meanwhile."""
+        self._said.say(self._name, word)
+        return self._pool.submit(function, *args, **kwargs).result()
+
+    def close(self) -> None:
+        """Kill the process, and end the thread."""
+        self._open = False
+        kill(self._pool)
+        self.orders.close()
+
+    def _follow(self, order: Order) -> None:
+        if not self._open:
+            return
+        try:
+            self._work(self, order)
+            self._said.say(self._name, "")
+        except ScanwrightError as error:
+            self._said.say(self._name, str(error), bad=True)
+        except BrokenExecutor:
+            if self._open:
+                self._said.say(self._name, f"{self._name}: its process ended; the next one begins", bad=True)
+                self._pool = spawn_pool()
+        except Exception:
+            self._said.say(self._name, f"{self._name}: a fault of the program: see the terminal", bad=True)
+            raise
+
+
+@dataclass(slots=True)
+class _Said:
+    """What the workers say, as one line: refusals before what is being done, the same words once."""
+
+    tell: Callable[[str, bool], None]
+    _lines: dict[str, tuple[str, bool]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    def say(self, worker: str, text: str, *, bad: bool = False) -> None:
+        """What one worker has to say now in place of what it said; nothing where that is empty."""
+        with self._lock:
+            self._lines[worker] = (text, bad)
+            said = [text for text, bad in self._lines.values() if bad]
+            said = said or [text for text, _ in self._lines.values() if text]
+            self.tell("; ".join(dict.fromkeys(said)), any(bad for _, bad in self._lines.values()))
