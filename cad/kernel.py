@@ -1,23 +1,30 @@
-"""The CAD kernel is imported late, and says in one line what it misses."""
+"""The CAD kernel takes seconds to load, so it is loaded late; whether it can be is asked first, and costs nothing."""
 
 from __future__ import annotations
 
-import importlib
+import ctypes
+import sys
 
-from design.errors import BuildError
+from design.errors import InstallError, require
+
+_PACKAGES = ("cadquery", "OCP", "ezdxf", "jinja2", "manifold3d", "reportlab", "shapely")
 
 
-def require_kernel() -> None:
-    """Import cadquery.
+def require_kernel(work: str) -> None:
+    """Refuse work that needs the CAD kernel where that is not installed. It is not loaded.
+
+    Args:
+        work: what the line says needs it, such as "build".
 
     Raises:
-        BuildError: cadquery, or a system library that it needs, is not installed.
+        InstallError: a package of the extra `cad`, or the system library that the kernel draws with, is missing.
     """
-    try:
-        importlib.import_module("cadquery")
-    except ImportError as error:
-        if "libGL" in str(error):
-            raise BuildError(
-                f"the CAD kernel misses a system library ({error}): apt-get install --no-install-recommends libgl1"
+    require("cad", f"{work} needs the CAD kernel", *_PACKAGES)
+    if sys.platform == "linux":
+        try:
+            ctypes.CDLL("libGL.so.1")
+        except OSError as error:
+            raise InstallError(
+                f"{work} needs the CAD kernel, and that a library of the system ({error}): "
+                "apt-get install --no-install-recommends libgl1"
             ) from error
-        raise BuildError(f"the CAD kernel is not installed ({error}): install cadquery==2.8.0") from error

@@ -5,6 +5,7 @@
      +-- BuildError            a part, a drawing or a build folder cannot be made as asked
      +-- RecordingError        a recording is unreadable, or lacks what the command needs
      +-- SceneError            a mesh is unreadable, or holds nothing that a beam can hit
+     +-- InstallError          an extra of the package, or a library of the system, is not installed
      +-- DeviceError           a device is absent, or did not do what it was asked
           +-- DeviceTimeoutError  ... because nothing came in time
           +-- ProtocolError    ... because what came is no valid packet
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from importlib.util import find_spec
 
 
 class ScanwrightError(Exception):
@@ -38,6 +40,10 @@ class RecordingError(ScanwrightError):
 
 class SceneError(ScanwrightError):
     """A mesh is unreadable, or holds nothing that a beam can hit."""
+
+
+class InstallError(ScanwrightError):
+    """An extra of the package, or a library of the system, is not installed. The message names the command."""
 
 
 class DeviceError(ScanwrightError):
@@ -64,3 +70,18 @@ def suggest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"; did you mean '{folded[close[0]]}'?"
     return f"; known: {', '.join(names)}" if names else ""
+
+
+def require(extra: str, need: str, *modules: str) -> None:
+    """Refuse work whose packages are not installed. None of them is imported.
+
+    Args:
+        extra: the extra of the package that brings them, such as "clouds".
+        need: the beginning of the line, such as "studio needs a page server".
+        modules: their top-level names.
+
+    Raises:
+        InstallError: one of them is not installed.
+    """
+    if not all(find_spec(module) for module in modules):
+        raise InstallError(f"{need}: pip install 'scanwright[{extra}]'")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cad.kernel import require_kernel
 from design.angles import AngleSet, load_angles
 from design.task.task import LoadedTask, load_task
 
@@ -181,11 +182,13 @@ def build(task: TaskLike, out: str | Path = "out", *, say: Say = _quiet) -> Buil
     Nothing is done where the folder already holds the build of this very task.
 
     Raises:
+        InstallError: the CAD kernel is not installed.
         TaskError: as for `optimise`.
-        BuildError: no setting can be built, the folder cannot be written, or the CAD kernel is not installed.
+        BuildError: no setting can be built, or the folder cannot be written.
     """
     from scanwright.pipeline.build import build_task
 
+    require_kernel("build")
     loaded = _task(task)
     return build_task(loaded, Path(out) / loaded.task.name, say)
 
@@ -202,11 +205,10 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = _quiet) -> Asse
         Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
 
     Raises:
-        BuildError: a part cannot be made, or the CAD kernel is not installed.
+        InstallError: the CAD kernel is not installed.
+        BuildError: a part cannot be made.
     """
-    from cad.kernel import require_kernel
-
-    require_kernel()
+    require_kernel("the making of parts")
     from cad.assembly.assembly import make_parts
 
     say("making the parts")
@@ -217,14 +219,13 @@ def check(folder: str | Path, *, say: Say = _quiet) -> list[Check]:
     """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
 
     Raises:
+        InstallError: the CAD kernel is not installed.
         TaskError: the folder has no angle set or no task.
-        BuildError: a part cannot be made, or the CAD kernel is not installed.
+        BuildError: a part cannot be made.
     """
-    from cad.kernel import require_kernel
-
+    require_kernel("check")
     folder = Path(folder)
     scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
-    require_kernel()
     from cad.checks.run import check_scanner
 
     return check_scanner(scanner, say)
@@ -496,6 +497,7 @@ def read_cloud(path: str | Path) -> Cloud:
     """Read a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
 
     Raises:
+        InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
     """
     from design.errors import RecordingError
@@ -520,6 +522,7 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any]) -> list[s
         What the format cannot hold, one sentence each.
 
     Raises:
+        InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is not known, or the file cannot be written.
     """
     from firmware_io.clouds.files import write_clouds

@@ -72,13 +72,14 @@ def build_parts(
         make: who makes the parts, `assembly.make_parts` or one that may have them already.
 
     Raises:
+        InstallError: the CAD kernel is not installed.
         BuildError: a part cannot be made, or the angle set names another place of the optical centre.
     """
     drive = drive_of(scanner)  # refuse what cannot be built before seconds go into the kernel
     deck = deck_of(scanner, drive.stack)
     _check_offset(scanner, deck.t_world_rot)
     progress("loading the CAD kernel")
-    require_kernel()
+    require_kernel("the making of parts")
     from cad.assembly.assembly import alone, as_tree, make_parts
     from cad.assembly.masses import density_g_cm3, link_bodies
     from cad.files.step import step_text

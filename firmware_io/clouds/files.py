@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import platform
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from design.atomic_file import check_place
-from design.errors import RecordingError, suggest
-from firmware_io.clouds import e57, las, npz, pcd, ply, xyz
+from design.errors import RecordingError, require, suggest
 from firmware_io.clouds.record import Cloud
 
-_READERS: dict[str, Callable[[Path], tuple[list[Cloud], list[str]]]] = {
-    ".ply": ply.read,
-    ".pcd": pcd.read,
-    ".las": las.read,
-    ".laz": las.read,
-    ".e57": e57.read,
-    ".npz": npz.read,
-    ".xyz": xyz.read,
-}
-_WRITERS: dict[str, Callable[[Path, Cloud], list[str]]] = {
-    ".ply": ply.write,
-    ".pcd": pcd.write,
-    ".las": las.write,
-    ".laz": las.write,
-    ".npz": npz.write,
-    ".xyz": xyz.write,
+_FORMATS = {  # suffix: module of this folder, and the packages of the extra `clouds` that it needs
+    ".ply": ("ply",),
+    ".pcd": ("pcd", "pypcd4"),
+    ".las": ("las", "laspy"),
+    ".laz": ("las", "laspy", "lazrs"),
+    ".e57": ("e57", "pye57"),
+    ".npz": ("npz",),
+    ".xyz": ("xyz",),
 }
 
 
@@ -33,22 +27,25 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
     """All clouds of a file (E57 holds several, the others one), and lines about what was not read.
 
     Raises:
+        InstallError: the format needs a package that is not installed.
         RecordingError: the format is not known, or the file is not what its suffix says.
     """
     if path.is_dir():
         raise RecordingError(f"{path}: this is a folder; name a cloud in it, a file")
     if path.suffix in (".mcap", ".bag", ".db3"):
         raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes the one of the other")
-    return _READERS[_known(path)](path)
+    clouds: tuple[list[Cloud], list[str]] = _format(path).read(path)
+    return clouds
 
 
 def check_target(path: Path) -> None:
     """Refuse what cannot be written, before the work that it is to hold.
 
     Raises:
+        InstallError: the format needs a package that is not installed.
         RecordingError: the format is not known, or no file can be there.
     """
-    _known(path)
+    _format(path)
     check_place(path, RecordingError)
 
 
@@ -56,18 +53,25 @@ def write_clouds(path: Path, clouds: Sequence[Cloud]) -> tuple[list[Path], list[
     """Write clouds, each to a file of its own where the format holds one; the files, and what they do not hold.
 
     Raises:
+        InstallError: the format needs a package that is not installed.
         RecordingError: the format is not known, or the file cannot be written.
     """
-    suffix = _known(path)
-    if suffix == ".e57":
-        return [path], e57.write(path, clouds)
+    module = _format(path)
+    if path.suffix.lower() == ".e57":
+        return [path], module.write(path, clouds)
     paths = [path] if len(clouds) == 1 else [path.with_stem(f"{path.stem}_{k}") for k in range(1, len(clouds) + 1)]
-    said = [_WRITERS[suffix](one, cloud) for one, cloud in zip(paths, clouds, strict=True)]
+    said = [module.write(one, cloud) for one, cloud in zip(paths, clouds, strict=True)]
     return paths, list(dict.fromkeys(line for lines in said for line in lines))
 
 
-def _known(path: Path) -> str:
+def _format(path: Path) -> Any:
+    """The module of the format that the suffix names; loaded only once its packages are known to be there."""
     suffix = path.suffix.lower()
-    if suffix not in _READERS:
-        raise RecordingError(f"{path}: '{suffix}' is no format of clouds{suggest(suffix, _READERS)}")
-    return suffix
+    if suffix not in _FORMATS:
+        raise RecordingError(f"{path}: '{suffix}' is no format of clouds{suggest(suffix, _FORMATS)}")
+    module, *packages = _FORMATS[suffix]
+    need = f"{path}: {suffix} needs {' and '.join(packages)}"
+    if suffix == ".e57" and platform.machine() == "aarch64":
+        need += ", which has no wheel for Linux on aarch64: take another format, or on another computer"
+    require("clouds", need, *packages)
+    return import_module(f"firmware_io.clouds.{module}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_io.clouds.files import read_clouds, write_clouds
+from firmware_io.clouds.files import check_target, read_clouds, write_clouds
 from firmware_io.recording.bag_export import export_bag
 
 
@@ -16,6 +16,7 @@ def convert(source: Path, target: Path) -> list[str]:
         target: a cloud; or a bag, `.bag` for ROS 1, else a new folder for ROS 2.
 
     Raises:
+        InstallError: a format needs the extra `clouds`, which is not installed.
         RecordingError: `source` is unreadable, its form is not known, or `target` cannot be written.
     """
     if source.suffix == ".mcap":
@@ -23,6 +24,7 @@ def convert(source: Path, target: Path) -> list[str]:
         unknown = [f"note: left out {topic}: this ROS has no {kind}" for topic, kind in exported.unknown.items()]
         written = ", ".join(f"{count:,} of {topic}" for topic, count in exported.written.items())
         return [*unknown, f"wrote {written} to {target}"]
+    check_target(target)
     clouds, unread = read_clouds(source)
     wrote, lost = write_clouds(target, clouds)
     rows = sum(len(cloud.points_m) for cloud in clouds)

@@ -14,6 +14,8 @@ from typing import Annotated, Any
 
 import typer
 
+from design.errors import require
+
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
 BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
@@ -51,6 +53,15 @@ def say_in_place(line: str) -> None:
 def complain(line: str) -> None:
     """What went wrong, on standard error."""
     print(f"scanwright: {line}", file=sys.stderr)
+
+
+def require_pages(work: str) -> None:
+    """Refuse work that opens a page where nothing is installed that could serve it.
+
+    Raises:
+        InstallError: a package of the extra `pages` is missing.
+    """
+    require("pages", f"{work} needs a page server", "msgspec", "viser", "websockets")
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from cad.kernel import require_kernel
 from scanwright.cli.console import AsJson, TaskFile, group, say, show, show_json
 
 app = group()
@@ -85,6 +86,8 @@ def accuracy(
     """Report error against run time of every way to compute J, at the optimum of a task; of other choices too."""
     from scanwright import api
 
+    if choices:
+        require_kernel("accuracy --choices")
     loaded = api.load_task(task)
     folder = out / loaded.task.name
     if choices:

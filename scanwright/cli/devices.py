@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import BuildFolder, complain, group, on_duty, say_in_place, show
+from scanwright.cli.console import BuildFolder, complain, group, on_duty, require_pages, say_in_place, show
 
 app = group()
 
@@ -75,6 +75,8 @@ def scan(
     ] = False,
 ) -> None:
     """Turn the scanner, record, and assemble the cloud beside the recording."""
+    if live:
+        require_pages("scan --live")
     from firmware_io.scan.acquire import acquire
     from firmware_io.scan.plan import plan_scan
     from scanwright import api

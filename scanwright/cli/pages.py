@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import group, say
+from cad.kernel import require_kernel
+from scanwright.cli.console import group, require_pages, say
 
 app = group()
 
@@ -23,6 +24,9 @@ def studio(
     ),
 ) -> None:
     """Drag the angles and paint what matters in a page of your browser, and see what it comes to."""
+    require_pages("studio")
+
+    require_kernel("studio")
     from design.task.task import load_task
     from scanwright.live.page_life import run_studio
     from scanwright.studio.view.bodies import bodies_of

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cad.kernel import require_kernel
+from design.errors import require
 from scanwright.cli.console import AsJson, BuildFolder, TaskFile, complain, group, say, say_in_place, show, show_json
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ def build(
 @app.command()
 def report(out: BuildFolder) -> None:
     """Write report.html of a build folder from the files in it: the answer, 3D view, checks, parts, steps, drawings."""
+    require("cad", "report needs jinja2", "jinja2")
     from scanwright.report.page import write_report
 
     print(f"wrote {write_report(out)}")
@@ -78,6 +81,8 @@ def study(
     plan: Annotated[bool, typer.Option("--plan", help="Say what it would cost, and stop.")] = False,
 ) -> None:
     """Cross tasks with products, judge every candidate with its parts, and build the winners of the trade-off."""
+    require("cluster", "study needs Dask", "dask", "distributed", "pyarrow")
+    require_kernel("study")
     from scanwright.study.crossing import Crossing
     from scanwright.study.study import load_study
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cad.kernel import require_kernel
 from design.concurrency.second_process import second_process
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
@@ -74,9 +76,11 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
         say: progress.
 
     Raises:
+        InstallError: the CAD kernel is not installed.
         TaskError: no direction has a weight, or no setting keeps the limits.
         BuildError: no setting can be built, or the folder cannot be written.
     """
+    require_kernel("build")
     made = None if is_current(target, loaded) else _make(loaded, target, say)
     return Build(target, listed_files(target), tuple(loaded.warnings()), made)
 
@@ -85,9 +89,11 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
     """Build the task of a build folder again, elsewhere: the first difference in words, None where there is none.
 
     Raises:
+        InstallError: the CAD kernel is not installed.
         TaskError: the folder has no task.
         BuildError: the folder is no finished build.
     """
+    require_kernel("build")
     loaded = load_task(folder / "task.toml")
     with tempfile.TemporaryDirectory() as elsewhere:
         again = Path(elsewhere) / loaded.task.name
@@ -98,7 +104,6 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.parts import build_parts, write_files
-    from cad.kernel import require_kernel
     from cad.layout.deck import mount_offset_mm
     from design.angles import standard_settings
     from design.evaluation.density_picture import density_picture
@@ -108,11 +113,10 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     from scanwright.report.page import write_report
 
     with fresh_folder(target) as work, second_process() as begin:
-        begin(require_kernel)  # it loads while the search runs
+        begin(import_module, "cadquery")  # it loads while the search runs
         optimum = optimum_of(asked, say)
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        require_kernel()
         from cad.assembly.shadow import PartsWorkshop
         from cad.checks.run import check_files
         from cad.files.write_all import export_scanner

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -17,32 +18,15 @@ from design.errors import BuildError
 from design.task.task import LoadedTask
 
 MANIFEST = "manifest.json"
-WRITERS = (
-    "cadquery",
-    "cadquery-ocp",
-    "embreex",
-    "ezdxf",
-    "jinja2",
-    "manifold3d",
-    "matplotlib",
-    "numba",
-    "numpy",
-    "pillow",
-    "reportlab",
-    "scipy",
-    "shapely",
-    "tomli-w",
-    "trimesh",
-)
-"""What a byte of a build may depend on."""
 _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
 _ROOMS = ("design", "cad", "scanwright")
 
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of this program and of everything that writes bytes of a build."""
-    return {name: _version(name) for name in ("scanwright", *WRITERS)}
+    """Versions of this program and of everything that writes bytes of a build: what the extra `cad` pins."""
+    pinned = {line.split("==")[0] for line in requires("scanwright") or () if re.search(r"extra == .cad\b", line)}
+    return {name: _version(name) for name in ("scanwright", *sorted(pinned))}
 
 
 @cache

@@ -27,7 +27,7 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 def judge(loaded: LoadedTask, found: Result) -> Result:
     """The result of one candidate; see `scanwright.study.candidate.judged`."""
-    require_kernel()
+    require_kernel("study")
     return judged(loaded, found, PartsBench)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from cad.kernel import require_kernel
 from design.accuracy.trials import best_trials, trials_picture, write_trials
 from design.search.optimum import optimum_of
 from design.task.task import LoadedTask
@@ -19,9 +18,8 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
-        BuildError: a part cannot be made, or the CAD kernel is not installed.
+        BuildError: a part cannot be made.
     """
-    require_kernel()
     from cad.assembly.assembly import make_parts
     from scanwright.trials.mesh import mesh_trials
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cad.kernel import require_kernel
 from design.frames import Array
 from design.scanner import Scanner
 from scanwright.studio.view.workbench import Body
@@ -18,7 +17,6 @@ def bodies_of(scanner: Scanner, turning: bool) -> tuple[Body, ...]:
     Raises:
         BuildError: a part cannot be made.
     """
-    require_kernel()
     from cad.assembly.assembly import make_parts, turns
     from cad.layout.linkage import PART
     from scanwright.studio.view.linkage_preview import coarse, draft_linkage
