@@ -15,6 +15,7 @@ INTRUDERS = {  # contract -> a file, and an import in it that breaks that one
     "floors": ("design/frames.py", "import cad.kernel"),
     "design": ("design/sphere/regions.py", "import design.search.limits"),
     "firmware_io": ("firmware_io/recording/recording.py", "import firmware_io.assembly.turns"),
+    "scanwright": ("scanwright/report/page.py", "import scanwright.pipeline.folder"),
     "door": ("firmware_io/samples.py", "import typer"),
     "kernel": ("design/frames.py", "import cadquery"),
     "wire": ("cad/kernel.py", "import serial"),
