@@ -16,8 +16,11 @@ import numpy as np
 from cad.kernel import require_kernel
 from design.angles import AngleSet
 from design.angles import load_angles as load_angles
+from design.errors import RecordingError
 from design.task.task import LoadedTask
 from design.task.task import load_task as load_task
+from firmware_io.assembly.own_body import own_body_beside
+from scanwright.pipeline.build import Build, build_task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +40,6 @@ if TYPE_CHECKING:
     from firmware_io.registration.session import Session
     from firmware_io.scan.acquire import ScanSummary
     from firmware_io.servo.dynamixel.driver import Servo
-    from scanwright.pipeline.build import Build
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A task: loaded, the name of a shipped one, a file, or a table with the keys of a task file."""
@@ -165,8 +167,6 @@ def build(task: TaskLike, out: str | Path = "out", *, say: Say = _quiet) -> Buil
         TaskError: as for `optimise`.
         BuildError: no setting can be built, or the folder cannot be written.
     """
-    from scanwright.pipeline.build import build_task
-
     require_kernel("build")
     loaded = _task(task)
     return build_task(loaded, Path(out) / loaded.task.name, say)
@@ -384,7 +384,6 @@ def assemble(
         RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
     """
     from firmware_io.assembly.assemble import assemble_recording
-    from firmware_io.assembly.own_body import own_body_beside
     from firmware_io.assembly.pose_files import load_trajectory
 
     recording, angle_set = Path(recording), _angles(angles)
@@ -432,7 +431,6 @@ def calibrate(
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
     """
-    from firmware_io.assembly.own_body import own_body_beside
     from firmware_io.calibration.session import calibrate_recordings
 
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
@@ -479,7 +477,6 @@ def read_cloud(path: str | Path) -> Cloud:
         InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
     """
-    from design.errors import RecordingError
     from firmware_io.clouds.files import read_clouds
 
     clouds, _unread = read_clouds(Path(path))

@@ -9,6 +9,7 @@ import numpy as np
 
 from design.errors import TaskError
 from design.frames import Array, Rx, Ry, Rz
+from design.scene.ray_caster import cast, load_scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +67,6 @@ def cast_surface(
     Raises:
         TaskError: the mesh cannot be read, or is hit nowhere.
     """
-    from design.scene.ray_caster import cast, load_scene  # loads the ray caster
-
     directions = cell_directions(step_deg)
     roll, pitch, yaw = np.radians(rpy_deg)
     R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)

@@ -9,6 +9,7 @@ import sys
 
 import typer
 
+from design.errors import ScanwrightError
 from scanwright.cli import clouds, design, devices, pages, parts
 from scanwright.cli.console import complain, notes_of
 
@@ -25,8 +26,6 @@ for group in (parts, design, devices, clouds, pages):
 
 def run() -> None:
     """Entry point: one line and exit 2 for what a person can mend, a traceback for a bug."""
-    from design.errors import ScanwrightError
-
     try:
         app(prog_name="scanwright")
     except ScanwrightError as error:

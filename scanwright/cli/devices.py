@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import closing, suppress
 from enum import Enum
 from pathlib import Path
+from threading import Event
 from typing import Annotated
 
 import typer
@@ -35,8 +36,6 @@ def emulate(
     seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
-    from threading import Event
-
     from design.angles import load_angles
     from firmware_io.ports import announced
     from firmware_io.twins.head import load_of
