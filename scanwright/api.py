@@ -207,7 +207,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = _quiet) -> Asse
     from cad.kernel import require_kernel
 
     require_kernel()
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
 
     say("making the parts")
     return make_parts(_task(task).scanner(_angles(angles)))

@@ -14,7 +14,7 @@ from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
 
 if TYPE_CHECKING:
-    from cad.findings import Finding
+    from cad.findings import PartFinding
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen
 
@@ -33,7 +33,7 @@ class Made:
 
     optimum: Optimum
     chosen: Chosen
-    findings: tuple[Finding, ...]
+    findings: tuple[PartFinding, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +97,9 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
 
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
-    from cad.files.parts import build_parts, write_files
+    from cad.files.part_files import build_parts, write_files
     from cad.kernel import require_kernel
-    from cad.layout.deck import mount_offset_mm
+    from cad.layout.layout import mount_offset_mm
     from design.angles import standard_settings
     from design.evaluation.density_picture import density_picture
     from design.search.optimum import angle_set, optimum_of
@@ -115,7 +115,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         require_kernel()
         from cad.assembly.shadow import PartsWorkshop
         from cad.checks.run import check_files
-        from cad.files.write_all import export_scanner
+        from cad.files.workshop_files import export_scanner
 
         workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
         chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)

@@ -22,7 +22,7 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
         BuildError: a part cannot be made, or the CAD kernel is not installed.
     """
     require_kernel()
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
     from scanwright.trials.mesh import mesh_trials
 
     optimum = optimum_of(loaded, say)
