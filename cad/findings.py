@@ -7,7 +7,7 @@ from typing import Literal
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class PartFinding:
     """One remark about a part. `note` informs, `warning` asks for a look before the part is made."""
 
     code: str

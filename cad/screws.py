@@ -74,6 +74,33 @@ def trap_of(screw: Screw, printer: Printer) -> Trap | None:
     return Trap(screw.nominal + printer.screw_clearance_mm / 2, screw.nut_across + fit, screw.nut_height + fit)
 
 
+@dataclass(frozen=True, slots=True)
+class Thread:
+    """What a screw holds on to in a printed part: a thread, an insert, or a nut in a trap.
+
+    Attributes:
+        hole: diameter.
+        trap: room for the nut, if it is one.
+        insert: whether it is an insert.
+    """
+
+    hole: float
+    trap: Trap | None
+    insert: bool
+
+
+def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True) -> Thread:
+    """What a printer's profile gives a screw to hold on to."""
+    trap = trap_of(screw, printer) if room_for_nut else None
+    hole = thread_hole(screw, printer) if trap is None else trap.hole
+    return Thread(hole, trap, printer.thread == "insert" and screw.insert is not None)
+
+
+def passing_hole(screw: Screw, printer: Printer) -> float:
+    """Diameter of the hole in a part that a screw passes through."""
+    return screw.nominal + printer.screw_clearance_mm
+
+
 def holding_holes(screw: Screw, printer: Printer) -> tuple[float, ...]:
     """Diameters of all holes in parts that a screw may hold on to."""
     trap = trap_of(screw, printer)

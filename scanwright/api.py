@@ -188,7 +188,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = _quiet) -> Asse
         BuildError: a part cannot be made.
     """
     require_kernel("the making of parts")
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
 
     say("making the parts")
     return make_parts(_task(task).scanner(_angles(angles)))

@@ -163,9 +163,9 @@ def browser(chromium):
 @pytest.fixture(scope="session")
 def made(tmp_path_factory):
     """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
-    from cad.files.parts import build_parts
-    from cad.files.write_all import export_scanner
-    from cad.layout.deck import mount_offset_mm
+    from cad.files.part_files import build_parts
+    from cad.files.workshop_files import export_scanner
+    from cad.layout.layout import mount_offset_mm
     from design.angles import Angles, AngleSet
     from design.catalogue.catalogue import load_catalogue
     from design.scanner import scanner_of

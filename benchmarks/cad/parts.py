@@ -16,7 +16,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from cad.assembly.assembly import make_parts
+from cad.assembly.make import make_parts
 from cad.assembly.masses import link_bodies
 from cad.checks.check import Check
 from cad.checks.run import run_checks
@@ -85,11 +85,11 @@ def _measured(scanner: Scanner) -> tuple[dict[str, float], list[Check]]:
     found = {check.kind: check.value for check in checks if check.value is not None}
     linkage = of_solid(assembly.made["alignment_linkage"], scanner.printer.density_g_cm3)
     values = {
-        "h_mm": assembly.stack.h,
+        "h_mm": assembly.layout.stack.h,
         "linkage_g": 1000 * linkage.mass_kg,
         "rotor_g": 1000 * link_bodies(scanner, assembly)["rot"].mass_kg,
-        "bearing": float(assembly.stack.bearing is not None),
-        "sub_plate": float(assembly.stack.sub_plate is not None),
+        "bearing": float(assembly.layout.stack.bearing is not None),
+        "sub_plate": float(assembly.layout.stack.sub_plate is not None),
         "counterweight": float("counterweight" in assembly.made),
         "imbalance_nm": found["flanks"],
         "thin_wall_mm2": max((check.value or 0.0 for check in checks if check.kind == "wall"), default=0.0),

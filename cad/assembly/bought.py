@@ -1,84 +1,146 @@
-"""Bought parts, true to size, as far as the catalogue knows them. Millimetres.
+"""Bought products: which bodies draw them, what moves these, and their colours.
 
-The lidar is made in its body frame (origin on the base at the optical axis, x to the front, z up), servo and
-slip ring and bearing in the rotation frame at gamma = 0 (`cad/layout/direct_stack.py`).
+Millimetres, rotation frame at gamma = 0. Every body is placed by an explicit location; the lidar by the angle set's
+own `T_rot_laser`, the one that the point cloud goes through.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
 import cadquery as cq
 
 from cad import solids
-from cad.layout.direct_stack import Stack
-from cad.screws import SCREWS
-from design.catalogue.products import Bearing, Lidar, Servo
+from cad.assembly import bought_shapes as draw
+from cad.layout import names
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.stack import DirectStack
+from cad.layout.layout import Layout
+from cad.parts.part_spec import STEEL, Colour
+from design.catalogue.products import Bearing
 
-CAP_INSET = 1.5
-EAR_ROOM = 3.6  # radius of the recess around a case hole
+CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
+WINDOW = (0.35, 0.05, 0.08)
 
 
-def lidar_solids(lidar: Lidar) -> dict[str, cq.Solid]:
-    """Body (with its threaded holes), window, cap and cables, in the body frame."""
-    half_x, half_y, height = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.body_mm[2]
-    low, high = lidar.window_z_mm
-    radius = SCREWS[lidar.mount_screw].nominal / 2
-    depth = min(lidar.mount_thread_depth_mm, low - 1.0)
-    threads = [solids.upright(radius, -1.0, depth, x, y) for x, y in lidar.mount_holes_mm]
-    body = solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low)).cut(*threads)
-    parts = {
-        "lidar_body": body.Solids()[0],
-        "lidar_window": solids.upright(lidar.window_radius_mm, low, high),
-        "lidar_cap": solids.upright(min(half_x, half_y) - CAP_INSET, high, height),
+Frame = Literal["servo", "rot", "laser"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodySpec:
+    """One body of a bought product.
+
+    Attributes:
+        name: unique in the scanner.
+        product: that it is a piece of, of `cad/layout/names.py`.
+        frame: that it moves with.
+        colour: sRGB.
+        make: its solid, rotation frame.
+        meets: body that it may touch though the other one moves: the other half of a ring, or what it drives.
+        clear: whether beams pass it.
+    """
+
+    name: str
+    product: str
+    frame: Frame
+    colour: Colour
+    make: Callable[[], cq.Solid]
+    meets: str = ""
+    clear: bool = False
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns about the rotation axis."""
+        return self.frame != "servo"
+
+
+def bought_of(layout: Layout) -> list[BodySpec]:
+    """The bodies of everything that one scanner is bought with."""
+    stack = layout.stack
+    drive = _of_belt(stack) if isinstance(stack, BeltStack) else _of_direct(layout, stack)
+    return [*drive, *_of_lidar(layout)]
+
+
+def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
+    """Servo, ring and bearing."""
+    servo = layout.scanner.servo
+    case, horn = partial(draw.servo_case, servo, stack.horn), partial(draw.servo_horn, servo, stack.horn)
+    yield _servo(names.SERVO_CASE, "servo", case, meets=names.SERVO_HORN)
+    yield _servo(names.SERVO_HORN, "rot", horn)
+    if layout.scanner.slip_ring is not None:
+        yield _ring(names.RING_STATOR, "servo", partial(draw.ring_stator, stack), meets=names.RING_ROTOR)
+        yield _ring(names.RING_ROTOR, "rot", partial(draw.ring_rotor, stack))
+    if stack.bearing is not None:
+        yield from _bearing(stack.bearing, stack.bearing_top, "")
+
+
+def _of_belt(stack: BeltStack) -> Iterator[BodySpec]:
+    """Servo, bearings, capsule and belt."""
+    case, horn = partial(draw.servo_case, stack.servo, stack.horn), partial(draw.servo_horn, stack.servo, stack.horn)
+    yield _servo(names.SERVO_CASE, "servo", partial(_beside, stack, case))
+    yield _servo(names.SERVO_OUTPUT, "servo", partial(_beside, stack, horn))
+    yield from _bearing(stack.carrier, stack.tower_top, "_upper")
+    yield from _bearing(stack.carrier, stack.lower_bottom + stack.carrier.width_mm, "_lower")
+    yield _ring(names.RING_STATOR, "servo", partial(draw.capsule, stack), meets=names.RING_ROTOR)
+    yield _ring(names.RING_ROTOR, "rot", partial(draw.capsule_rotor, stack))
+    yield BodySpec(
+        name=names.BELT,
+        product=names.BELT,
+        frame="servo",
+        colour=RUBBER,
+        make=partial(draw.belt, stack),
+        meets=names.SHAFT_PULLEY,
+    )
+
+
+def _servo(name: str, frame: Frame, make: Callable[[], cq.Solid], meets: str = "") -> BodySpec:
+    return BodySpec(name=name, product=names.SERVO, frame=frame, colour=CASE, make=make, meets=meets)
+
+
+def _ring(name: str, frame: Frame, make: Callable[[], cq.Solid], meets: str = "") -> BodySpec:
+    return BodySpec(name=name, product=names.RING, frame=frame, colour=RING, make=make, meets=meets)
+
+
+def _bearing(bearing: Bearing, top: float, place: str) -> Iterator[BodySpec]:
+    inner, outer = f"{names.BEARING}_inner{place}", f"{names.BEARING}_outer{place}"
+    make = partial(draw.bearing_inner, bearing, top)
+    yield BodySpec(name=inner, product=names.BEARING, frame="rot", colour=STEEL, make=make)
+    make = partial(draw.bearing_outer, bearing, top)
+    yield BodySpec(name=outer, product=names.BEARING, frame="servo", colour=STEEL, make=make, meets=inner)
+
+
+def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
+    """Body, window, cap and cables."""
+    lidar = layout.scanner.lidar
+    makes = {
+        names.LIDAR_BODY: partial(draw.lidar_body, lidar),
+        names.LIDAR_WINDOW: partial(draw.lidar_window, lidar),
+        names.LIDAR_CAP: partial(draw.lidar_cap, lidar),
     }
     for i, y in enumerate(lidar.cable_y_mm, start=1):
-        start = (-half_x, y, lidar.cable_z_mm)
-        stub = solids.cylinder(lidar.cable_diameter_mm / 2, start, (-1.0, 0.0, 0.0), lidar.cable_straight_mm)
-        parts[f"lidar_cable_{i}"] = stub
-    return parts
+        makes[f"{names.LIDAR_CABLE}_{i}"] = partial(draw.lidar_cable, lidar, y)
+    for name, make in makes.items():
+        window = name == names.LIDAR_WINDOW
+        yield BodySpec(
+            name=name,
+            product=names.LIDAR,
+            frame="laser",
+            colour=WINDOW if window else LIDAR,
+            make=partial(_on_axis, layout, make),
+            clear=window,
+        )
 
 
-def servo_case(servo: Servo, z: float) -> cq.Solid:
-    """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
-    (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    recesses = [
-        solids.upright(EAR_ROOM, z + servo.case_holes_z_mm, z + z1 + 1.0, *hole) for hole in servo.case_holes_mm
-    ]
-    recesses += [
-        solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.case_rear_holes_z_mm, *hole)
-        for hole in servo.case_rear_holes_mm
-    ]
-    return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
+def _beside(stack: BeltStack, make: Callable[[], cq.Solid]) -> cq.Solid:
+    """A body of the servo where it stands beside the axis."""
+    return make().moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 
 
-def servo_horn(servo: Servo, z: float) -> cq.Solid:
-    """The horn's disc with its threaded holes and boss, its face at height z."""
-    disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
-    radius = SCREWS[servo.horn_screw].nominal / 2
-    depth = min(servo.horn_thread_depth_mm, servo.horn_thickness_mm)
-    centres = solids.polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
-    disc = disc.cut(*(solids.upright(radius, z - depth, z + 1.0, float(x), float(y)) for x, y in centres))
-    if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
-        disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))
-    return disc.Solids()[0]
-
-
-def ring_solids(stack: Stack) -> dict[str, cq.Solid]:
-    """Stator and rotor of a through-bore ring; the split between them is not in any drawing."""
-    bore, outer = stack.ring_bore / 2, stack.ring_radius
-    split = bore + 0.4 * (outer - bore)
-    rotor: cq.Shape = solids.upright(split - 0.2, stack.ring_bottom, stack.ring_top)
-    rotor = rotor.cut(solids.upright(bore, stack.ring_bottom - 1.0, stack.ring_top + 1.0))
-    stator: cq.Shape = solids.upright(outer, stack.ring_bottom + 1.0, stack.ring_top - 1.0)
-    stator = stator.cut(solids.upright(split, stack.ring_bottom - 1.0, stack.ring_top + 1.0))
-    return {"ring_stator": stator.Solids()[0], "ring_rotor": rotor.Solids()[0]}
-
-
-def bearing_solids(bearing: Bearing, high: float) -> dict[str, cq.Solid]:
-    """Inner and outer ring, their upper face at a height; the balls between them are left out."""
-    inner, outer = bearing.bore_mm / 2, bearing.outer_mm / 2
-    wall = 0.3 * (outer - inner)
-    low = high - bearing.width_mm
-    bodies = {"bearing_inner": (inner, inner + wall), "bearing_outer": (outer - wall, outer)}
-    return {name: solids.lathe([(a, low), (b, low), (b, high), (a, high)]) for name, (a, b) in bodies.items()}
+def _on_axis(layout: Layout, make: Callable[[], cq.Solid]) -> cq.Solid:
+    """A body of the lidar, its optical centre where the angle set has it."""
+    T = layout.scanner.angles.T_rot_laser()
+    base = cq.Location(cq.Vector(0, 0, -layout.scanner.lidar.optical_height_mm))
+    return make().moved(solids.location(layout.stack.R(), T[:3, 3] * 1000) * base)

@@ -14,9 +14,13 @@ from typing import Literal
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly, turns
-from cad.findings import Finding
+from cad.assembly.assembly import Assembly
+from cad.findings import PartFinding
 from cad.geometry.holes import Piercing, Round
+from cad.layout.balance.counterweight import SCREW as BAR_SCREW
+from cad.layout.balance.counterweight import Counterweight
+from cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, BeltStack
+from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, BEARING_TOWER, COUNTERWEIGHT, DRIVE_PLATE, SERVO_CASE
 from cad.screws import SCREWS, Screw, holding_holes, trap_of
 from design.catalogue.products import Printer
 from design.scanner import Scanner
@@ -34,7 +38,7 @@ HOLDS = 2.0  # diameters of thread that hold
 NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
 THREAD_FREE = 0.5  # that a screw may not bottom
 CASE_EAR = 2.0  # of a servo's case between a screw hole and its nut: assumed, no catalogue gives it
-DECK = 5.0  # thickness of the robot's deck, assumed
+DECK_MM = 5.0  # thickness of the robot's deck, assumed
 COAXIAL = 0.05
 NEAR = 6.0  # between the hole of a part and what its screw holds: feet stand off, ears are recessed
 DRIVER = 60.0  # free length behind the head
@@ -97,12 +101,12 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
                 in_trap = behind.fixing == "trap" or (core and _is_trap(hole, screw, printer))
                 key = (part, behind.onto, behind.fixing, screw.name, in_trap)
                 found.setdefault(key, []).append((hole.length, behind.depth, covered))
-    for part, onto, screw, count, grip, depth in assembly.slotted():
+    for part, onto, screw, count, grip, depth in _slotted(scanner, assembly):
         traps = any(hole.hole and _is_trap(hole, screw, printer) for hole in rounds.get(onto, []))
         found[part, onto, "trap" if traps else "thread", screw.name, traps] = [(grip, depth, False)] * count
-    if "base_mount" not in assembly.made:
-        key = ("deck", "servo_case", "nut", scanner.servo.case_screw, False)
-        found[key] = [(DECK, CASE_EAR, False)] * 4
+    if BASE_MOUNT not in assembly.made:
+        key = ("deck", SERVO_CASE, "nut", scanner.servo.case_screw, False)
+        found[key] = [(DECK_MM, CASE_EAR, False)] * 4
     return [
         _joint(*key, holes, inserts=_has_insert(printer, SCREWS[key[3]], key[2] == "grub" or key[1] in printed))
         for key, holes in found.items()
@@ -110,7 +114,19 @@ def joints_of(scanner: Scanner, assembly: Assembly, rounds: dict[str, list[Round
     ]
 
 
-def without_traps(printer: Printer, assembly: Assembly, joints: list[Joint]) -> list[Finding]:
+def _slotted(scanner: Scanner, assembly: Assembly) -> list[tuple[str, str, Screw, int, float, float]]:
+    """Screws in slots: part, what they end in, size, number, grip and depth of thread."""
+    slots, stack, bar = [], assembly.layout.stack, assembly.layout.counterweight
+    if isinstance(stack, BeltStack):
+        depth = SHELF if trap_of(PLATE_SCREW, scanner.printer) is None else PLATE_GRIP
+        slots.append((DRIVE_PLATE, BEARING_TOWER, PLATE_SCREW, 4, PLATE, depth))
+    if COUNTERWEIGHT in assembly.made and isinstance(bar, Counterweight):
+        grip = bar.ear.high - bar.ear.low
+        slots.append((ALIGNMENT_LINKAGE, COUNTERWEIGHT, BAR_SCREW, len(bar.screws), grip, bar.section[1]))
+    return slots
+
+
+def without_traps(printer: Printer, assembly: Assembly, joints: list[Joint]) -> list[PartFinding]:
     """Screws that hold in plain threads although the printer's profile asks for nuts."""
     if printer.thread != "nut":
         return []
@@ -119,7 +135,7 @@ def without_traps(printer: Printer, assembly: Assembly, joints: list[Joint]) -> 
         holder = joint.part if joint.fixing == "grub" else joint.onto
         if holder in assembly.made.keys() - assembly.metal() and joint.fixing in ("grub", "thread") and not joint.traps:
             message = f"{holder}: no nut trap fits at its {joint.count} {joint.screw.name}: they hold in plain threads"
-            found.append(Finding("no_nut_trap", "note", holder, message))
+            found.append(PartFinding("no_nut_trap", "note", holder, message))
     return found
 
 
@@ -173,7 +189,7 @@ def _behind(
             return None
         return _Behind(_clamped(assembly, part), "grub", 0.0, 0)
     if partner is None:
-        return None if turns(part) else _Behind("", "deck", DECK, 0)
+        return None if assembly.parts[part].turns else _Behind("", "deck", DECK_MM, 0)
     return partner
 
 

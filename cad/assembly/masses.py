@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from cad.assembly.assembly import Assembly
 from cad.geometry import inertia
 from cad.geometry.inertia import Inertial
-from cad.layout.balance import PART as COUNTERWEIGHT
-from cad.layout.balance import STEEL_G_CM3
-from cad.layout.loads import ALUMINIUM_G_CM3
+from cad.layout.drive import Mass, Stack
+from cad.layout.loads import Weight, weight_of
 from design.frames import Array
 from design.scanner import Scanner
 
@@ -19,26 +21,38 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
 
     Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns.
     """
-    lidar = scanner.lidar
-    own = {name: inertia.of_solid(s, density_g_cm3(name, scanner, assembly)) for name, s in assembly.made.items()}
-    bought_standing, bought_turning = assembly.drive.weights()
-    standing = [*(own[name] for name in assembly.standing_parts()), *bought_standing]
-    turning = [*(own[name] for name in assembly.turning_parts()), *bought_turning]
+    lidar, masses = scanner.lidar, assembly.layout.drive.masses
+    own = {
+        name: inertia.of_solid(solid, assembly.parts[name].density_g_cm3(scanner.printer))
+        for name, solid in assembly.made.items()
+    }
+    standing = [own[name] for name in assembly.standing_parts()]
+    standing += [_share(mass, 1 - mass.turning) for mass in masses]
+    turning = [own[name] for name in assembly.turning_parts()]
+    turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
     x, y, z = lidar.body_mm
     base = -lidar.optical_height_mm
     laser = inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
     return {"servo": inertia.together(standing), "rot": inertia.together(turning), "laser": laser}
 
 
-def density_g_cm3(name: str, scanner: Scanner, assembly: Assembly) -> float:
-    """Of a made part."""
-    if name == COUNTERWEIGHT:
-        return STEEL_G_CM3
-    return ALUMINIUM_G_CM3 if name in assembly.metal() else scanner.printer.density_g_cm3
+def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:
+    """All that turns, rotation frame, from the bodies of `link_bodies`."""
+    return inertia.together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
+
+
+def rotor_weight(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> Weight:
+    """Weight of all that turns, from the bodies of `link_bodies`."""
+    rotor = rotor_of(scanner, bodies)
+    x, y, z = rotor.centre_m
+    return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
 def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:
     """Mass times distance from the axis of all that turns, shape (2,) [g mm]."""
-    bodies = link_bodies(scanner, assembly)
-    rotor = inertia.together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
+    rotor = rotor_of(scanner, link_bodies(scanner, assembly))
     return np.asarray(1e6 * rotor.mass_kg * rotor.centre_m[:2])
+
+
+def _share(mass: Mass, share: float) -> Inertial:
+    return inertia.of_box(share * mass.mass_g, mass.box.low, mass.box.high)

@@ -7,14 +7,14 @@ distance. A beam counts as hidden if any of the bundle is: what is cut partly an
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.drives.drive import drive_of
-from cad.layout.head import Head
+from cad.layout.drive import Stack
+from cad.layout.layout import config_hash, drive_of
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
@@ -24,7 +24,6 @@ from design.shadow import AXIS_STEPS, Mask, Shadow
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
-    from cad.geometry.mesh import Mesh
 
 APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
 SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
@@ -54,7 +53,7 @@ class PartsWorkshop:
             assembly = self.assembly(scanner)
         except BuildError as error:
             return Refused(str(error))
-        return shadow_of(scanner, triangles_of(assembly.outlines()))
+        return shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
     def assembly(self, scanner: Scanner) -> Assembly:
         """Parts of these products at the angles of `scanner`; those that were made for a shadow are kept.
@@ -62,8 +61,7 @@ class PartsWorkshop:
         Raises:
             BuildError: a part cannot be made.
         """
-        from cad.assembly.assembly import make_parts
-        from cad.files.parts import config_hash
+        from cad.assembly.make import make_parts
 
         key = f"{config_hash(scanner)} {scanner.angles.t_rot_laser_mm}"
         if key not in self._made:
@@ -71,23 +69,23 @@ class PartsWorkshop:
         return self._made[key]
 
 
-def triangles_of(meshes: Mapping[str, Mesh]) -> dict[str, Array]:
-    """Corners [m] of every part that stops a beam, shape (t, 3, 3): all but the lidar's window."""
-    return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in meshes.items() if name != "lidar_window"}
+def triangles_of(assembly: Assembly) -> dict[str, Array]:
+    """Corners [m] of every part that stops a beam, as it looks while it turns, shape (t, 3, 3)."""
+    clear = {name for name, body in assembly.bodies.items() if body.clear}
+    return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in assembly.outlines().items() if name not in clear}
 
 
-def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array]) -> Shadow:
+def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Container[str]) -> Shadow:
     """What the parts of one scanner hide.
 
     Args:
         scanner: angles and lidar.
         triangles_m: of `triangles_of` every part, made and bought, rotation frame at gamma = 0.
+        turning: names of those that turn.
     """
-    from cad.assembly.assembly import turns
-
     by_motion: dict[bool, list[Array]] = {True: [], False: []}
     for name, triangles in triangles_m.items():
-        by_motion[turns(name)].append(triangles)
+        by_motion[name in turning].append(triangles)
     origins, directions = bundles(scanner)
     rotor = _hidden(ray_caster.scene_of(np.concatenate(by_motion[True])), origins, directions)
     return Shadow(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
@@ -107,7 +105,7 @@ def bundles(scanner: Scanner) -> tuple[Array, Array]:
     return APERTURE_M * off + scanner.angles.T_rot_laser()[:3, 3], directions
 
 
-def beams_in_cone(stack: Head, bearings_rad: Array) -> Mask:
+def beams_in_cone(stack: Stack, bearings_rad: Array) -> Mask:
     """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
     q = stack.R()[2]
     down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))

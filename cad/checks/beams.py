@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from cad.assembly.shadow import bundles
 from cad.checks.check import Check, at_most, note
+from cad.layout.names import ALIGNMENT_LINKAGE
 from design.frames import Array
 from design.scanner import Scanner
 from design.scene import ray_caster
 from design.shadow import Mask, Shadow
 
-LINKAGE = ("alignment_linkage", "sub_plate")
 OWN_LIMIT_DEG = 2.0  # of the fan that the linkage may hide beyond servo, ring and shaft
 
 
-def beam_checks(scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Array]) -> list[Check]:
+def beam_checks(
+    scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Array], carriers: Collection[str]
+) -> list[Check]:
     """Which beams are hidden, and by whom.
 
     Args:
         scanner: angles and lidar.
         shadow: of all parts.
         triangles_m: of `shadow.triangles_of`.
+        carriers: names of linkage and sub-plate.
     """
     bearings = scanner.lidar.bearings_rad()
     step = math.degrees(float(bearings[1] - bearings[0]))
@@ -36,12 +39,12 @@ def beam_checks(scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Arra
         ),
         note("beams_partly_hidden", step * float(hidden.sum()), "deg", "fan", "hidden on average over a turn"),
     ]
-    linkage = [triangles for name, triangles in triangles_m.items() if name in LINKAGE]
+    linkage = [triangles for name, triangles in triangles_m.items() if name in carriers]
     own = _middle_hidden(scanner, np.concatenate(linkage))
-    others = [triangles for name, triangles in triangles_m.items() if name not in LINKAGE]
+    others = [triangles for name, triangles in triangles_m.items() if name not in carriers]
     beyond = own & ~_middle_hidden(scanner, np.concatenate(others))
-    what = "of the fan hidden by the linkage alone"
-    return [*checks, at_most("beams_linkage", step * float(beyond.sum()), OWN_LIMIT_DEG, "deg", LINKAGE[0], what)]
+    width, what = step * float(beyond.sum()), "of the fan hidden by the linkage alone"
+    return [*checks, at_most("beams_linkage", width, OWN_LIMIT_DEG, "deg", ALIGNMENT_LINKAGE, what)]
 
 
 def _middle_hidden(scanner: Scanner, triangles_m: Array) -> Mask:

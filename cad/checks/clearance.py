@@ -9,13 +9,13 @@ as solids.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 import manifold3d
 import numpy as np
 import shapely
 
-from cad.assembly.assembly import turns
+from cad.assembly.assembly import Assembly
 from cad.checks.check import Check, at_least, at_most
 from cad.geometry.mesh import Mesh
 from design.frames import Array
@@ -25,24 +25,13 @@ LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
 CLEARANCE = 0.4  # between what turns and what stands still
 FAR = 5.0  # distances beyond it are not worked out
 SHARED_MM3 = 0.05  # of two bodies that touch: the noise of their meshes
-UNITS = (
-    ("servo_case", "servo_horn"),
-    ("ring_stator", "ring_rotor"),
-    ("bearing_outer", "bearing_inner"),
-    ("bearing_outer_upper", "bearing_inner_upper"),
-    ("bearing_outer_lower", "bearing_inner_lower"),
-    ("belt", "shaft_pulley"),  # it lies around the pulley and turns with it
-)
 
 
-def clearance_checks(meshes: Mapping[str, Mesh], sweeps: Mapping[str, Mesh] | None = None) -> list[Check]:
-    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together.
-
-    Args:
-        meshes: of all bodies by name.
-        sweeps: what some of them fill that turn about an axis of their own.
-    """
-    return [_turning({**meshes, **(sweeps or {})}), _together(meshes)]
+def clearance_checks(assembly: Assembly) -> list[Check]:
+    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together."""
+    meet = {frozenset({name, body.meets}) for name, body in assembly.bodies.items() if body.meets}
+    turning = assembly.turning()
+    return [turning_check(assembly.outlines(), turning, meet), together_check(assembly.meshes(), turning)]
 
 
 def distance_over_a_turn(one: Mesh, other: Mesh) -> float:
@@ -52,12 +41,21 @@ def distance_over_a_turn(one: Mesh, other: Mesh) -> float:
     return _distance(_image(one), _image(other))
 
 
-def _turning(meshes: Mapping[str, Mesh]) -> Check:
+def turning_check(
+    meshes: Mapping[str, Mesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
+) -> Check:
+    """Room between turning and standing bodies over a whole turn.
+
+    Args:
+        meshes: of all bodies by name, as they look while they turn.
+        turning: names of those that turn about the axis.
+        meet: pairs that may touch.
+    """
     images = {name: _image(mesh) for name, mesh in meshes.items()}
     nearest, where = FAR, "everything that turns"
-    for rotor in sorted(name for name in meshes if turns(name)):
-        for stator in sorted(name for name in meshes if not turns(name)):
-            if (stator, rotor) in UNITS:
+    for rotor in sorted(name for name in meshes if name in turning):
+        for stator in sorted(name for name in meshes if name not in turning):
+            if frozenset({stator, rotor}) in meet:
                 continue
             inside = _holds(meshes[rotor], meshes[stator]) or _holds(meshes[stator], meshes[rotor])
             distance = 0.0 if inside else _distance(images[rotor], images[stator])
@@ -66,13 +64,14 @@ def _turning(meshes: Mapping[str, Mesh]) -> Check:
     return at_least("clearance", nearest, CLEARANCE, "mm", where, "least distance over a whole turn")
 
 
-def _together(meshes: Mapping[str, Mesh]) -> Check:
+def together_check(meshes: Mapping[str, Mesh], turning: Container[str]) -> Check:
+    """No room shared by bodies that move together; arguments as for `turning_check`."""
     most, where = 0.0, "parts that move together"
     bodies = {name: _manifold(mesh) for name, mesh in meshes.items()}
     names = sorted(meshes)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
-            if turns(one) != turns(other) or _apart(meshes[one], meshes[other]):
+            if (one in turning) != (other in turning) or _apart(meshes[one], meshes[other]):
                 continue
             volume = float((bodies[one] ^ bodies[other]).volume())
             if volume > most:

@@ -14,24 +14,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cad.assembly.assembly import Assembly
+from cad.assembly.masses import rotor_of
 from cad.checks.check import Check, Severity, tidy
-from cad.drives.drive import Drive
-from cad.geometry.inertia import Inertial, together
+from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import Mesh
-from cad.layout.linkage import AlignmentLinkage
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.cage import cage_of, stiffness_n_per_m
+from cad.layout.layout import Layout
+from cad.layout.loads import ALUMINIUM_PA, FAR_MM, noise_deg
+from cad.layout.names import ALIGNMENT_LINKAGE
+from cad.parts.servo_shaft import shaft_is_turned
 from cad.statics.sag import Sag, linkage_sag, with_shaft
+from cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
 from design.frames import Array
 from design.scanner import Scanner
 
 POSITIONS = 72  # of the servo, around a turn
-FAR_MM = 10_000.0
 LEAST_ERROR = 0.25  # of the bend: what a grid of 4.8 or 4 mm still moved, 22 % at worst and mostly 3, on seven settings
 HANGS_DEG = 1.0  # what bends more hangs on an edge
-CARRIERS = ("alignment_linkage", "sub_plate")
 
 
 @dataclass(frozen=True, slots=True)
-class Beams:
+class BeamError:
     """Largest over a turn: angle of the lidar [rad], and how far that puts a beam off at FAR_MM [mm]."""
 
     angle_rad: float
@@ -39,28 +44,23 @@ class Beams:
 
 
 def deflection_checks(
-    scanner: Scanner,
-    drive: Drive,
-    linkage: AlignmentLinkage,
-    bodies: Mapping[str, Inertial],
-    meshes: Mapping[str, Mesh],
+    scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, Mesh]
 ) -> list[Check]:
     """The constant part, which a calibration finds, and the part that changes over a turn.
 
     Args:
         scanner: angles and products.
-        drive: its layout.
-        linkage: parameters of the linkage.
-        bodies: of `weights.link_bodies`.
+        assembly: its parts.
+        bodies: of `masses.link_bodies`.
         meshes: of all parts.
     """
     down = -scanner.angles.T_world_rot(0.0)[2, :3]
-    limit = math.degrees(math.atan(scanner.lidar.range_sigma_mm / FAR_MM))
+    limit = noise_deg(scanner)
     try:
-        sag = sag_of(scanner, drive, linkage, bodies, meshes)
+        sag = sag_of(scanner, assembly, bodies, meshes)
     except RuntimeError as error:
-        message = f"alignment_linkage: nothing carries the seat: no equilibrium by finite elements ({error})"
-        return [Check("deflection", "error", None, tidy(limit), "deg", "alignment_linkage", message)]
+        message = f"{ALIGNMENT_LINKAGE}: nothing carries the seat: no equilibrium by finite elements ({error})"
+        return [Check("deflection", "error", None, tidy(limit), "deg", ALIGNMENT_LINKAGE, message)]
     constant, turning = split(sag.rotation_rad, sag.shift_m, down)
     doubts = split(sag.rotation_error_rad, sag.shift_error_m, down)
     what = "the same in every position, for calibrate to find"
@@ -73,23 +73,27 @@ def deflection_checks(
     return [found, _check("deflection_turning", turning, _at_least(doubts[1], turning), limit, what)]
 
 
-def sag_of(
-    scanner: Scanner,
-    drive: Drive,
-    linkage: AlignmentLinkage,
-    bodies: Mapping[str, Inertial],
-    meshes: Mapping[str, Mesh],
-) -> Sag:
+def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, Mesh]) -> Sag:
     """Of everything between horn and lidar; arguments as for `deflection_checks`."""
-    stack, printer = drive.stack, scanner.printer
+    layout, printer = assembly.layout, scanner.printer
+    stack, linkage = layout.stack, layout.linkage
     seat = np.array([linkage.half_x, linkage.half_y, linkage.seat])
-    printed = [meshes[name] for name in CARRIERS if name in meshes]
+    printed = [meshes[name] for name in assembly.carriers()]
     sag = linkage_sag(stack, printed, seat, bodies["laser"], 1000 * printer.modulus_gpa, printer.density_g_cm3)
-    rotor = together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
-    return with_shaft(sag, drive.bend(), stack, rotor)
+    return with_shaft(sag, bend_of(layout), stack, rotor_of(scanner, bodies))
 
 
-def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[Beams, Beams]:
+def bend_of(layout: Layout) -> ShaftBend:
+    """How far the shaft gives way at the hub."""
+    stack, scanner = layout.stack, layout.scanner
+    if isinstance(stack, BeltStack):
+        return belt_shaft_bend(stack)
+    cage = cage_of(scanner, stack)
+    modulus = ALUMINIUM_PA if shaft_is_turned(stack) else 1e9 * scanner.printer.modulus_gpa
+    return shaft_bend(stack, modulus, 0.0 if cage is None else stiffness_n_per_m(cage))
+
+
+def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[BeamError, BeamError]:
     """Constant part and the rest of a sag.
 
     Args:
@@ -109,23 +113,23 @@ def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[Beams, Beam
     return _largest(same), _largest(still - same)
 
 
-def _at_least(doubt: Beams, part: Beams) -> Beams:
-    return Beams(max(doubt.angle_rad, LEAST_ERROR * part.angle_rad), max(doubt.off_mm, LEAST_ERROR * part.off_mm))
+def _at_least(doubt: BeamError, part: BeamError) -> BeamError:
+    return BeamError(max(doubt.angle_rad, LEAST_ERROR * part.angle_rad), max(doubt.off_mm, LEAST_ERROR * part.off_mm))
 
 
-def _largest(parts: Array) -> Beams:
+def _largest(parts: Array) -> BeamError:
     angle, shift = np.linalg.norm(parts, axis=2)
-    return Beams(float(angle.max()), float((angle * FAR_MM + 1000 * shift).max()))
+    return BeamError(float(angle.max()), float((angle * FAR_MM + 1000 * shift).max()))
 
 
-def _check(kind: str, beams: Beams, doubt: Beams, limit: float, what: str) -> Check:
+def _check(kind: str, beams: BeamError, doubt: BeamError, limit: float, what: str) -> Check:
     """Fails over the limit, and warns where its error may put it there."""
     value = round(math.degrees(beams.angle_rad), 6)  # what is nothing is nothing on every machine
     error = round(math.degrees(doubt.angle_rad), 6)
     fails, may_fail = not value <= limit, not value + error <= limit  # what is no number fails
     message = (
-        f"alignment_linkage: {what}: {value:.3g} +- {error:.1g} deg ({beams.off_mm:.1f} mm at 10 m), "
+        f"{ALIGNMENT_LINKAGE}: {what}: {value:.3g} +- {error:.1g} deg ({beams.off_mm:.1f} mm at 10 m), "
         f"{'over' if fails else 'may be over' if may_fail else 'of'} {limit:.3g}"
     )
     severity: Severity = "error" if fails else "warning" if may_fail else "pass"
-    return Check(kind, severity, tidy(value), tidy(limit), "deg", "alignment_linkage", message)
+    return Check(kind, severity, tidy(value), tidy(limit), "deg", ALIGNMENT_LINKAGE, message)

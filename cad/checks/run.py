@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cad.assembly.assembly import Assembly, make_parts
+from cad.assembly.assembly import Assembly
+from cad.assembly.make import make_parts
 from cad.assembly.masses import link_bodies
 from cad.assembly.shadow import shadow_of, triangles_of
 from cad.checks.beams import beam_checks
@@ -49,24 +50,22 @@ def check_scanner(scanner: Scanner, progress: Say) -> list[Check]:
 def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Check], Shadow]:
     """Checks and shadow."""
     progress("casting the beams")
-    meshes = assembly.meshes()
-    outlines = assembly.outlines()
-    triangles = triangles_of(outlines)
-    shadow = shadow_of(scanner, triangles)
+    layout, meshes = assembly.layout, assembly.meshes()
+    triangles = triangles_of(assembly)
+    shadow = shadow_of(scanner, triangles, assembly.turning())
     progress("checking clearance, loads and walls")
-    drive = assembly.drive
-    printed = {name: solid for name, solid in assembly.made.items() if name not in assembly.metal()}
+    printed = {name: solid for name, solid in assembly.made.items() if not assembly.parts[name].metal}
     doubts = [
         Check("unverified", "note", None, None, "", product.name, finding.message)
-        for product in products_of(scanner, drive)
+        for product in products_of(scanner, layout.drive)
         for finding in unverified(product, assembly)
     ]
     bodies = link_bodies(scanner, assembly)
     checks = [
-        *clearance_checks(meshes, outlines),
-        *beam_checks(scanner, shadow, triangles),
-        *mechanics_checks(scanner, drive, bodies),
-        *deflection_checks(scanner, drive, assembly.linkage, bodies, meshes),
+        *clearance_checks(assembly),
+        *beam_checks(scanner, shadow, triangles, assembly.carriers()),
+        *mechanics_checks(scanner, layout.stack, bodies),
+        *deflection_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes),
         *doubts,
     ]

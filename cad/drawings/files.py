@@ -5,21 +5,16 @@ from __future__ import annotations
 import math
 
 from cad.assembly.assembly import Assembly
-from cad.assembly.joints import Joint
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.views import views_of
 from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
-from cad.files.bom import drawing_number
 from cad.geometry.holes import Round
-from cad.layout.balance import PART as COUNTERWEIGHT
-from cad.layout.balance import SCREW as BAR_SCREW
-from cad.layout.balance import Counterweight
 from cad.layout.fits import OnSheet
+from design.catalogue.products import Printer
 from design.scanner import Scanner
 
-HOLDS = ("thread", "trap")  # what of a joint a part holds itself
 AT_M = 10.0  # distance at which a wrong angle is judged
 
 
@@ -27,15 +22,13 @@ def drawing_files(
     scanner: Scanner,
     assembly: Assembly,
     rounds: dict[str, list[Round]],
-    joints: list[Joint],
     masses_g: dict[str, float],
-    metal: set[str],
     config_hash: str,
 ) -> dict[str, bytes]:
     """Draw every made part; `rounds` are its cylinders, the other arguments those of `bom.items_of`."""
     files: dict[str, bytes] = {}
     for name in assembly.made:
-        sheet = drawing_of(name, scanner, assembly, rounds[name], joints, masses_g[name], metal, config_hash)
+        sheet = drawing_of(name, scanner, assembly, rounds[name], masses_g[name], config_hash)
         files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
         files[f"drawings/{name}.svg"] = svg_bytes(sheet)
         files[f"drawings/{name}.dxf"] = dxf_text(sheet).encode("utf-8")
@@ -47,48 +40,36 @@ def drawing_of(
     scanner: Scanner,
     assembly: Assembly,
     rounds: list[Round],
-    joints: list[Joint],
     mass_g: float,
-    metal: set[str],
     config_hash: str,
 ) -> Sheet:
     """The sheet of one part."""
-    lidar_axis = assembly.stack.R()[:, 2] if name in _carriers(joints) else None
-    lathed = name in assembly.drive.turned()
-    said = assembly.drive.on_sheets().get(name, OnSheet())
-    part = part_of(assembly.made[name], rounds, lidar_axis, said)
+    spec = assembly.parts[name]
+    lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
+    part = part_of(assembly.made[name], rounds, lidar_axis, spec.sheet)
     views = views_of(part)
-    material = "aluminium or steel, turned" if lathed else f"{scanner.printer.name}, solid"
-    if isinstance(assembly.counterweight, Counterweight) and name == COUNTERWEIGHT:
-        material = assembly.counterweight.stock
+    material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),
         ("task", scanner.angles.task),
         ("drawing number", drawing_number(config_hash, name, assembly)),
-        ("material", material),
+        ("material", material or f"{scanner.printer.name}, solid"),
         ("mass", f"{mass_g:.1f} g"),
         ("configuration", config_hash),
-        ("general tolerances", "ISO 2768-m" if name in metal else "ISO 2768-c"),
+        ("general tolerances", "ISO 2768-m" if spec.metal else "ISO 2768-c"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, said, [] if lathed else [_making(scanner, name)])
+    notes = _notes(scanner, part, spec.sheet, [] if spec.metal else [_clearances(scanner.printer)])
     return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
-def _carriers(joints: list[Joint]) -> set[str]:
-    """The part that the lidar is screwed to, and the one that this is screwed to in turn."""
-    seats = {joint.part for joint in joints if joint.onto.startswith("lidar")}
-    return seats | {joint.onto for joint in joints if joint.part in seats and joint.fixing in HOLDS} - {
-        "lidar_body",
-        COUNTERWEIGHT,
-    }
+def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
+    """The number of a made part: configuration and place in the assembly."""
+    return f"{config_hash}-{list(assembly.made).index(part) + 1}"
 
 
-def _making(scanner: Scanner, name: str) -> str:
-    """What the model says, and does not say, to whoever makes the part."""
-    printer = scanner.printer
-    if name == COUNTERWEIGHT:
-        return f"Holes of {number(BAR_SCREW.core)}: thread {BAR_SCREW.name} all through."
+def _clearances(printer: Printer) -> str:
+    """What the model holds already."""
     return (
         f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
         f"fits {number(printer.fit_clearance_mm)} on the diameter."

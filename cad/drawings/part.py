@@ -11,7 +11,7 @@ import numpy as np
 from cad.drawings.patterns import Pattern, on_axis, patterns_of
 from cad.drawings.slots import Slot, slots_of
 from cad.geometry.holes import Round
-from cad.layout.fits import Fit, OnSheet
+from cad.layout.fits import OnSheet, ToleratedDiameter
 from design.frames import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
@@ -41,7 +41,7 @@ class Part:
     axial: list[Round]
     datum: float
     lidar_axis: Array | None
-    fits: tuple[Fit, ...]
+    fits: tuple[ToleratedDiameter, ...]
 
     def tolerance(self, item: Round) -> str:
         """What stands behind the diameter of a cylinder about the axis."""
@@ -60,7 +60,7 @@ def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, said
     return Part(solid, patterns_of(rounds), slots_of(solid), axial, datum, lidar_axis, fits)
 
 
-def is_of(fit: Fit, item: Round) -> bool:
+def is_of(fit: ToleratedDiameter, item: Round) -> bool:
     """Whether a fit is meant for a cylinder."""
     return fit.hole == item.hole and abs(fit.diameter - item.diameter) < SAME_SIZE
 

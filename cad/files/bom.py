@@ -14,13 +14,15 @@ from dataclasses import dataclass, fields
 from cad.assembly.assembly import Assembly
 from cad.assembly.joints import Joint
 from cad.checks.remarks import products_of
-from cad.drives.drive import Drive
-from cad.layout.balance import PART as COUNTERWEIGHT
-from cad.layout.balance import SCREW, Counterweight
+from cad.drawings.files import drawing_number
+from cad.layout.belt.stack import BeltStack
+from cad.layout.drive import Drive
+from cad.layout.names import DECK
 from cad.screws import INSERT_LENGTH, SCREWS
-from design.catalogue.products import Bearing, Belt, Lidar, Servo, SlipRing
+from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from design.scanner import Scanner
 
+HOLES = "holes of the solids"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 
 # What else a product needs: name, quantity, source. A product that is not here asks for its data sheet.
@@ -45,7 +47,7 @@ WIRING: dict[str, tuple[tuple[str, int, str], ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class BomItem:
     """One row. Empty texts and None are unknown.
 
     Attributes:
@@ -77,19 +79,13 @@ class Item:
     note: str = ""
 
 
-def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
-    """The number of a made part: configuration and place in the assembly."""
-    return f"{config_hash}-{list(assembly.made).index(part) + 1}"
-
-
 def items_of(
     scanner: Scanner,
     assembly: Assembly,
     joints: list[Joint],
     masses_g: dict[str, float],
-    metal: set[str],
     config_hash: str,
-) -> list[Item]:
+) -> list[BomItem]:
     """All rows; the total last.
 
     Args:
@@ -97,48 +93,52 @@ def items_of(
         assembly: the solids.
         joints: of `joints_of`.
         masses_g: of the made parts.
-        metal: made parts that no printer makes.
         config_hash: of what shapes the parts.
     """
     items = []
-    for part in assembly.made:
-        number = drawing_number(config_hash, part, assembly)
-        made = "turned" if part in metal else "printed"
-        file = f"parts/{part}.step" if part in metal else f"print/{part}.3mf"
-        how = "aluminium or steel, after" if part in metal else f"{scanner.printer.name}, solid, from"
-        bar = assembly.counterweight
-        if isinstance(bar, Counterweight) and part == COUNTERWEIGHT:
-            made, how = "sawn", f"{bar.stock}, {len(bar.screws)} threads {SCREW.name}, after"
-        note = f"{how} {file}; drawing drawings/{part}.pdf"
-        items.append(Item(made, part, number, 1, mass_g=round(masses_g[part], 1), note=note))
-    items += _products(scanner, assembly.drive)
+    for name in assembly.made:
+        part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
+        how = f"{scanner.printer.name}, solid, from print/{name}.3mf"
+        if part.metal:
+            how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
+        note = f"{how}; drawing drawings/{name}.pdf"
+        items.append(BomItem(part.process, name, number, 1, mass_g=round(masses_g[name], 1), note=note))
+    items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
-    items += _wiring(scanner, assembly.drive)
+    items += _wiring(scanner, assembly.layout.drive)
     return [*items, _total(items)]
 
 
-def bom_text(items: list[Item]) -> str:
+def bom_text(items: list[BomItem]) -> str:
     """The CSV file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [field.name for field in fields(Item)]
+    names = [field.name for field in fields(BomItem)]
     writer.writerow(names)
     for item in items:
         writer.writerow(["" if getattr(item, name) is None else getattr(item, name) for name in names])
     return text.getvalue()
 
 
-def _products(scanner: Scanner, drive: Drive) -> Iterator[Item]:
+def _products(scanner: Scanner, drive: Drive) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
         if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            number = drive.order_number(product)
-            yield _bought(product, max(1, drive.products().count(product)), number)
+            number = _order_number(product, drive)
+            yield _bought(product, max(1, drive.products.count(product)), number)
 
 
-def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> Item:
+def _order_number(product: Product, drive: Drive) -> str:
+    """What to ask a shop for: a belt comes in lengths."""
+    stack = drive.stack
+    if isinstance(stack, BeltStack) and product == stack.belt:
+        return f"{product.name}, {stack.belt_teeth} teeth, {stack.belt_teeth * stack.belt.pitch_mm:g} mm"
+    return product.name
+
+
+def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
     origin = product.provenance().get("price_usd")
     price = product.price_usd
-    return Item(
+    return BomItem(
         kind="bought",
         part=product.kind.replace("_", " "),
         number=number,
@@ -154,7 +154,7 @@ def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, n
     )
 
 
-def _screws(joints: list[Joint]) -> Iterator[Item]:
+def _screws(joints: list[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: dict[str, int] = {}
     inserts: dict[str, int] = {}
@@ -166,39 +166,39 @@ def _screws(joints: list[Joint]) -> Iterator[Item]:
             inserts[joint.screw.name] = inserts.get(joint.screw.name, 0) + joint.count
     for number, used in sorted(screws.items()):
         kind = "grub screw" if number.startswith("ISO 4026") else "cap screw"
-        where = ", ".join(f"{joint.count} {joint.part} to {joint.onto or 'deck'}" for joint in used)
+        where = ", ".join(f"{joint.count} {joint.part} to {joint.onto or DECK}" for joint in used)
         total = sum(joint.count for joint in used)
-        yield Item("screw", kind, number, total, source="holes of the solids", note=f"{where}; price unknown")
+        yield BomItem("screw", kind, number, total, source=HOLES, note=f"{where}; price unknown")
     for name, count in sorted(nuts.items()):
-        yield Item("nut", "hexagon nut", f"ISO 4032 {name}", count, source="holes of the solids", note="price unknown")
+        yield BomItem("nut", "hexagon nut", f"ISO 4032 {name}", count, source=HOLES, note="price unknown")
     for name, count in sorted(inserts.items()):
         note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm; price unknown"
-        yield Item("insert", "heat-set insert", name, count, source="holes of the solids", note=note)
+        yield BomItem("insert", "heat-set insert", name, count, source=HOLES, note=note)
 
 
-def _wiring(scanner: Scanner, drive: Drive) -> Iterator[Item]:
-    yield Item("wiring", "power supply, 12 V", quantity=1, source=PAPER, note="price unknown")
+def _wiring(scanner: Scanner, drive: Drive) -> Iterator[BomItem]:
+    yield BomItem("wiring", "power supply, 12 V", quantity=1, source=PAPER, note="price unknown")
     for product in (scanner.lidar, scanner.servo):
         needs = WIRING.get(product.name)
         if needs is None:
             part = f"cables and power of {product.name}"
-            yield Item("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
+            yield BomItem("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
             continue
         for part, quantity, source in needs:
-            yield Item("wiring", part, quantity=quantity, source=source, note="price unknown")
+            yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
     if scanner.slip_ring is not None:
         circuits = scanner.slip_ring.circuits
-        for part, source in drive.wiring():
-            yield Item("wiring", part, quantity=1, source=source, note="price unknown")
+        for part, source in drive.ring_needs:
+            yield BomItem("wiring", part, quantity=1, source=source, note="price unknown")
         part = "plug, socket and heat shrink for the leads of the slip ring"
-        yield Item(
+        yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
 
 
-def _total(items: list[Item]) -> Item:
+def _total(items: list[BomItem]) -> BomItem:
     known = [item.total_usd for item in items if item.total_usd is not None]
     unknown = sum(item.total_usd is None for item in items)
     doubtful = sum(item.total_usd is not None and item.verified == "no" for item in items)
     note = f"sum of {len(known)} known prices, {doubtful} of them not verified; {unknown} rows without a price"
-    return Item("total", "all rows with a price", total_usd=round(sum(known), 2), note=note)
+    return BomItem("total", "all rows with a price", total_usd=round(sum(known), 2), note=note)

@@ -13,33 +13,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly, colour_of, turns
+from cad.assembly.assembly import Assembly
 from cad.files.glb import Node, glb_bytes
 from cad.geometry.mesh import Mesh
-from cad.layout.balance import PART as COUNTERWEIGHT
-from cad.layout.balance import Counterweight
+from cad.layout.balance.counterweight import Counterweight
+from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR
 from design.frames import Array
 from design.scanner import Scanner
 
 GAP_MM = 15.0  # between the products of the exploded view
-ALONG_LIDAR = ("sub_plate", "lidar")  # what leaves the linkage along the lidar's z, in this order
-
-
-def frame_of(body: str, assembly: Assembly) -> str:
-    """Which frame a body moves with: servo, rot or laser."""
-    if body in assembly.bought and body.startswith("lidar_"):
-        return "laser"
-    return "rot" if turns(body) else "servo"
 
 
 def product_of(body: str, assembly: Assembly) -> str:
     """The thing that one holds in the hand: a made part, or the bought product that several bodies draw."""
-    return body if body in assembly.made else body.split("_")[0]
+    return body if body in assembly.made else assembly.bodies[body].product
 
 
-def scene_files(
-    scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str, metal: set[str]
-) -> dict[str, bytes]:
+def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str) -> dict[str, bytes]:
     """Both files.
 
     Args:
@@ -47,7 +37,6 @@ def scene_files(
         assembly: the solids.
         meshes: of the made parts, rotation frame; the bought ones are meshed here.
         config_hash: of what shapes the parts.
-        metal: parts of bare metal.
     """
     T = scanner.angles.T_rot_laser()
     nodes = [
@@ -57,11 +46,12 @@ def scene_files(
         Node("laser", "rot", T),
     ]
     for name in (*assembly.made, *assembly.bought):
-        frame = frame_of(name, assembly)
+        spec = assembly.spec(name)
+        frame = spec.frame
         mesh = meshes[name] if name in meshes else assembly.mesh(name)
         if frame == "laser":
             mesh = Mesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
-        nodes.append(Node(name, frame, np.eye(4), mesh, colour_of(name), name in metal))
+        nodes.append(Node(name, frame, np.eye(4), mesh, spec.colour, name in assembly.metal()))
     motion = scanner.angles.motion
     spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None
     extras = {"task": scanner.angles.task, "config": config_hash, "unit": "m"}
@@ -97,22 +87,24 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
     axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
     lifts: dict[str, Array] = {}
     top = -np.inf
-    for product in sorted(points.keys() - {*ALONG_LIDAR, COUNTERWEIGHT}, key=assembly.drive.stacked().index):
+    along = {name: part.lifted for name, part in assembly.parts.items() if name in points} | {LIDAR: "lidar"}
+    stacked = [product for product in assembly.layout.drive.stacked if product in points]
+    for product in stacked:
         low, high = float(points[product][:, 2].min()), float(points[product][:, 2].max())
         lift = max(0.0, top + GAP_MM - low)
         lifts[product] = lift * axis
         top = high + lift
-    top = float((points["alignment_linkage"] @ out).max())
-    bar = assembly.counterweight
-    if COUNTERWEIGHT in points and isinstance(bar, Counterweight):
+    top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
+    bar = assembly.layout.counterweight
+    for product in (product for product in along if along[product] == "radius"):
+        assert isinstance(bar, Counterweight)
         away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
         shift = (bar.ear.end - bar.start + GAP_MM) * away
-        lifts[COUNTERWEIGHT] = lifts["alignment_linkage"] + shift
-        top = max(top, float(((points[COUNTERWEIGHT] + shift) @ out).max()))
-    for product in ALONG_LIDAR:
-        if product in points:
-            heights = points[product] @ out
-            lift = top + GAP_MM - float(heights.min())
-            lifts[product] = lifts["alignment_linkage"] + lift * out
-            top = float(heights.max()) + lift
+        lifts[product] = linkage + shift
+        top = max(top, float(((points[product] + shift) @ out).max()))
+    for product in (product for product in along if along[product] == "lidar"):
+        heights = points[product] @ out
+        lift = top + GAP_MM - float(heights.min())
+        lifts[product] = linkage + lift * out
+        top = float(heights.max()) + lift
     return lifts

@@ -6,7 +6,10 @@ import re
 from collections.abc import Iterator
 
 from cad.assembly.assembly import Assembly
-from cad.assembly.joints import CASE_EAR, DECK, Joint
+from cad.assembly.joints import CASE_EAR, DECK_MM, Joint
+from cad.assembly.steps import steps_of
+from cad.layout.joints import ALL_SCREWS, screws
+from cad.layout.names import DECK, LIDAR, LIDAR_BODY
 from design.scanner import Scanner
 
 NUTS = (
@@ -32,15 +35,15 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
         "Print `print/fit_coupon.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm).",
         "",
-        f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK:g} mm; "
-        "all others follow from the parts.",
+        f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
+        "mm; all others follow from the parts.",
         "",
     ]
     if any(joint.inserts for joint in joints):
         lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
     if any(joint.traps for joint in joints):
         lines += [NUTS, ""]
-    for number, (title, text) in enumerate(_steps(scanner, assembly, joints), start=1):
+    for number, (title, text) in enumerate(_filled(scanner, assembly, joints), start=1):
         lines += [f"## {number}. {title}", "", text, ""]
     return "\n".join(lines)
 
@@ -64,29 +67,22 @@ def screws_in_words(joint: Joint) -> str:
     return f"{what} {where}{held}.{left}"
 
 
-def _steps(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:
+def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:
+    """Title and words of each step, every joint in one of them."""
     done: set[int] = set()
-    words = assembly.drive.steps()
-    order = tuple(words)
-    seat = next((joint.part for joint in joints if joint.onto.startswith("lidar")), "")
-    things = [*assembly.made, "lidar"]
-    if scanner.slip_ring is not None:
-        things.append("ring")
-    if "base_mount" not in assembly.made:
-        things.append("deck")
-    for thing in sorted(things, key=lambda name: order.index(name) if name in order else len(order)):
-        title, text = words.get(thing, (thing, "{*}"))
-        carrier = seat if thing == "lidar" else thing
+    seat = next((joint.part for joint in joints if joint.onto == LIDAR_BODY), "")
+    for thing, step in steps_of(assembly):
+        text, carrier = step.words, seat if thing == LIDAR else thing
         for i, joint in enumerate(joints):
-            onto = joint.onto or "deck"
-            marks = [f"{{{joint.part}>{onto}}}"]
-            marks += [f"{{{onto}}}", "{*}"] if joint.part == carrier else []
+            onto = joint.onto or DECK
+            marks = [screws(onto, joint.part)]
+            marks += [screws(onto), ALL_SCREWS] if joint.part == carrier else []
             place = next((mark for mark in marks if mark in text), None)
             if place is not None and i not in done:
                 text = text.replace(place, f"**{screws_in_words(joint)}** {place}")
                 done.add(i)
-        yield title, " ".join(re.sub(r"\{.*?\}", "", text).split())
+        yield step.title, " ".join(re.sub(r"\{.*?\}", "", text).split())
     for i, joint in enumerate(joints):
         if i not in done:
-            yield f"{joint.part} to {joint.onto or 'deck'}", f"**{screws_in_words(joint)}**"
+            yield f"{joint.part} to {joint.onto or DECK}", f"**{screws_in_words(joint)}**"
     yield "Look, then wire", LAST + (IN_A_LOOP if scanner.slip_ring is None else THROUGH_RING)

@@ -14,8 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cad.drives.drive import Drive
 from cad.geometry.inertia import Inertial
+from cad.layout.drive import Block, Drive, Rod
 from design.frames import Array
 from design.scanner import Scanner
 
@@ -34,7 +34,7 @@ def urdf_text(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial], meshe
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
         '  <link name="world"/>',
-        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *_standing_shapes(drive)]),
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *map(_standing_shape, drive.shapes)]),
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
@@ -90,12 +90,11 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _standing_shapes(drive: Drive) -> list[tuple[str, str]]:
-    shapes = []
-    for centre, size in drive.shapes():
-        shape = _box(size) if len(size) == 3 else _cylinder(*size)
-        shapes.append((_origin(np.array(centre) / 1000), shape))
-    return shapes
+def _standing_shape(shape: Block | Rod) -> tuple[str, str]:
+    if isinstance(shape, Rod):
+        return _origin((0.0, 0.0, (shape.low + shape.high) / 2000)), _cylinder(shape.radius, shape.high - shape.low)
+    low, high = np.array(shape.low), np.array(shape.high)
+    return _origin((low + high) / 2000), _box(high - low)
 
 
 def _lidar_shapes(scanner: Scanner) -> list[tuple[str, str]]:

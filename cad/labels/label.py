@@ -21,14 +21,15 @@ import shapely.affinity
 from numpy.typing import NDArray
 
 from cad import solids
-from cad.assembly.assembly import Assembly, turns
-from cad.findings import Finding
+from cad.assembly.assembly import Assembly
+from cad.findings import PartFinding
 from cad.geometry.holes import Piercing
 from cad.geometry.mesh import Mesh, checked_mesh
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at, flats_of
 from cad.labels.glyphs import letters, text_width
 from cad.labels.sight import Sight
+from cad.parts.part_spec import PartSpec
 from design.errors import BuildError
 from design.frames import Array
 from design.left_out import LeftOut
@@ -45,7 +46,6 @@ OVERLAP = 0.01  # of the squares around these points
 PLACES = 5  # of these, the nearest to its middle, that are looked at closely
 LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
-CARRIERS = ("alignment_linkage", "sub_plate")
 FRONT_INSET = 10.0  # of its middle from the edge
 TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1)))
 
@@ -63,12 +63,12 @@ class Labelled:
 
     parts: dict[str, cq.Solid] = field(default_factory=dict)
     meshes: dict[str, Mesh] = field(default_factory=dict)
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[PartFinding] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class Lines:
+class Lettering:
     """Lettering, its origin at the lower left corner of its last line."""
 
     lines: tuple[str, ...]
@@ -102,7 +102,7 @@ class Place:
         """Points of the lettering, shape (n, 2), in the axes of the face."""
         return np.asarray(points @ self.turn.T + [self.x, self.y])
 
-    def outlines(self, lines: Lines, stroke: float) -> list[shapely.Polygon]:
+    def outlines(self, lines: Lettering, stroke: float) -> list[shapely.Polygon]:
         """Of the grooves of some lines, in the axes of the face."""
         return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]
 
@@ -112,13 +112,13 @@ class Label:
     """Lettering, its place, and whether it can be read on the assembled scanner."""
 
     place: Place
-    lines: Lines
+    lines: Lettering
     seen: bool
 
 
 Views = Callable[[Flat, Array], NDArray[np.bool_]]
 Room = tuple[Flat, shapely.Polygon]
-FRONT = Lines(("FRONT",), HEIGHTS[0])
+FRONT = Lettering(("FRONT",), HEIGHTS[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,24 +184,25 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
     sight, done = Sight(assembly), Labelled()
     groove, up = groove_of(scanner.printer), scanner.angles.T_world_rot(0.0)[2, :3]
     for name, solid in assembly.made.items():
-        if name in assembly.metal():
+        part = assembly.parts[name]
+        if part.metal:
             continue
         front = None
-        if name in CARRIERS:
-            front = _front(assembly, name, groove)
+        if part.seat is not None:
+            front = _front(assembly, solid, part.seat, groove)
             if front is None:
                 why = "a hole of the seat is in the way of the word; the V in the edge says it too"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not sight.touched(flat)]
         ground = Ground(flats, Piercing(solid), groove, scanner.printer.min_wall_mm, up, front)
-        views = partial(sight.views, turning=turns(name))
-        label = label_on(ground, label_texts(scanner, name, config_hash), views)
+        views = partial(sight.views, turning=part.turns)
+        label = label_on(ground, label_texts(scanner, part, config_hash), views)
         if label is None:
             why = "none of its flat faces that mate with nothing has room for one"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
         elif not label.seen:
             message = f"{name}: its label is hidden on the assembled scanner: no face in sight has room for it"
-            done.findings.append(Finding("label_hidden", "note", name, message))
+            done.findings.append(PartFinding("label_hidden", "note", name, message))
         words = [] if front is None else [(front, FRONT)]
         words += [] if label is None else [(label.place, label.lines)]
         if words:
@@ -212,14 +213,15 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
     return done
 
 
-def label_texts(scanner: Scanner, name: str, config_hash: str) -> list[str]:
+def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]:
     """What stands on a part: the task, the angles that shape it, the configuration."""
     angles = scanner.angles.angles_deg
-    turning = f"L {angles.alpha_laser:g} {angles.beta_laser:g}"
-    standing = f"R {angles.alpha_rot:g} {angles.beta_rot:g}"
-    shaped = {"base_mount": standing, "alignment_linkage": turning, "sub_plate": turning}.get(name)
-    texts = [scanner.angles.task[: max(LONGEST)], shaped, config_hash[:DIGITS]]
-    return [text for text in texts if text is not None]
+    shaped = {
+        "none": [],
+        "laser": [f"L {angles.alpha_laser:g} {angles.beta_laser:g}"],
+        "rot": [f"R {angles.alpha_rot:g} {angles.beta_rot:g}"],
+    }[part.angles]
+    return [scanner.angles.task[: max(LONGEST)], *shaped, config_hash[:DIGITS]]
 
 
 def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
@@ -233,7 +235,7 @@ def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
     rooms = [(flat, ground.room(flat)) for flat in ground.flats]
     in_sight = [(flat, part) for flat, room in rooms for part in _in_sight(flat, room, views)]
     for seen, some, longest, height in product((True, False), (texts, texts[-1:]), LONGEST, HEIGHTS):
-        lines = Lines(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
+        lines = Lettering(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
         for place in _places(ground, in_sight if seen else rooms, lines.size):
             points = place.put(_grid(lines.size))
             reads = not seen or bool(views(place.flat, points).all(axis=1).any())
@@ -242,7 +244,7 @@ def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
     return None
 
 
-def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lines]], groove: Groove) -> tuple[cq.Solid, Mesh]:
+def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, Mesh]:
     """The part with lettering, and its mesh.
 
     Raises:
@@ -255,13 +257,12 @@ def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lines]], groove: Groo
     return cut, checked_mesh(cut, "label")
 
 
-def _front(assembly: Assembly, name: str, groove: Groove) -> Place | None:
+def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:
     """Where FRONT stands on the plates that carry the lidar: its letters' feet to the middle, its heads to the V."""
-    linkage, R = assembly.linkage, assembly.stack.R()
-    height = linkage.top if name == "alignment_linkage" else linkage.seat
+    R = assembly.layout.stack.R()
     width, letter = FRONT.size
-    middle = linkage.half_x - FRONT_INSET
-    flat = flat_at(assembly.made[name], R @ [middle, 0.0, height], R[:, 2])
+    middle = assembly.layout.linkage.half_x - FRONT_INSET
+    flat = flat_at(solid, R @ [middle, 0.0, height], R[:, 2])
     if flat is None:
         return None
     x, y = flat.along((R @ [middle - letter / 2, width / 2, height])[None])[0]

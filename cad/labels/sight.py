@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from cad.assembly.assembly import Assembly, turns
+from cad.assembly.assembly import Assembly
 from cad.labels.flats import Flat
 from design.frames import Array
 from design.scene import ray_caster
@@ -28,8 +28,9 @@ class Sight:
 
     def __init__(self, assembly: Assembly) -> None:
         corners: dict[bool, list[Array]] = {True: [], False: [_deck(assembly)]}
+        turning = assembly.turning()
         for name, mesh in assembly.meshes().items():
-            corners[turns(name)].append(mesh.vertices[mesh.faces])
+            corners[name in turning].append(mesh.vertices[mesh.faces])
         self._scenes = {turning: ray_caster.scene_of(np.concatenate(all_) / 1000) for turning, all_ in corners.items()}
 
     def touched(self, flat: Flat) -> bool:
@@ -67,7 +68,7 @@ class Sight:
 
 def _deck(assembly: Assembly) -> Array:
     """Two triangles, shape (2, 3, 3)."""
-    axes, centre = assembly.deck.rotation(), np.array(assembly.deck.centre)
+    axes, centre = assembly.layout.deck.rotation(), np.array(assembly.layout.deck.centre)
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * DECK_HALF
     corners = centre - DECK_BELOW * axes[:, 2] + square @ axes[:, :2].T
     return corners[[[0, 1, 2], [0, 2, 3]]]

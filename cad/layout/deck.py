@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.drives.drive import drive_of
-from cad.layout.direct_stack import rotor_radius
-from cad.layout.head import Head
-from cad.layout.mounted import Carried
+from cad.layout.drive import Drive, Mounted
+from cad.layout.envelope import rotor_radius
+from cad.layout.hub import Hub
+from cad.layout.names import BASE_MOUNT
 from cad.screws import SCREWS, Screw
 from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
@@ -25,6 +25,7 @@ from design.scanner import Scanner
 FOOT_THICKNESS = 6.0
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
+UNDER_MOUNT_HEAD = 5.0  # of the mount, to what it holds
 BACK_MARGIN = 5.0  # of the back plate around the rear holes
 USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
 PAD_HALF = 26.0  # of the strut on the foot
@@ -57,18 +58,9 @@ class Deck:
         return np.stack([along, np.cross(normal, along), normal], axis=1)
 
 
-def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
-    """`t_world_rot_mm`: the optical centre in the world, whose origin is the centre of the deck holes.
-
-    Raises:
-        BuildError: the scanner cannot be built, as for `stack_of`.
-    """
-    return deck_of(scanner, drive_of(scanner).stack).t_world_rot
-
-
-def deck_of(scanner: Scanner, stack: Head) -> Deck:
+def deck_of(scanner: Scanner, drive: Drive) -> Deck:
     """Lay the deck so that rotor, ring, case and mount stay clear of it, rounded up to whole millimetres."""
-    carried, pattern = drive_of(scanner).carried(), scanner.deck or USUAL
+    mounted, pattern = drive.mounted, scanner.deck or USUAL
     screw = SCREWS[pattern.screw]
     R = scanner.angles.T_world_rot(0.0)[:3, :3]
     R = np.where(np.abs(R) < 1e-12, 0.0, R)
@@ -76,16 +68,16 @@ def deck_of(scanner: Scanner, stack: Head) -> Deck:
     normal = -R[2] if hangs else R[2]
     deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # to the left of x, seen from the room
     along = R[0]
-    holes = carried.holes
+    holes = mounted.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
     half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
-    back = np.array([0.0, (max(ys) + min(ys)) / 2, carried.rear - PLUG_GAP])
-    flat = carried.stands_alone and scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
+    back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
+    flat = mounted.stands_alone and scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
     if flat:
-        centre = np.array([0.0, 0.0, carried.rear])
+        centre = np.array([0.0, 0.0, mounted.rear])
     else:
-        height = _height_of_back(scanner, stack, carried, normal, back, half)
-        centre = back - height * normal + _foot_shift(scanner, carried, deck_holes, back, normal, R[0], height)
+        height = _height_of_back(scanner, drive.stack, mounted, normal, back, half)
+        centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
     offset = -R @ centre
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
@@ -105,7 +97,7 @@ def deck_of(scanner: Scanner, stack: Head) -> Deck:
 
 
 def _height_of_back(
-    scanner: Scanner, stack: Head, carried: Carried, normal: Array, back: Array, half: tuple[float, float]
+    scanner: Scanner, stack: Hub, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
 ) -> float:
     """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
     plate = [
@@ -114,16 +106,16 @@ def _height_of_back(
         for sy in (1, -1)
         for depth in (0.0, BACK_THICKNESS)
     ]
-    below = [float(-(np.array(point) @ normal)) for point in (*carried.corners, *plate)]
+    below = [float(-(np.array(point) @ normal)) for point in (*mounted.corners, *plate)]
     sideways = float(np.hypot(normal[0], normal[1]))
-    below += [around * sideways - z * float(normal[2]) for around, z in carried.discs]
+    below += [around * sideways - z * float(normal[2]) for around, z in mounted.discs]
     below.append(rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN)
     return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
 
 
 def _foot_shift(
     scanner: Scanner,
-    carried: Carried,
+    mounted: Mounted,
     deck_holes: tuple[tuple[float, float], ...],
     back: Array,
     normal: Array,
@@ -135,7 +127,7 @@ def _foot_shift(
     The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
     """
     screw = SCREWS[(scanner.deck or USUAL).screw]
-    room = carried.screw.head_room + screw.head_room
+    room = mounted.screw.head_room + screw.head_room
     left = np.cross(normal, along)
     shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
     depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
@@ -146,7 +138,7 @@ def _foot_shift(
         return min(
             float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
             for point in screws
-            for x, y in carried.holes
+            for x, y in mounted.holes
         )
 
     a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
@@ -163,8 +155,8 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
     near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]
     if near:
         raise BuildError(
-            f"base_mount: deck.shape = '{pattern.shape}': the hole at ({near[0][0]:g}, {near[0][1]:g}) mm is under the "
-            f"strut: {screw.name} needs {least:g} mm from the centre along x or y; take a larger pattern"
+            f"{BASE_MOUNT}: deck.shape = '{pattern.shape}': the hole at ({near[0][0]:g}, {near[0][1]:g}) mm is under "
+            f"the strut: {screw.name} needs {least:g} mm from the centre along x or y; take a larger pattern"
         )
     if isinstance(pattern, Circle):  # a regular octagon keeps the margin all around
         half = pattern.diameter_mm / 2 + HOLE_MARGIN

@@ -8,7 +8,7 @@ from design.catalogue.products import Bearing
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class ToleratedDiameter:
     """Of the cylinders of one diameter about the axis that a part is measured from.
 
     Attributes:
@@ -34,31 +34,31 @@ class OnSheet:
         axis: where the axis that its ordinates run from meets the rotation frame's plane z = 0.
     """
 
-    fits: tuple[Fit, ...] = ()
+    fits: tuple[ToleratedDiameter, ...] = ()
     notes: tuple[str, ...] = ()
     axis: tuple[float, float] = (0.0, 0.0)
 
 
-def printed_seat(bearing: Bearing, fit: float) -> Fit:
+def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:
     """Of a bearing's outer ring in a printed part, which is drawn half of the sliding fit wider."""
     why = f"seat of {bearing.name}, from size for size to a sliding fit"
-    return Fit(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
+    return ToleratedDiameter(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
 
 
-def printed_journal(bearing: Bearing, fit: float) -> Fit:
+def printed_journal(bearing: Bearing, fit: float) -> ToleratedDiameter:
     """Of a printed part in a bearing's inner ring, which is drawn half of the sliding fit thinner."""
     why = f"journal of {bearing.name}, from size for size to a sliding fit"
-    return Fit(bearing.bore_mm - fit / 2, False, f"±{_g(fit / 2)}", why)
+    return ToleratedDiameter(bearing.bore_mm - fit / 2, False, f"±{_g(fit / 2)}", why)
 
 
-def no_wider(diameter: float, fit: float, why: str) -> Fit:
+def no_wider(diameter: float, fit: float, why: str) -> ToleratedDiameter:
     """A printed hole that is drawn with half of the sliding fit, and what goes wrong where it has more."""
-    return Fit(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)
+    return ToleratedDiameter(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)
 
 
-def turned_spigot(diameter: float, fit: float) -> Fit:
+def turned_spigot(diameter: float, fit: float) -> ToleratedDiameter:
     """Of a turned shaft in the printed hub."""
-    return Fit(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
+    return ToleratedDiameter(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
 
 
 def _g(value: float) -> str:

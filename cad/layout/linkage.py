@@ -7,17 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad import solids
-from cad.layout.direct_stack import BODY_GAP, PLATE_THICKNESS, SUB_PLATE, Box, box_corners, envelope_of
-from cad.layout.head import Head
-from cad.parts.sub_plate import EAR_SCREW, ear_screws
-from cad.screws import SCREWS, Screw, Trap, thread_hole, trap_of
+from cad import outlines
+from cad.layout.drive import Stack
+from cad.layout.envelope import (
+    BODY_GAP,
+    EAR_SCREW,
+    PLATE_THICKNESS,
+    SUB_PLATE_THICKNESS,
+    Box,
+    box_corners,
+    ear_screws,
+    envelope_of,
+)
+from cad.layout.names import ALIGNMENT_LINKAGE
+from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
 
-PART = "alignment_linkage"
 CLAMP_SCREW = SCREWS["M3"]
+SPOT_FACE = 1.5  # of a radial screw, into the hub: no tangent plane
 CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
 
@@ -39,7 +48,7 @@ class Ear:
 class AlignmentLinkage:
     """Lengths in mm, angles in rad, directions in the rotation frame."""
 
-    stack: Head
+    stack: Stack
     seat: float  # z of the lidar's base in the laser frame
     top: float  # z of the plate's upper face: the seat, or below a sub-plate
     half_x: float
@@ -48,9 +57,8 @@ class AlignmentLinkage:
     body: Box
     ears: Box | None  # room of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
-    ear_thread: float  # diameter
-    clamp_thread: float  # diameter
-    trap: Trap | None  # of all these screws, if they hold in nuts
+    ear_thread: Thread
+    clamp_thread: Thread
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
@@ -62,7 +70,7 @@ class AlignmentLinkage:
     ear: Ear | None = None
 
 
-def linkage_of(scanner: Scanner, stack: Head) -> AlignmentLinkage:
+def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
     """Parameters of the linkage of one scanner.
 
     Raises:
@@ -71,32 +79,30 @@ def linkage_of(scanner: Scanner, stack: Head) -> AlignmentLinkage:
     lidar, printer = scanner.lidar, scanner.printer
     envelope = envelope_of(lidar, stack.sub_plate)
     screw = SCREWS[lidar.mount_screw]
-    hole = screw.nominal + printer.screw_clearance_mm
+    hole = passing_hole(screw, printer)
     half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
     edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in lidar.mount_holes_mm) - hole / 2
     if edge < printer.min_wall_mm:
         raise BuildError(
-            f"{PART}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm at the edge "
-            f"of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
+            f"{ALIGNMENT_LINKAGE}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm "
+            f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in lidar.mount_holes_mm)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
-    trap = trap_of(CLAMP_SCREW, printer)
     return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
-        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE),
+        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE_THICKNESS),
         half_x=half_x,
         half_y=half_y,
         chamfer=chamfer,
         body=envelope.body,
         ears=None if stack.sub_plate is None else _grown(envelope.under),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
-        ear_thread=thread_hole(EAR_SCREW, printer) if trap is None else trap.hole,
-        clamp_thread=thread_hole(CLAMP_SCREW, printer) if trap is None else trap.hole,
-        trap=trap,
+        ear_thread=thread_in_part(EAR_SCREW, printer),
+        clamp_thread=thread_in_part(CLAMP_SCREW, printer),
         cables=envelope.cables,
         fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
         fan=_free_bearings(stack, lidar.bearings_rad()),
@@ -115,19 +121,19 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     """
     stack = p.stack
     turn = math.radians(0.7 + 1.9 * attempt)
-    ring = solids.polygon(stack.hub_radius - 1.0 - 0.05 * attempt, 24, turn)
+    ring = outlines.polygon(stack.hub_radius - 1.0 - 0.05 * attempt, 24, turn)
     R = stack.R()
     under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
     top = min(max(-stack.h, under_body), 40.0 - stack.h)
     layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.shoulder + 1.5, top)]
-    outline = solids.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
+    outline = outlines.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
     for z in (p.top - 0.2, p.top - PLATE_THICKNESS + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
     layers.append(_heel(np.concatenate(layers[2:]), stack))
     return np.concatenate(layers)
 
 
-def _heel(plate: Array, stack: Head) -> Array:
+def _heel(plate: Array, stack: Stack) -> Array:
     """The lower half of the plate's corners, moved down: else a lying plate hangs on a wedge that ends in an edge."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
@@ -143,7 +149,7 @@ def _grown(box: Box) -> Box:
     return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
-def _free_bearings(stack: Head, bearings: Array) -> tuple[tuple[float, float], ...]:
+def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
     """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there."""
     first, last = float(bearings.min()), float(bearings.max())
     q = stack.R()[2]

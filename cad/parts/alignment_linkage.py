@@ -1,6 +1,6 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. A hub clamps the shaft's spigot (blind bore
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub clamps the shaft's spigot (blind bore
 with a flat at +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must
 stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x
 (FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub,
@@ -13,16 +13,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 import numpy as np
 
-from cad import solids
+from cad import outlines, solids
 from cad.geometry.mesh import checked_mesh
-from cad.layout.direct_stack import BODY_GAP, EAR_REACH, PLATE_THICKNESS
-from cad.layout.linkage import CLAMP_DRIVER, PART, AlignmentLinkage, Ear, neck_corners
-from cad.layout.loads import JOURNAL_WALL
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.loads import JOURNAL_WALL
+from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS
+from cad.layout.fits import OnSheet, printed_journal
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.linkage import CLAMP_DRIVER, SPOT_FACE, AlignmentLinkage, Ear, neck_corners
+from cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT, SERVO_SHAFT
 from cad.parts.fins import FAR, fins_beside
+from cad.parts.part_spec import PartSpec, Step, shapes
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
 from cad.solids import building, checked
@@ -35,6 +42,38 @@ EAR_CORNER = 0.3  # of its half width
 RETRIES = 5
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
 TRAP_WALL = 1.2  # between wires and a nut
+BELT_WORDS = (
+    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
+    f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
+    "shaft in its loose pulley, until the groove of the hub stands over the groove in the edge of the tower's "
+    "top, and tighten the pulley's two grub screws. Both pulleys have the same number of teeth and turn the "
+    "same way, so from now on the servo's angle is that of the axis."
+)
+
+
+def linkage_spec(layout: Layout) -> PartSpec:
+    """The linkage of one scanner."""
+    p, stack = layout.linkage, layout.stack
+    words = (
+        "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way "
+        f"only, and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
+    )
+    step = Step("Linkage on the shaft", words)
+    if isinstance(stack, BeltStack):
+        step = Step("Linkage on the shaft, and the belt set", BELT_WORDS)
+    of_lidar = ("body_mm", "optical_height_mm", "window_z_mm", "mount_screw", "mount_holes_mm")
+    of_cables = ("cable_y_mm", "cable_z_mm", "cable_diameter_mm", "cable_straight_mm")
+    return PartSpec(
+        name=ALIGNMENT_LINKAGE,
+        turns=True,
+        make=partial(alignment_linkage, p),
+        step=step,
+        sheet=OnSheet(() if stack.bearing is None else (printed_journal(stack.bearing, p.fit),)),
+        shaped_by=shapes(ALIGNMENT_LINKAGE, *(f"lidar.{field}" for field in (*of_lidar, *of_cables)), "bearing.bore_mm")
+        | shapes(f"the bore of {ALIGNMENT_LINKAGE}", "printer.fit_clearance_mm"),
+        angles="laser",
+        seat=p.top,
+    )
 
 
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
@@ -77,7 +116,7 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
     Raises:
         BuildError: the kernel fails at one.
     """
-    with building(PART, "plate and neck", "tilt", _tilt(p)):
+    with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", _tilt(p)):
         laser = solids.location(p.stack.R())
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
         neck = neck_corners(p, attempt) @ p.stack.R()
@@ -96,19 +135,21 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
 
 def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
-    with building(PART, "plate and neck", "tilt", tilt):
-        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck), PART, "plate and neck", "tilt", tilt)
-    with building(PART, "free room of lidar, cables and fan", "tilt", tilt):
+    with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt):
+        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck), ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt)
+    with building(ALIGNMENT_LINKAGE, "free room of lidar, cables and fan", "tilt", tilt):
         # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
         body = _largest(body.cut(*shapes.room, *shapes.beside))
-    with building(PART, "hub", "h", f"{stack.h} mm"):
-        body = checked(body.fuse(shapes.hub).cut(*shapes.room), PART, "hub", "h", f"{stack.h} mm")
-    with building(PART, "holes and marks", "h", f"{stack.h} mm"):
-        linkage = checked(body.cut(*shapes.holes).clean(), PART, "holes and marks", "h", f"{stack.h} mm")
+    with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm"):
+        body = checked(body.fuse(shapes.hub).cut(*shapes.room), ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm")
+    with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm"):
+        linkage = checked(body.cut(*shapes.holes).clean(), ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm")
     bottom = linkage.BoundingBox().zmin
     if abs(bottom - stack.hub_bottom) > 1e-3:
-        raise BuildError(f"{PART}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub")
-    checked_mesh(linkage, PART)
+        raise BuildError(
+            f"{ALIGNMENT_LINKAGE}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub"
+        )
+    checked_mesh(linkage, ALIGNMENT_LINKAGE)
     return linkage
 
 
@@ -135,7 +176,7 @@ def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
 def _plate(p: AlignmentLinkage) -> cq.Shape:
     """The plate, and under a sub-plate its ears."""
     low = p.top - PLATE_THICKNESS
-    plate: cq.Shape = solids.prism(solids.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
+    plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
     if p.ears is None:
         return plate
     (x0, y0, _), (x1, y1, _) = p.ears
@@ -158,13 +199,13 @@ def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
     pocket = p.top - p.screw.head_height - 0.5
     pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
     low = p.top - PLATE_THICKNESS - 1.0
-    traps = [] if p.trap is None else [_ear_trap(p, p.trap, hole) for hole in p.ear_screws]
-    return pockets + traps + [solids.upright(p.ear_thread / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
+    traps = [] if p.clamp_thread.trap is None else [_ear_trap(p, p.clamp_thread.trap, hole) for hole in p.ear_screws]
+    return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
 
 
 def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.Solid:
     """Pocket in the plate's lower face and the nut's way into it; its flats face the ends of the ear."""
-    outline = solids.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
+    outline = outlines.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
     low = p.top - PLATE_THICKNESS
     return solids.prism(outline, low - TRAP_WAY, low + trap.depth)
 
@@ -184,7 +225,7 @@ def _hub(p: AlignmentLinkage) -> cq.Shape:
 def _ear(ear: Ear, start: float) -> cq.Shape:
     corner = EAR_CORNER * ear.half_width
     middle = np.array([(ear.end + start) / 2, 0.0])
-    outline = solids.octagon(ear.end - middle[0], ear.half_width, corner) + middle
+    outline = outlines.octagon(ear.end - middle[0], ear.half_width, corner) + middle
     return solids.prism(outline, ear.low, ear.high).moved(solids.about_axis(ear.azimuth))
 
 
@@ -214,8 +255,9 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    if p.trap is not None:  # clear of the corners of the traps on either side
-        inner = max(inner, (_trap_floor(p, p.trap) + p.trap.across / 2) * math.sqrt(0.5) + TRAP_WALL)
+    if p.clamp_thread.trap is not None:  # clear of the corners of the traps on either side
+        beside = _trap_floor(p, p.clamp_thread.trap) + p.clamp_thread.trap.across / 2
+        inner = max(inner, beside * math.sqrt(0.5) + TRAP_WALL)
     low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
     channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
     return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
@@ -232,12 +274,15 @@ def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
     for azimuth in p.clamp_azimuths:
         out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         centre = np.array([0.0, 0.0, stack.clamp])
-        cuts.append(solids.cylinder(p.clamp_thread / 2, centre, out, 80.0))
-        # 1.5 mm into the hub: a spot face, not a tangent plane
-        cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - 1.5) * out, out, 80.0))
-        if p.trap is not None:  # from within the bore, where the shaft holds the nut in and the screw pushes it out
+        cuts.append(solids.cylinder(p.clamp_thread.hole / 2, centre, out, 80.0))
+        cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - SPOT_FACE) * out, out, 80.0))
+        if (
+            p.clamp_thread.trap is not None
+        ):  # from within the bore, where the shaft holds the nut in and the screw pushes it out
             frame = np.stack([[-out[1], out[0], 0.0], [0.0, 0.0, 1.0], out], axis=1)
-            pocket = solids.prism(solids.polygon(p.trap.corner, 6, math.pi / 2), 0.0, _trap_floor(p, p.trap))
+            pocket = solids.prism(
+                outlines.polygon(p.clamp_thread.trap.corner, 6, math.pi / 2), 0.0, _trap_floor(p, p.clamp_thread.trap)
+            )
             cuts.append(pocket.moved(solids.location(frame, centre)))
     return cuts
 
@@ -264,7 +309,7 @@ def _index_groove(p: AlignmentLinkage) -> cq.Solid:
         low, high = -stack.h - 5.0, -stack.h + 1.0
         if ear is not None and _reach_along_y(ear) > y:
             y, low, high = _reach_along_y(ear), ear.low - 1.0, ear.high + 1.0
-    return solids.prism(solids.diamond(1.0, y), low, high)
+    return solids.prism(outlines.diamond(1.0, y), low, high)
 
 
 def _reach_along_y(ear: Ear) -> float:

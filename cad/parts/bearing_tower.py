@@ -1,6 +1,6 @@
 """Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm; the servo's side is that of `BeltStack.quarter`.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's side is that of `BeltStack.quarter`.
 A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
 screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
 arms. Nuts, where the printer's profile asks for them, go into the arms from below and into the foot from its corners.
@@ -11,13 +11,13 @@ down. An index groove in the edge of its top at +y meets the groove of the linka
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from cad.layout.belt_stack import (
+from cad import outlines, solids
+from cad.layout.belt.stack import (
     BOSS,
     CASE_ROOM,
     DISC,
@@ -32,16 +32,14 @@ from cad.layout.belt_stack import (
     TRAVEL,
     BeltStack,
 )
-from cad.screws import SCREWS, Trap, thread_hole, trap_of
+from cad.layout.belt.tower import DISC_SCREW, UNDER_FOOT_NUT, UNDER_HEAD, BearingTower, disc_azimuths, tower_of
+from cad.layout.fits import OnSheet, printed_seat
+from cad.layout.layout import Layout
+from cad.layout.names import BEARING_TOWER, DRIVE_PLATE
+from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.screws import Trap
 from cad.solids import building, checked
-from design.scanner import Scanner
 
-PART = "bearing_tower"
-DISC_SCREW = SCREWS["M3"]
-DISC_SCREWS = 3
-SCREW_DEPTH = 10.0  # of a radial screw in the disc
-UNDER_HEAD = 3.5  # of the wall
-UNDER_FOOT_NUT = 4.0  # of the foot
 BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
 WINDOW = 10.0  # diameter
 FOOT_CHAMFER = 8.0
@@ -49,49 +47,33 @@ GROOVE = 1.0  # half width of the index groove
 MARKED = 6.0  # half of the edge that it is in
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BearingTower:
-    """Lengths in mm."""
-
-    stack: BeltStack
-    fit: float  # diametral clearance of a sliding fit
-    plate_thread: float  # diameter
-    plate_trap: Trap | None  # below the arms, if these screws hold in nuts
-    foot_thread: float  # diameter
-    foot_trap: Trap | None  # open to the corners of the foot, if these screws do
-    disc_hole: float  # diameter
-
-
-def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
-    """Parameters of the tower of one scanner."""
-    printer = scanner.printer
-    plate, foot = trap_of(PLATE_SCREW, printer), trap_of(FOOT_SCREW, printer)
-    if foot is not None and math.sqrt(2) * FOOT_HOLE - foot.corner - printer.min_wall_mm < stack.chamber_radius:
-        foot = None
-    return BearingTower(
-        stack=stack,
-        fit=printer.fit_clearance_mm,
-        plate_thread=thread_hole(PLATE_SCREW, printer) if plate is None else plate.hole,
-        plate_trap=plate,
-        foot_thread=thread_hole(FOOT_SCREW, printer) if foot is None else foot.hole,
-        foot_trap=foot,
-        disc_hole=DISC_SCREW.nominal + printer.screw_clearance_mm,
+def tower_spec(layout: Layout) -> PartSpec | None:
+    """The tower of one scanner; None where the servo stands on the axis."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    p = tower_of(scanner, stack)
+    words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
+    return PartSpec(
+        name=BEARING_TOWER,
+        turns=False,
+        make=partial(bearing_tower, p),
+        step=Step("Bearings into the tower", words),
+        sheet=OnSheet((printed_seat(stack.carrier, p.fit),), _nuts_words(p)),
+        shaped_by=shapes(BEARING_TOWER, "servo.case_min_mm", "slip_ring.length_mm")
+        | shapes(f"{BEARING_TOWER} and {DRIVE_PLATE}", "servo.case_max_mm")
+        | shapes("every bore and seat", "printer.fit_clearance_mm"),
     )
 
 
-def nuts_words(p: BearingTower) -> tuple[str, ...]:
+def _nuts_words(p: BearingTower) -> tuple[str, ...]:
     """What the drawing says of the room for nuts."""
     words = []
-    if p.plate_trap is not None:
-        words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {p.plate_trap.across:g} across flats.")
-    if p.foot_trap is not None:
-        words.append(f"Slots in the foot for nuts {FOOT_SCREW.name}: {p.foot_trap.across:g} wide, from its corners.")
+    if p.plate.trap is not None:
+        words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {p.plate.trap.across:g} across flats.")
+    if p.foot.trap is not None:
+        words.append(f"Slots in the foot for nuts {FOOT_SCREW.name}: {p.foot.trap.across:g} wide, from its corners.")
     return tuple(words)
-
-
-def disc_azimuths(stack: BeltStack) -> list[float]:
-    """Of the radial screws that hold the capsule's disc [rad], servo's frame: between the screws of its flange."""
-    return [math.pi / stack.flange.holes + 2 * math.pi * k / DISC_SCREWS + math.pi / 2 for k in range(DISC_SCREWS)]
 
 
 def bearing_tower(p: BearingTower) -> cq.Solid:
@@ -102,17 +84,17 @@ def bearing_tower(p: BearingTower) -> cq.Solid:
     """
     stack = p.stack
     size = f"{stack.carrier.outer_mm:g}"
-    with building(PART, "tube, shelf and foot", "outer_mm", size):
+    with building(BEARING_TOWER, "tube, shelf and foot", "outer_mm", size):
         body = checked(
-            _tube(p).fuse(_foot(p), *_shelf(p)).cut(_inside(p)), PART, "tube, shelf and foot", "outer_mm", size
+            _tube(p).fuse(_foot(p), *_shelf(p)).cut(_inside(p)), BEARING_TOWER, "tube, shelf and foot", "outer_mm", size
         )
-    with building(PART, "holes and mark", "outer_mm", size):
-        made = checked(body.cut(*_holes(p)).clean(), PART, "holes", "outer_mm", size).moved(
+    with building(BEARING_TOWER, "holes and mark", "outer_mm", size):
+        made = checked(body.cut(*_holes(p)).clean(), BEARING_TOWER, "holes", "outer_mm", size).moved(
             solids.location(stack.turn())
         )
         edge = (stack.plate_y[1], stack.tower_radius, -stack.plate_y[0], stack.tower_radius)[stack.quarter]
-        groove = solids.prism(solids.diamond(GROOVE, edge), stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0)
-        return checked(made.cut(groove).clean(), PART, "mark", "outer_mm", size)
+        groove = solids.prism(outlines.diamond(GROOVE, edge), stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0)
+        return checked(made.cut(groove).clean(), BEARING_TOWER, "mark", "outer_mm", size)
 
 
 def _tube(p: BearingTower) -> cq.Solid:
@@ -150,7 +132,7 @@ def _foot(p: BearingTower) -> cq.Shape:
     """The square of the mount's screws, on a cone that needs no support upside down."""
     stack = p.stack
     low, high = stack.tower_bottom, stack.tower_bottom + FOOT
-    plate = solids.prism(solids.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), low, high)
+    plate = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), low, high)
     reach = math.sqrt(2) * FOOT_HALF
     rise = reach - stack.wide_radius
     inner = stack.chamber_radius - 0.5
@@ -163,7 +145,7 @@ def _foot(p: BearingTower) -> cq.Shape:
             (inner, high + rise),
         ]
     )
-    around = solids.prism(solids.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), high - 1.0, high + rise + 1.0)
+    around = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), high - 1.0, high + rise + 1.0)
     return plate.fuse(cone.intersect(around))
 
 
@@ -193,17 +175,17 @@ def _holes(p: BearingTower) -> list[cq.Solid]:
     cuts = []
     for x in (stack.centre - stack.slot_x, stack.centre + stack.slot_x):
         for _, y in stack.arms_y:
-            cuts.append(solids.upright(p.plate_thread / 2, stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0, x, y))
-            if p.plate_trap is not None:
-                nut = np.array([x, y]) + solids.polygon(p.plate_trap.corner, 6, 0.0)
+            cuts.append(solids.upright(p.plate.hole / 2, stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0, x, y))
+            if p.plate.trap is not None:
+                nut = np.array([x, y]) + outlines.polygon(p.plate.trap.corner, 6, 0.0)
                 cuts.append(solids.prism(nut, stack.tower_top - SHELF - 1.0, stack.tower_top - PLATE_GRIP))
     low = stack.tower_bottom
-    deep = FOOT - 1.0 if p.foot_trap is None else UNDER_FOOT_NUT + p.foot_trap.depth + BEYOND_NUT
+    deep = FOOT - 1.0 if p.foot.trap is None else UNDER_FOOT_NUT + p.foot.trap.depth + BEYOND_NUT
     for x in (FOOT_HOLE, -FOOT_HOLE):
         for y in (FOOT_HOLE, -FOOT_HOLE):
-            cuts.append(solids.upright(p.foot_thread / 2, low - 1.0, low + deep, x, y))
-            if p.foot_trap is not None:
-                cuts.append(_corner_slot(p.foot_trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
+            cuts.append(solids.upright(p.foot.hole / 2, low - 1.0, low + deep, x, y))
+            if p.foot.trap is not None:
+                cuts.append(_corner_slot(p.foot.trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
     for azimuth in disc_azimuths(stack):
         out = (math.cos(azimuth), math.sin(azimuth), 0.0)
         height = stack.disc_top - DISC / 2

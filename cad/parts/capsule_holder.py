@@ -1,6 +1,6 @@
 """Slip-ring adapter of the belt layout: a disc in the tower that the capsule's flange is screwed to.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm; turned with the servo's side. The capsule hangs
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; turned with the servo's side. The capsule hangs
 through its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower
 from below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is
 not in line.
@@ -10,17 +10,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 
 from cad import solids
-from cad.layout.belt_stack import DISC, BeltStack
-from cad.parts.bearing_tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths
-from cad.screws import SCREWS, Screw, thread_hole
+from cad.layout.belt.stack import DISC, BeltStack
+from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import BEARING_TOWER, RING_STATOR, SLIP_RING_ADAPTER
+from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from cad.solids import building, checked
 from design.scanner import Scanner
 
-PART = "slip_ring_adapter"
 BODY_ROOM = 0.5  # around the capsule's body
 
 
@@ -32,7 +36,27 @@ class CapsuleHolder:
     fit: float  # diametral clearance of a sliding fit
     screw: Screw  # of the flange
     hole: float  # diameter
-    thread: float  # diameter, of the radial screws
+    thread: Thread  # of the radial screws
+
+
+def holder_spec(layout: Layout) -> PartSpec | None:
+    """The disc of one scanner; None where its ring is no capsule."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    words = (
+        "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
+        f"{screws(RING_STATOR)} Leave them so loose that the flange still gives. Push 10 mm of soft tube, "
+        f"{stack.shaft_bore:g} x {stack.rotor.diameter_mm:g} mm, over the stub of the rotor."
+    )
+    return PartSpec(
+        name=SLIP_RING_ADAPTER,
+        turns=False,
+        make=partial(capsule_holder, holder_of(scanner, stack)),
+        step=Step("Capsule on its disc", words),
+        shaped_by=shapes(SLIP_RING_ADAPTER, "slip_ring.outer_diameter_mm")
+        | shapes(f"{SLIP_RING_ADAPTER} and {BEARING_TOWER}", "slip_ring.flange"),
+    )
 
 
 def holder_of(scanner: Scanner, stack: BeltStack) -> CapsuleHolder:
@@ -43,8 +67,8 @@ def holder_of(scanner: Scanner, stack: BeltStack) -> CapsuleHolder:
         stack=stack,
         fit=printer.fit_clearance_mm,
         screw=screw,
-        hole=screw.nominal + printer.screw_clearance_mm,
-        thread=thread_hole(DISC_SCREW, printer),
+        hole=passing_hole(screw, printer),
+        thread=thread_in_part(DISC_SCREW, printer, room_for_nut=False),
     )
 
 
@@ -57,7 +81,7 @@ def capsule_holder(p: CapsuleHolder) -> cq.Solid:
     stack = p.stack
     low, high = stack.disc_top - DISC, stack.disc_top
     size = f"{stack.flange.diameter_mm:g}"
-    with building(PART, "disc", "flange.diameter_mm", size):
+    with building(SLIP_RING_ADAPTER, "disc", "flange.diameter_mm", size):
         radius = stack.chamber_radius - p.fit / 2
         cuts = [solids.upright(stack.ring_radius + BODY_ROOM, low - 1.0, high + 1.0)]
         for x, y in flange_centres(stack):
@@ -65,12 +89,8 @@ def capsule_holder(p: CapsuleHolder) -> cq.Solid:
         for azimuth in disc_azimuths(stack):
             out = (math.cos(azimuth), math.sin(azimuth), 0.0)
             start = tuple((radius - SCREW_DEPTH) * c for c in out[:2])
-            cuts.append(solids.cylinder(p.thread / 2, (*start, (low + high) / 2), out, SCREW_DEPTH + 1.0))
-        disc = checked(solids.upright(radius, low, high).cut(*cuts).clean(), PART, "disc", "flange.diameter_mm", size)
+            cuts.append(solids.cylinder(p.thread.hole / 2, (*start, (low + high) / 2), out, SCREW_DEPTH + 1.0))
+        disc = checked(
+            solids.upright(radius, low, high).cut(*cuts).clean(), SLIP_RING_ADAPTER, "disc", "flange.diameter_mm", size
+        )
     return disc.moved(solids.location(stack.turn()))
-
-
-def flange_centres(stack: BeltStack) -> list[tuple[float, float]]:
-    """Of the flange's holes, servo's frame; one at its +y."""
-    centres = solids.polygon(stack.flange.circle_mm / 2, stack.flange.holes, math.pi / 2)
-    return [(float(x), float(y)) for x, y in centres]

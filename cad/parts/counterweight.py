@@ -1,15 +1,49 @@
-"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/balance/`).
+"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/layout/balance/`).
 
 Frame: rotation frame at gamma = 0, mm. It lies along a radius; its screws come from below, through slots of the ear.
 """
 
 from __future__ import annotations
 
+from functools import partial
+
 import cadquery as cq
 
 from cad import solids
-from cad.layout.balance import PART, SCREW, Counterweight
+from cad.layout.balance.counterweight import SCREW, Counterweight
+from cad.layout.fits import OnSheet
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
+from cad.parts.part_spec import PartSpec, Step, shapes
 from cad.solids import building, checked
+from design.left_out import LeftOut
+
+
+def counterweight_spec(layout: Layout) -> PartSpec | None:
+    """The bar of one scanner; None where nothing is to be balanced, or nothing can."""
+    bar = layout.counterweight
+    if isinstance(bar, LeftOut):
+        return None
+    words = (
+        "Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in the middle "
+        f"of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their heads. "
+        "Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots to "
+        "where `scanwright scan` prints the least ripple."
+    )
+    return PartSpec(
+        name=COUNTERWEIGHT,
+        turns=True,
+        make=partial(counterweight, bar),
+        step=Step("Counterweight on the linkage", words),
+        process="sawn",
+        material=bar.stock,
+        work=f"{len(bar.screws)} threads {SCREW.name}",
+        sheet=OnSheet(notes=(f"Holes of {SCREW.core:g}: thread {SCREW.name} all through.",)),
+        shaped_by=shapes(COUNTERWEIGHT, "lidar.mass_g")
+        | shapes(f"whether there is a {COUNTERWEIGHT}", "servo.backlash_deg"),
+        lifted="radius",
+    )
 
 
 def counterweight(p: Counterweight) -> cq.Solid:
@@ -19,8 +53,8 @@ def counterweight(p: Counterweight) -> cq.Solid:
         BuildError: a step did not give one valid solid.
     """
     half, low, high = p.section[0] / 2, p.ear.high, p.ear.high + p.section[1]
-    with building(PART, "bar and threads", "length", f"{p.length:g} mm"):
+    with building(COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm"):
         bar: cq.Shape = solids.box((p.start, -half, low), (p.end, half, high))
         threads = [solids.upright(SCREW.core / 2, low - 1.0, high + 1.0, at, 0.0) for at in p.screws]
-        bar = checked(bar.cut(*threads), PART, "bar and threads", "length", f"{p.length:g} mm")
+        bar = checked(bar.cut(*threads), COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm")
     return bar.moved(solids.about_axis(p.ear.azimuth))

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from cad import solids
-from cad.layout.direct_stack import Box
+from cad.layout.envelope import Box
 from design.frames import Array
 
 FAR = 200.0  # beyond any linkage

@@ -1,50 +1,65 @@
 """Main shaft of the belt layout: a tube in two bearings, with the spigot that the linkage sits on. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. The spigot is the one of `servo_shaft`, its flat
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot is the one of `servo_shaft`, its flat
 at +y. A collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave
 through two windows below the web under the spigot.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 
 from cad import solids
-from cad.layout.belt_stack import BeltStack
+from cad.layout.belt.stack import BeltStack
+from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
+from cad.layout.layout import Layout
+from cad.layout.names import MAIN_SHAFT
+from cad.parts.part_spec import TURNED_FROM, PartSpec, Step, shapes
 from cad.solids import building, checked
 
-PART = "main_shaft"
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MainShaft:
-    """Lengths in mm."""
+def main_shaft_spec(layout: Layout) -> PartSpec | None:
+    """The shaft of one scanner; None where the servo's horn carries another."""
+    stack = layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    seat = ToleratedDiameter(stack.seat_diameter, False, "+0.02/0", "f7 in the bearings, which slide on by hand")
+    words = "Lower the shaft through both bearings until its collar lies on the upper one."
+    return PartSpec(
+        name=MAIN_SHAFT,
+        turns=True,
+        make=partial(main_shaft, stack),
+        step=Step("Shaft into the tower", words),
+        process="turned",
+        material=TURNED_FROM,
+        why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
+        sheet=OnSheet((seat, turned_spigot(stack.shaft_diameter, layout.scanner.printer.fit_clearance_mm))),
+        shaped_by=shapes(MAIN_SHAFT, "bearing.bore_mm", "slip_ring.rotor"),
+    )
 
-    stack: BeltStack
 
-
-def main_shaft(p: MainShaft) -> cq.Solid:
+def main_shaft(stack: BeltStack) -> cq.Solid:
     """Make the shaft.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack = p.stack
     size, top = f"{stack.tube_diameter:g} mm", stack.hub_bottom - UNDER_HUB
-    with building(PART, "body", "shaft diameter", size):
+    with building(MAIN_SHAFT, "body", "shaft diameter", size):
         radius = stack.shaft_diameter / 2
         body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
         body = body.fuse(
             solids.upright(stack.collar_radius, stack.tower_top, stack.teeth_low),
             solids.upright(radius, top - 0.5, stack.spigot_top),
         )
-        body = checked(body, PART, "body", "shaft diameter", size)
-    with building(PART, "bore, windows and flat", "bore", f"{stack.shaft_bore:g} mm"):
+        body = checked(body, MAIN_SHAFT, "body", "shaft diameter", size)
+    with building(MAIN_SHAFT, "bore, windows and flat", "bore", f"{stack.shaft_bore:g} mm"):
         end = top - WEB
         flat = (-2 * radius, stack.flat, stack.hub_bottom)
         cuts = [
@@ -52,4 +67,4 @@ def main_shaft(p: MainShaft) -> cq.Solid:
             solids.cylinder(WINDOW / 2, (-stack.tube_diameter, 0.0, end - WINDOW / 2), (1.0, 0.0, 0.0), 99.0),
             solids.box(flat, (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
         ]
-        return checked(body.cut(*cuts).clean(), PART, "bore, windows and flat", "bore", stack.shaft_bore)
+        return checked(body.cut(*cuts).clean(), MAIN_SHAFT, "bore, windows and flat", "bore", stack.shaft_bore)

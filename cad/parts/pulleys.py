@@ -1,6 +1,6 @@
 """The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. Teeth between two rims; a groove is a half circle
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. Teeth between two rims; a groove is a half circle
 with flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press,
 half of the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
 
@@ -12,23 +12,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from cad.layout.belt_stack import BOSS, GRUB, RIM, BeltStack
-from cad.screws import SCREWS, Screw, thread_hole
+from cad import outlines, solids
+from cad.layout.belt.loads import PRELOAD_N, press_newton
+from cad.layout.belt.plate import pulley_foot_radius
+from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, RIM, TRAVEL, BeltStack
+from cad.layout.fits import OnSheet, no_wider
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
+from cad.parts.part_spec import HORN, PartSpec, Step, shapes
+from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from cad.solids import building, checked
 from design.errors import BuildError
 from design.scanner import Scanner
 
-SHAFT_PULLEY = "shaft_pulley"
-DRIVE_PULLEY = "drive_pulley"
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
 UNDER_HEAD = 4.0  # of the drive pulley, above the horn: at least
-GRUBS_DEG = (45.0, 135.0)  # azimuths from +x: on both sides of the flat
+GIVE_MM = 2.0  # of a strand, when the pre-load is felt
+OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +44,63 @@ class Pulley:
 
     stack: BeltStack
     fit: float  # diametral clearance of a sliding fit
-    thread: float  # diameter, of the grub screws
+    thread: Thread  # of the grub screws
     screw: Screw  # of the horn
     hole: float  # diameter
     circle: float  # diameter
     holes: int
     first_hole_deg: float  # from +y of the servo
+    foot_radius: float  # of what lies on the horn
     boss_radius: float  # of the horn's
     boss_height: float
+
+
+def shaft_pulley_spec(layout: Layout) -> PartSpec | None:
+    """The pulley on the shaft of one scanner; None where there is no belt."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    words = (
+        "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and lay the belt "
+        f"around it: {stack.belt.name} of {stack.belt_teeth} teeth ({stack.belt_teeth * stack.belt.pitch_mm:g} mm). "
+        f"{screws(MAIN_SHAFT)} Leave these two loose."
+    )
+    fit = no_wider(stack.tube_diameter, scanner.printer.fit_clearance_mm, OFF_AXIS)
+    return PartSpec(
+        name=SHAFT_PULLEY,
+        turns=True,
+        make=partial(shaft_pulley, pulley_of(scanner, stack)),
+        step=Step("Pulley and belt on the shaft", words),
+        sheet=OnSheet((fit,), (_teeth_words(stack),)),
+        shaped_by=shapes("the rims of the pulleys", "belt.thickness_mm")
+        | shapes("the teeth of the pulleys", "belt.groove_radius_mm"),
+    )
+
+
+def drive_pulley_spec(layout: Layout) -> PartSpec | None:
+    """The pulley on the horn of one scanner; None where there is no belt."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    push = press_newton(stack, PRELOAD_N, GIVE_MM)
+    words = (
+        f"The boss of the horn centres the pulley. {screws(SERVO_OUTPUT)} Hang the servo between the arms of the "
+        "tower, lay the belt around both pulleys, and put in the screws of the slots: "
+        f"{screws(BEARING_TOWER, DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the middle of a "
+        f"strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
+        f"{stack.centre:g} mm apart; the slots give {TRAVEL:g} mm to either side."
+    )
+    pocket = stack.servo.horn_boss_diameter_mm
+    fits = (no_wider(pocket, scanner.printer.fit_clearance_mm, OFF_AXIS),) if pocket > 0 else ()
+    return PartSpec(
+        name=DRIVE_PULLEY,
+        turns=False,
+        make=partial(drive_pulley, pulley_of(scanner, stack)),
+        step=Step("Drive pulley, and the servo beside the shaft", words),
+        sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
+        shaped_by=shapes(DRIVE_PULLEY, *HORN, "servo.horn_thickness_mm"),
+        sweep=partial(drive_envelope, pulley_of(scanner, stack)),
+    )
 
 
 def pulley_of(scanner: Scanner, stack: BeltStack) -> Pulley:
@@ -70,12 +126,13 @@ def pulley_of(scanner: Scanner, stack: BeltStack) -> Pulley:
     return Pulley(
         stack=stack,
         fit=printer.fit_clearance_mm,
-        thread=thread_hole(GRUB, printer),
+        thread=thread_in_part(GRUB, printer, room_for_nut=False),
         screw=screw,
-        hole=screw.nominal + printer.screw_clearance_mm,
+        hole=passing_hole(screw, printer),
         circle=servo.horn_circle_mm,
         holes=servo.horn_holes,
         first_hole_deg=servo.horn_first_hole_deg,
+        foot_radius=pulley_foot_radius(servo),
         boss_radius=boss,
         boss_height=servo.horn_boss_height_mm,
     )
@@ -97,7 +154,7 @@ def shaft_pulley(p: Pulley) -> cq.Solid:
         grubs = []
         for azimuth in np.radians(GRUBS_DEG):
             out = (math.cos(azimuth), math.sin(azimuth), 0.0)
-            grubs.append(solids.cylinder(p.thread / 2, middle, out, 80.0))
+            grubs.append(solids.cylinder(p.thread.hole / 2, middle, out, 80.0))
         cut = body.cut(bore, *grubs).clean()
         return checked(cut, SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter)
 
@@ -110,10 +167,10 @@ def drive_pulley(p: Pulley) -> cq.Solid:
     """
     stack, horn = p.stack, p.stack.horn
     with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth):
-        foot = solids.upright(foot_radius(p), horn, stack.teeth_low + 0.5)
+        foot = solids.upright(p.foot_radius, horn, stack.teeth_low + 0.5)
         body = checked(_toothed(stack, foot, None), DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth)
     with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle):
-        centres = solids.polygon(p.circle / 2, p.holes, math.radians(90.0 + p.first_hole_deg))
+        centres = outlines.polygon(p.circle / 2, p.holes, math.radians(90.0 + p.first_hole_deg))
         seat = max(horn + UNDER_HEAD, stack.teeth_low)  # lower, and a pocket would leave the foot a thin wall
         cuts = []
         for x, y in centres.tolist():
@@ -131,7 +188,7 @@ def drive_envelope(p: Pulley) -> cq.Solid:
     stack = p.stack
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
-    foot = solids.upright(foot_radius(p), stack.horn, low + 0.5)
+    foot = solids.upright(p.foot_radius, stack.horn, low + 0.5)
     with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth):
         whole = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
@@ -140,9 +197,14 @@ def drive_envelope(p: Pulley) -> cq.Solid:
     return swept.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 
 
-def foot_radius(p: Pulley) -> float:
-    """Of what lies on the horn."""
-    return p.circle / 2 + p.screw.nominal / 2 + 2.0
+def _teeth_words(stack: BeltStack) -> str:
+    """What a pulley's drawing says of its teeth."""
+    belt = stack.belt
+    return (
+        f"{stack.teeth} teeth for {belt.name}, pitch {belt.pitch_mm:g}: pitch diameter {2 * stack.pitch_radius:.2f}, "
+        f"over the tips {2 * stack.tip_radius:.2f}, grooves {belt.tooth_height_mm:g} deep with "
+        f"a round bottom R{belt.groove_radius_mm:g}."
+    )
 
 
 def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -> cq.Shape:

@@ -1,6 +1,6 @@
 """Servo shaft: from the servo's horn through the slip ring to the linkage's hub. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. Horn flange with the horn's holes and a pocket
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Horn flange with the horn's holes and a pocket
 for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends
 could not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and
 bearing are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do
@@ -11,23 +11,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.direct_stack import Stack, horn_screw
-from cad.layout.loads import WAIST, waist_radius_mm
+from cad import outlines, solids
+from cad.layout.direct.stack import WAIST, DirectStack
+from cad.layout.fits import OnSheet, turned_spigot
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import SERVO_HORN, SERVO_SHAFT, SLIP_RING_ADAPTER
+from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step, shapes
+from cad.screws import SCREWS, passing_hole
 from cad.solids import building, checked
 from design.scanner import Scanner
 
-PART = "servo_shaft"
+SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoShaft:
     """Lengths in mm."""
 
-    stack: Stack
+    stack: DirectStack
     boss_radius: float  # of the pocket
     boss_depth: float
     hole: float  # diameter
@@ -36,14 +42,45 @@ class ServoShaft:
     first_hole_deg: float  # from +y
 
 
-def shaft_of(scanner: Scanner, stack: Stack) -> ServoShaft:
+def shaft_spec(layout: Layout) -> PartSpec | None:
+    """The shaft of one scanner; None where a belt turns another."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, DirectStack):
+        return None
+    turned = shaft_is_turned(stack)
+    fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),) if turned else ()
+    words = (
+        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
+        "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
+        f"{screws(SERVO_HORN)}"
+    )
+    return PartSpec(
+        name=SERVO_SHAFT,
+        turns=True,
+        make=partial(servo_shaft, shaft_of(scanner, stack)),
+        step=Step("Shaft on the horn", words),
+        process="turned" if turned else "printed",
+        material=TURNED_FROM if turned else "",
+        why_metal=f"{stack.shaft_diameter:g} mm is too thin to print (0.9 deg of bending with the axis horizontal)",
+        sheet=OnSheet(fits),
+        shaped_by=shapes(SERVO_SHAFT, *HORN, "slip_ring.bore_mm")
+        | shapes(f"{SERVO_SHAFT} and {SLIP_RING_ADAPTER}", "servo.horn_diameter_mm", "slip_ring.length_mm"),
+    )
+
+
+def shaft_is_turned(stack: DirectStack) -> bool:
+    """Whether the shaft is too thin to be printed."""
+    return stack.shaft_diameter < SHAFT_PRINTABLE
+
+
+def shaft_of(scanner: Scanner, stack: DirectStack) -> ServoShaft:
     """Parameters of the shaft of one scanner."""
     servo = scanner.servo
     return ServoShaft(
         stack=stack,
         boss_radius=servo.horn_boss_diameter_mm / 2 + 0.2,
         boss_depth=servo.horn_boss_height_mm + 0.5,
-        hole=horn_screw(servo).nominal + scanner.printer.screw_clearance_mm,
+        hole=passing_hole(SCREWS[servo.horn_screw], scanner.printer),
         circle=servo.horn_circle_mm,
         holes=servo.horn_holes,
         first_hole_deg=servo.horn_first_hole_deg,
@@ -58,32 +95,32 @@ def servo_shaft(p: ServoShaft) -> cq.Solid:
     """
     stack = p.stack
     horn, radius = stack.horn, stack.shaft_diameter / 2
-    with building(PART, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm"):
+    with building(SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm"):
         body: cq.Shape = solids.upright(stack.flange_radius, horn, horn + stack.flange_thickness)
         if stack.collar_radius > radius:
             body = body.fuse(solids.upright(stack.collar_radius, horn, horn + stack.collar_height))
         body = body.fuse(solids.upright(radius, horn, stack.spigot_top))
-        body = checked(body, PART, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm")
-    with building(PART, "holes, flat and marks", "horn_circle_mm", p.circle):
+        body = checked(body, SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm")
+    with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.circle):
         low = (-2 * radius, stack.flat, stack.hub_bottom)
         cuts = [solids.box(low, (2 * radius, 2 * radius, stack.spigot_top + 1.0)), *_holes(p), _index_groove(p)]
         if p.boss_radius > 0.2:
             cuts.append(solids.upright(p.boss_radius, horn - 1.0, horn + p.boss_depth))
         if stack.bearing is not None:
             cuts.append(_waist(stack))
-        return checked(body.cut(*cuts).clean(), PART, "holes, flat and marks", "horn_circle_mm", p.circle)
+        return checked(body.cut(*cuts).clean(), SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.circle)
 
 
 def _holes(p: ServoShaft) -> list[cq.Solid]:
     low, high = p.stack.horn - 1.0, p.stack.horn + p.stack.flange_thickness + 1.0
     first = math.radians(90.0 + p.first_hole_deg)
-    centres = solids.polygon(p.circle / 2, p.holes, first)
+    centres = outlines.polygon(p.circle / 2, p.holes, first)
     return [solids.upright(p.hole / 2, low, high, float(x), float(y)) for x, y in centres]
 
 
-def _waist(stack: Stack) -> cq.Solid:
+def _waist(stack: DirectStack) -> cq.Solid:
     """What is turned off: its ends slope at 45 deg, an edge would crack."""
-    radius, waist = stack.shaft_diameter / 2, waist_radius_mm(stack)
+    radius, waist = stack.shaft_diameter / 2, stack.waist_radius
     slope = radius - waist
     low = stack.horn + stack.collar_height
     high = low + WAIST + slope
@@ -93,4 +130,4 @@ def _waist(stack: Stack) -> cq.Solid:
 
 def _index_groove(p: ServoShaft) -> cq.Solid:
     low, high = p.stack.horn - 1.0, p.stack.horn + p.stack.flange_thickness + 1.0
-    return solids.prism(solids.diamond(0.6, p.stack.flange_radius), low, high)
+    return solids.prism(outlines.diamond(0.6, p.stack.flange_radius), low, high)

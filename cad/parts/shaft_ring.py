@@ -1,6 +1,6 @@
 """Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt_stack.py`), mm. A step that only the inner ring touches, and two
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that only the inner ring touches, and two
 grub screws 90 deg apart; a driver reaches them through the window of the tower.
 """
 
@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 
 from cad import solids
-from cad.layout.belt_stack import BOSS, GRUB, BeltStack
-from cad.layout.head import BEARING_STEP
-from cad.screws import thread_hole
+from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, BeltStack
+from cad.layout.hub import BEARING_STEP
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import MAIN_SHAFT, SHAFT_RING
+from cad.parts.part_spec import PartSpec, Step
+from cad.screws import Thread, thread_in_part
 from cad.solids import building, checked
 from design.scanner import Scanner
-
-PART = "shaft_ring"
-GRUBS_DEG = (45.0, 135.0)  # azimuths from +x
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,13 +30,33 @@ class ShaftRing:
 
     stack: BeltStack
     fit: float  # diametral clearance of a sliding fit
-    thread: float  # diameter
+    thread: Thread
+
+
+def shaft_ring_spec(layout: Layout) -> PartSpec | None:
+    """The ring of one scanner; None where there is no tower."""
+    scanner, stack = layout.scanner, layout.stack
+    if not isinstance(stack, BeltStack):
+        return None
+    words = (
+        "From below push the ring up the shaft, its step against the lower bearing, so that the shaft has no play "
+        f"along the axis and still turns freely. {screws(MAIN_SHAFT)} A driver reaches them through the round window "
+        "in the tower: turn the shaft until they show."
+    )
+    return PartSpec(
+        name=SHAFT_RING,
+        turns=True,
+        make=partial(shaft_ring, shaft_ring_of(scanner, stack)),
+        step=Step("Ring under the bearings", words),
+    )
 
 
 def shaft_ring_of(scanner: Scanner, stack: BeltStack) -> ShaftRing:
     """Parameters of the ring of one scanner."""
     printer = scanner.printer
-    return ShaftRing(stack=stack, fit=printer.fit_clearance_mm, thread=thread_hole(GRUB, printer))
+    return ShaftRing(
+        stack=stack, fit=printer.fit_clearance_mm, thread=thread_in_part(GRUB, printer, room_for_nut=False)
+    )
 
 
 def shaft_ring(p: ShaftRing) -> cq.Solid:
@@ -45,16 +67,16 @@ def shaft_ring(p: ShaftRing) -> cq.Solid:
     """
     stack = p.stack
     size = f"{stack.tube_diameter:g} mm"
-    with building(PART, "ring", "shaft diameter", size):
+    with building(SHAFT_RING, "ring", "shaft diameter", size):
         low, high = stack.collar_low, stack.collar_low + BOSS
         body = solids.upright(stack.boss_radius, low, high).fuse(
             solids.upright(stack.collar_radius, low, high + BEARING_STEP)
         )
         bore = solids.upright((stack.tube_diameter + p.fit) / 2, low - 1.0, high + 2.0)
         grubs = [_radial(p, math.radians(azimuth)) for azimuth in GRUBS_DEG]
-        return checked(body.cut(bore, *grubs).clean(), PART, "ring", "shaft diameter", size)
+        return checked(body.cut(bore, *grubs).clean(), SHAFT_RING, "ring", "shaft diameter", size)
 
 
 def _radial(p: ShaftRing, azimuth: float) -> cq.Solid:
     start = (0.0, 0.0, p.stack.collar_low + BOSS / 2)
-    return solids.cylinder(p.thread / 2, start, (math.cos(azimuth), math.sin(azimuth), 0.0), 80.0)
+    return solids.cylinder(p.thread.hole / 2, start, (math.cos(azimuth), math.sin(azimuth), 0.0), 80.0)

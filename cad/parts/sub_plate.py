@@ -1,6 +1,6 @@
 """Sub-plate: between lidar and linkage where the hub would cover one of the lidar's screws.
 
-Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/direct_stack.py`), mm. On the
+Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. On the
 bench it is screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where
 nothing is in the way. The heads of the lidar's screws stand in pockets of the linkage.
 """
@@ -8,22 +8,23 @@ nothing is in the way. The heads of the lidar's screws stand in pockets of the l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from cad.layout.direct_stack import BODY_GAP, EAR_REACH, SUB_PLATE, ear_corner
-from cad.layout.head import Axis, Head
-from cad.screws import SCREWS
+from cad import outlines, solids
+from cad.layout.drive import Stack
+from cad.layout.envelope import EAR_REACH, EAR_SCREW, SUB_PLATE_THICKNESS, ear_corner, ear_screws
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
+from cad.parts.part_spec import PartSpec, Step
+from cad.screws import SCREWS, passing_hole
 from cad.solids import building, checked
-from design.catalogue.products import Lidar
 from design.frames import Array
 from design.scanner import Scanner
 
-PART = "sub_plate"
-EAR_SCREW = SCREWS["M3"]
-EAR_SCREW_OFFSET = 5.5  # half the distance of the two screws of an ear
 CHAMFER = 3.0
 
 
@@ -31,7 +32,7 @@ CHAMFER = 3.0
 class SubPlate:
     """Lengths in mm, in the laser frame."""
 
-    stack: Head
+    stack: Stack
     seat: float
     half_x: float
     half_y: float
@@ -43,11 +44,32 @@ class SubPlate:
     ear_holes: tuple[tuple[float, float], ...]
 
 
-def sub_plate_of(scanner: Scanner, stack: Head) -> SubPlate | None:
+def sub_plate_spec(layout: Layout) -> PartSpec | None:
+    """The sub-plate of one scanner; None where a driver reaches all screws of the lidar."""
+    p = sub_plate_of(layout.scanner, layout.stack)
+    if p is None:
+        return None
+    words = (
+        "The hub covers one of the lidar's screws, so the lidar came on a plate of its own: put this plate on the "
+        "linkage, FRONT over FRONT, and drive the screws of its ears from the lidar's side. "
+        f"{screws(ALIGNMENT_LINKAGE)}"
+    )
+    return PartSpec(
+        name=SUB_PLATE,
+        turns=True,
+        make=partial(sub_plate, p),
+        step=Step("Lidar and sub-plate on the linkage", words),
+        angles="laser",
+        seat=p.seat,
+        lifted="lidar",
+    )
+
+
+def sub_plate_of(scanner: Scanner, stack: Stack) -> SubPlate | None:
     """Parameters of the sub-plate of one scanner; None where a driver reaches all screws of the lidar."""
     if stack.sub_plate is None:
         return None
-    lidar, clearance = scanner.lidar, scanner.printer.screw_clearance_mm
+    lidar, printer = scanner.lidar, scanner.printer
     half_x = lidar.body_mm[0] / 2
     return SubPlate(
         stack=stack,
@@ -56,19 +78,11 @@ def sub_plate_of(scanner: Scanner, stack: Head) -> SubPlate | None:
         half_y=lidar.body_mm[1] / 2,
         ears=ear_corner(lidar, stack.sub_plate),
         front=half_x + (EAR_REACH if stack.sub_plate == "x" else 0.0),
-        screw_hole=SCREWS[lidar.mount_screw].nominal + clearance,
+        screw_hole=passing_hole(SCREWS[lidar.mount_screw], printer),
         holes=lidar.mount_holes_mm,
-        ear_hole=EAR_SCREW.nominal + clearance,
+        ear_hole=passing_hole(EAR_SCREW, printer),
         ear_holes=ear_screws(lidar, stack.sub_plate),
     )
-
-
-def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
-    """Centres of the ears' screws: their heads stand clear of the lidar's body."""
-    half = (lidar.body_mm[0] if axis == "x" else lidar.body_mm[1]) / 2
-    away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
-    along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
-    return tuple(along if axis == "x" else [(y, x) for x, y in along])
 
 
 def sub_plate(p: SubPlate) -> cq.Solid:
@@ -77,15 +91,15 @@ def sub_plate(p: SubPlate) -> cq.Solid:
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    low, high = p.seat - SUB_PLATE, p.seat
+    low, high = p.seat - SUB_PLATE_THICKNESS, p.seat
     ears = f"{p.stack.sub_plate}"
-    with building(PART, "plate and holes", "ears along", ears):
-        body: cq.Shape = solids.prism(solids.octagon(p.half_x, p.half_y, CHAMFER), low, high)
-        body = body.fuse(solids.prism(solids.octagon(*p.ears, CHAMFER), low, high))
+    with building(SUB_PLATE, "plate and holes", "ears along", ears):
+        body: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, CHAMFER), low, high)
+        body = body.fuse(solids.prism(outlines.octagon(*p.ears, CHAMFER), low, high))
         cuts = [solids.upright(p.screw_hole / 2, low - 1.0, high + 1.0, *hole) for hole in p.holes]
         cuts += [solids.upright(p.ear_hole / 2, low - 1.0, high + 1.0, *hole) for hole in p.ear_holes]
         cuts += [solids.prism(outline, low - 1.0, high + 1.0) for outline in plate_marks(p.front)]
-        body = checked(body.cut(*cuts).clean(), PART, "plate and holes", "ears along", ears)
+        body = checked(body.cut(*cuts).clean(), SUB_PLATE, "plate and holes", "ears along", ears)
     return body.moved(solids.location(p.stack.R()))
 
 

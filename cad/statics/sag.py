@@ -15,7 +15,7 @@ import numpy as np
 
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import Mesh
-from cad.layout.head import Head
+from cad.layout.hub import Hub
 from cad.layout.loads import STANDARD_GRAVITY
 from cad.statics import elastic
 from cad.statics.shaft import ShaftBend
@@ -46,7 +46,7 @@ class Sag:
 
 
 def linkage_sag(
-    stack: Head, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
+    stack: Hub, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
     """Of the printed parts alone.
 
@@ -68,7 +68,7 @@ def linkage_sag(
     return Sag(*fine, *errors)
 
 
-def with_shaft(sag: Sag, shaft: ShaftBend, stack: Head, rotor: Inertial) -> Sag:
+def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
     """Sag of linkage and shaft, which the whole rotor bends."""
     end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
     turned, shifted = [], []
@@ -87,7 +87,7 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Head, rotor: Inertial) -> Sag:
 
 
 def _on_grid(
-    edge: float, stack: Head, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus: float, density: float
+    edge: float, stack: Hub, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus: float, density: float
 ) -> tuple[Array, Array]:
     """Rotation [rad] and shift [m] of one grid, rotation frame."""
     R = stack.R()
@@ -117,7 +117,7 @@ def _grid(triangles: Array, edge: float, seat: float) -> Grid:
     return Grid(start - edge * before, edge, (int(shape[0]), int(shape[1]), int(shape[2])), PARTS)
 
 
-def _spigot(stack: Head) -> tuple[Array, float]:
+def _spigot(stack: Hub) -> tuple[Array, float]:
     """Points all around the shaft in the hub, and the area, rotation frame."""
     radius, length = stack.shaft_diameter / 2, stack.spigot
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))

@@ -1,6 +1,8 @@
-"""How far the shaft bends and twists at the hub: a beam of round sections (Timoshenko), clamped in the horn.
+"""How far the shaft bends and twists at the hub. SI units.
 
-Where a bearing holds the hub, a spring holds the hub's journal sideways. SI units.
+On the servo's axis it is a beam of round sections (Timoshenko), clamped in the horn; where a bearing holds the hub, a
+spring holds the hub's journal sideways. Beside the servo it is a tube on two supports that are taken for stiff, its hub
+beyond the upper one, and the belt is two springs.
 """
 
 from __future__ import annotations
@@ -10,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.direct_stack import Stack
-from cad.layout.loads import ALUMINIUM_PA, WAIST, waist_radius_mm
+from cad.layout.belt.loads import belt_nm_per_rad
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.stack import WAIST, DirectStack
+from cad.layout.loads import ALUMINIUM_PA
 from design.frames import Array
 
 SLICES = 400  # of the shaft's length: bend within 1e-4
@@ -46,7 +50,7 @@ class ShaftBend:
         return bend + np.array([0.0, 0.0, self.stretch_m_per_n * force_n[2]])
 
 
-def shaft_bend(stack: Stack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0) -> ShaftBend:
+def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0) -> ShaftBend:
     """The beam from horn to hub.
 
     Args:
@@ -75,14 +79,43 @@ def shaft_bend(stack: Stack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: flo
     )
 
 
-def _radius_mm(stack: Stack, above_horn_mm: Array) -> Array:
+def _radius_mm(stack: DirectStack, above_horn_mm: Array) -> Array:
     """Radius of the shaft; the pocket of the horn's boss lies within the flange and is left out."""
     shaft = stack.shaft_diameter / 2
     z = above_horn_mm
     radius = np.full_like(z, shaft)
     if stack.bearing is not None:
-        waist = waist_radius_mm(stack)
+        waist = stack.waist_radius
         above = z - stack.collar_height - WAIST
         radius = np.where(above < 0, waist, np.minimum(shaft, waist + np.maximum(above, 0.0)))
     radius = np.where(z < stack.collar_height, max(stack.collar_radius, shaft), radius)
     return np.where(z < stack.flange_thickness, np.maximum(stack.flange_radius, radius), radius)
+
+
+def belt_shaft_bend(stack: BeltStack) -> ShaftBend:
+    """The shaft beyond its upper bearing, the span below it, and the belt that holds it from turning."""
+    EI = ALUMINIUM_PA * _second_moment(stack)
+    span = (stack.upper_middle - stack.lower_middle) / 1000
+    over = (stack.hub_bottom - stack.upper_middle) / 1000
+    coupled = over * span / (3 * EI) + over**2 / (2 * EI)
+    area = math.pi * (stack.tube_diameter**2 - stack.shaft_bore**2) / 4e6
+    return ShaftBend(
+        compliance=np.array(
+            [
+                [over**2 * span / (3 * EI) + over**3 / (3 * EI), coupled],
+                [coupled, span / (3 * EI) + over / EI],
+            ]
+        ),
+        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + _twist(stack),
+        stretch_m_per_n=over / (ALUMINIUM_PA * area),
+    )
+
+
+def _second_moment(stack: BeltStack) -> float:
+    """Of the tube [m4]."""
+    return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
+
+
+def _twist(stack: BeltStack) -> float:
+    shear = ALUMINIUM_PA / (2 + 2 * POISSON)
+    return (stack.hub_bottom - stack.belt_middle) / 1000 / (shear * 2 * _second_moment(stack))

@@ -9,9 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cad.files.parts import build_parts, write_files
+from cad.files.part_files import build_parts, write_files
 from cad.kernel import require_kernel
-from cad.layout.deck import mount_offset_mm
+from cad.layout.layout import mount_offset_mm
 from design.angles import standard_settings
 from design.concurrency.second_process import second_process
 from design.task.task import LoadedTask, load_task
@@ -19,7 +19,7 @@ from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
 
 if TYPE_CHECKING:
-    from cad.findings import Finding
+    from cad.findings import PartFinding
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen
 
@@ -38,7 +38,7 @@ class Made:
 
     optimum: Optimum
     chosen: Chosen
-    findings: tuple[Finding, ...]
+    findings: tuple[PartFinding, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from cad.assembly.shadow import PartsWorkshop
         from cad.checks.run import check_files
-        from cad.files.write_all import export_scanner
+        from cad.files.workshop_files import export_scanner
 
         workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
         chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)

@@ -61,7 +61,7 @@ class PartsBench:
 
 
 def _made(scanner: Scanner) -> tuple[Shadow, PartFacts] | Refused:
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
     from cad.checks.run import run_checks
 
     try:
@@ -93,7 +93,7 @@ def _facts(scanner: Scanner, assembly: Assembly, checks: Sequence[Check]) -> Par
 
 def _cost(scanner: Scanner, assembly: Assembly) -> float | None:
     """Of lidar, servo, ring, bearings and belt, no more; None where a price is not known."""
-    bought = (scanner.lidar, scanner.servo, scanner.slip_ring, *assembly.drive.products())
+    bought = (scanner.lidar, scanner.servo, scanner.slip_ring, *assembly.layout.drive.products)
     prices = [product.price_usd for product in bought if product is not None]
     known = [price for price in prices if price is not None]
     return sum(known) if len(known) == len(prices) else None

@@ -20,7 +20,7 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
         TaskError: no direction has a weight, or no setting keeps the limits.
         BuildError: a part cannot be made.
     """
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
     from cad.geometry.mesh_trials import mesh_trials
 
     optimum = optimum_of(loaded, say)

@@ -36,19 +36,17 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     Raises:
         BuildError: the kernel is missing, or a part cannot be made.
     """
-    from cad.assembly.assembly import make_parts, turns
     from cad.assembly.linkage_preview import coarse, draft_linkage
-    from cad.layout.linkage import PART
+    from cad.assembly.make import make_parts
+    from cad.layout.names import ALIGNMENT_LINKAGE
 
-    assembly = make_parts(scanner, lambda name: name != PART and turns(name) == turning)
+    assembly = make_parts(scanner, lambda spec: spec.name != ALIGNMENT_LINKAGE and spec.turns == turning)
     meshes = {name: coarse(solid) for name, solid in (assembly.made | assembly.bought).items()}
     if turning:
-        meshes[PART] = draft_linkage(assembly.linkage)
-    return tuple(_body(name, *mesh) for name, mesh in meshes.items())
+        meshes[ALIGNMENT_LINKAGE] = draft_linkage(assembly.layout.linkage)
+    return tuple(_body(name, assembly.spec(name).colour, *mesh) for name, mesh in meshes.items())
 
 
-def _body(name: str, vertices_mm: Array, faces: Array) -> BodyMesh:
-    from cad.assembly.assembly import colour_of
-
-    red, green, blue = (round(255 * c) for c in colour_of(name))
+def _body(name: str, colour: tuple[float, float, float], vertices_mm: Array, faces: Array) -> BodyMesh:
+    red, green, blue = (round(255 * c) for c in colour)
     return BodyMesh(name, (vertices_mm * 1e-3).astype(np.float32), faces.astype(np.uint32), (red, green, blue))

@@ -4,7 +4,7 @@ import cadquery as cq
 import numpy as np
 import pytest
 
-from cad.files.parts import build_parts
+from cad.files.part_files import build_parts
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of

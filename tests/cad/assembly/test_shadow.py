@@ -8,9 +8,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cad.assembly.assembly import make_parts, turns
+from cad.assembly.make import make_parts
 from cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
-from cad.geometry.mesh import mesh_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -35,8 +34,7 @@ def scanner_for(alpha_rot, beta_rot, alpha, beta):
 def pitching():
     scanner = scanner_for(*PITCHING)
     assembly = make_parts(scanner)
-    meshes = {name: mesh_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    return scanner, meshes, shadow_of(scanner, triangles_of(meshes))
+    return scanner, assembly, shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
 
 def rays(gamma):
@@ -53,17 +51,18 @@ def other_caster(meshes):
 
 
 def test_hidden_beams_are_those_of_another_caster_and_no_more_than_a_beam_is_wide(pitching):
-    _, meshes, shadow = pitching
+    _, assembly, shadow = pitching
+    meshes = assembly.meshes()
     assert shadow.stator.shape == (1081, AXIS_STEPS)
     some = np.arange(0, 1081, 9)
-    rotor = other_caster([m for name, m in meshes.items() if turns(name) and name != "lidar_window"])
+    rotor = other_caster([m for name, m in meshes.items() if name in assembly.turning() and name != "lidar_window"])
     hidden = rotor.intersects_any(np.zeros((len(some), 3)), rays(0.0)[some])
     assert shadow.beams[some][hidden].all()  # whose middle is hidden is hidden
     grown = np.convolve(hidden, np.ones(5), "same") > 0
     assert not (shadow.beams[some] & ~grown).any()  # 3 mm of aperture 45 mm away: within 4.5 deg
     assert 30 < hidden.sum() * 9 * 0.25 < 60
 
-    stator = other_caster([m for name, m in meshes.items() if not turns(name)])
+    stator = other_caster([m for name, m in meshes.items() if name not in assembly.turning()])
     near = np.flatnonzero(shadow.stator.any(axis=1))[::12]
     for k in (0, 131, 500):
         hit = stator.intersects_any(np.zeros((len(near), 3)), rays(2 * np.pi * k / AXIS_STEPS)[near])
@@ -79,11 +78,11 @@ def test_only_beams_that_look_down_meet_what_stands_still(pitching):
 
 
 def test_a_part_in_the_way_is_seen_and_only_while_it_is_there(pitching):
-    scanner, meshes, before = pitching
+    scanner, assembly, before = pitching
     post = trimesh.creation.box((10, 10, 10))
     post.apply_translation([200, 0, 0])  # in the fan when gamma = 0, 2.9 deg wide from here
-    more = dict(triangles_of(meshes)) | {"a_post": post.triangles / 1000}
-    after = shadow_of(scanner, more)
+    more = triangles_of(assembly) | {"a_post": post.triangles / 1000}
+    after = shadow_of(scanner, more, assembly.turning())
     added = after.stator & ~before.stator
     ahead = np.abs(np.degrees(scanner.lidar.bearings_rad())) < 1.2
     assert added[ahead][:, [0, 1, AXIS_STEPS - 1]].all()

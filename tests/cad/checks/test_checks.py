@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 
 import cad.checks.run as room
 from cad.checks.check import at_least, at_most, checks_text
-from cad.checks.clearance import clearance_checks, distance_over_a_turn
+from cad.checks.clearance import distance_over_a_turn, together_check, turning_check
 from cad.checks.islands import islands_check, islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
-from cad.drives.drive import drive_of
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import Mesh, mesh_of
 from cad.geometry.print_pose import print_pose
-from cad.layout.direct_stack import stack_of
+from cad.layout.direct.sizing import direct_stack
 from cad.solids import box, location, upright
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -90,11 +89,12 @@ def test_shared_room_is_found_by_name():
         "lidar_body": mesh_of(box((9, 0, 0), (20, 10, 10))),
         "base_mount": mesh_of(box((-30, -30, -30), (30, 30, -20))),
     }
-    clearance, shared = clearance_checks(meshes)
+    turning = ("alignment_linkage", "lidar_body")
+    clearance, shared = turning_check(meshes, turning), together_check(meshes, turning)
     assert clearance.severity == "pass" and shared.severity == "error"
     assert (shared.value, shared.where) == (pytest.approx(100, rel=1e-3), "alignment_linkage and lidar_body")
     meshes["lidar_body"] = mesh_of(box((10, 0, -19.9), (20, 10, 10)))
-    clearance, shared = clearance_checks(meshes)
+    clearance, shared = turning_check(meshes, turning), together_check(meshes, turning)
     assert clearance.severity == "error" and clearance.where == "lidar_body and base_mount"
     assert clearance.value == pytest.approx(0.1, abs=1e-3)
     assert shared.severity == "pass"
@@ -163,9 +163,9 @@ def bodies(mass, z):
 def test_loads_against_hand_calculation():
     scanner = scanner_for(0, 90, 30, -30)
     alone = replace(scanner, bearings=())
-    stack = stack_of(alone)
+    stack = direct_stack(alone)
     lever = -stack.horn / 1000 - 0.030
-    found = {c.kind: c for c in mechanics_checks(alone, drive_of(alone), bodies(0.5, -0.030))}
+    found = {c.kind: c for c in mechanics_checks(alone, direct_stack(alone), bodies(0.5, -0.030))}
     weight = 0.5 * 9.80665
     assert found["tilt_moment"].value == pytest.approx(weight * lever, rel=1e-3)
     assert found["tilt_moment"].severity == "error"
@@ -173,33 +173,32 @@ def test_loads_against_hand_calculation():
     about_axis = 0.5 * (0.03**2 + 0.012**2)
     assert found["spin_up_torque"].value == pytest.approx(weight * 0.012 + about_axis * 2 * np.pi / 0.2, rel=1e-3)
     assert found["axial_load"].value == pytest.approx(0, abs=1e-6)
-    held = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}
+    held = {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.5, -0.030))}
     assert held["tilt_moment"].severity == "pass" and held["bearing_load"].value > weight
     upright = scanner_for(0, 0, 30, -30)
-    heavy = {c.kind: c.severity for c in mechanics_checks(upright, drive_of(upright), bodies(3.0, -0.030))}
+    heavy = {c.kind: c.severity for c in mechanics_checks(upright, direct_stack(upright), bodies(3.0, -0.030))}
     assert heavy["axial_load"] == "error"
 
 
 def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
     scanner = scanner_for(0, 90, 30, -30)
-    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.5, -0.030))}["flanks"]
+    found = {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.5, -0.030))}["flanks"]
     assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
     grams, at, azimuth = (
         float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.message).groups()
     )
     assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
     upright = scanner_for(0, 0, 30, -30)
-    found = {c.kind: c for c in mechanics_checks(upright, drive_of(upright), bodies(0.5, -0.030))}["flanks"]
+    found = {c.kind: c for c in mechanics_checks(upright, direct_stack(upright), bodies(0.5, -0.030))}["flanks"]
     assert found.severity == "pass"
     exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
-    assert {c.kind: c.severity for c in mechanics_checks(exact, drive_of(exact), bodies(0.5, -0.03))}[
-        "flanks"
-    ] == "note"
+    found = {c.kind: c for c in mechanics_checks(exact, direct_stack(exact), bodies(0.5, -0.03))}["flanks"]
+    assert found.severity == "note"
 
 
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
-    found = {c.kind: c for c in mechanics_checks(scanner, drive_of(scanner), bodies(0.3, -0.03))}
+    found = {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.3, -0.03))}
     for kind in ("tilt_moment", "axial_load"):
         assert (found[kind].severity, found[kind].limit) == ("note", None)
         assert "gives no rating" in found[kind].message

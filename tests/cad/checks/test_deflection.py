@@ -9,7 +9,9 @@ import pytest
 from cad.checks.deflection import sag_of, split
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import mesh_of
-from cad.layout.loads import ALUMINIUM_PA, WAIST, hanging, waist_radius_mm, weight_of
+from cad.layout.direct.loads import hanging
+from cad.layout.direct.stack import WAIST
+from cad.layout.loads import ALUMINIUM_PA, weight_of
 from cad.solids import box, upright
 from cad.statics import elastic
 from cad.statics.sag import linkage_sag
@@ -66,7 +68,7 @@ def test_a_cantilever_that_lies_askew_bends_as_timoshenko_says():
 
 
 def test_the_shaft_as_a_beam_bends_and_twists_as_the_same_shaft_in_finite_elements(made):
-    stack = replace(made.result.assembly.stack, bearing=None, flange_radius=6.0, collar_radius=6.0)
+    stack = replace(made.result.assembly.layout.stack, bearing=None, flange_radius=6.0, collar_radius=6.0)
     bend = shaft_bend(stack)
     length, radius = stack.hub_bottom - stack.horn, stack.shaft_diameter / 2
     closed = length / 1000 / (ALUMINIUM_PA * math.pi / 4 * (radius / 1000) ** 4)
@@ -85,7 +87,7 @@ def test_the_shaft_as_a_beam_bends_and_twists_as_the_same_shaft_in_finite_elemen
 
 def test_shaft_bend_is_that_of_the_load_check_where_both_apply(made):
     scanner = made.scanner
-    stack = replace(made.result.assembly.stack, bearing=None, flange_radius=6.0, collar_radius=6.0)
+    stack = replace(made.result.assembly.layout.stack, bearing=None, flange_radius=6.0, collar_radius=6.0)
     weight = weight_of(scanner, 0.6, 0.14, 0.0)
     arm = weight.lever_m - (stack.hub_bottom - stack.horn) / 1000
     turned = shaft_bend(stack).rotation_of(np.array([weight.across_n, 0, 0]), np.array([0, weight.across_n * arm, 0]))
@@ -93,10 +95,10 @@ def test_shaft_bend_is_that_of_the_load_check_where_both_apply(made):
 
 
 def test_a_waist_bends_more_and_a_stiff_cage_holds(made):
-    stack = made.result.assembly.stack
+    stack = made.result.assembly.layout.stack
     assert stack.bearing is not None
     free, held, clamped = (shaft_bend(stack, cage_n_per_m=k).compliance for k in (0.0, 1e6, 1e12))
-    waist = WAIST / 1000 / (ALUMINIUM_PA * math.pi / 4 * (waist_radius_mm(stack) / 1000) ** 4)
+    waist = WAIST / 1000 / (ALUMINIUM_PA * math.pi / 4 * (stack.waist_radius / 1000) ** 4)
     assert free[1, 1] > waist
     assert free[0, 0] > held[0, 0] > clamped[0, 0] > 0
     reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])
@@ -124,7 +126,7 @@ def test_what_a_calibration_finds_is_told_from_what_it_does_not():
 def test_a_lidar_on_a_post_turns_as_the_post_bends(made):
     lidar = Inertial(0.37, np.array([0.01, 0, -0.012]), 1e-4 * np.eye(3))
     rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    stack = replace(made.result.assembly.stack, R_rot_laser=rows, h=200.0)  # so long that its root is stiff
+    stack = replace(made.result.assembly.layout.stack, R_rot_laser=rows, h=200.0)  # so long that its root is stiff
     post = upright(9.0, stack.hub_bottom, -60.0).fuse(box((-30, -30, -63), (30, 30, -55))).Solids()[0]
     sag = linkage_sag(stack, [mesh_of(post)], np.array([30.0, 30.0, -55.0]), lidar, 2300.0, 1e-6)
     EI, root, top = 2300.0 * math.pi / 4 * 9.0**4, stack.spigot_top, -63.0
@@ -145,7 +147,7 @@ def test_the_modulus_moves_the_linkage_and_not_the_shaft(made):
         "rot": Inertial(0.2, np.array([0, 0, -0.05]), 1e-4 * np.eye(3)),
         "laser": Inertial(0.37, np.array([0, 0, -0.012]), 1e-4 * np.eye(3)),
     }
-    args = (assembly.drive, assembly.linkage, bodies, made.result.meshes)
+    args = (assembly, bodies, made.result.meshes)
     stiff = replace(scanner, printer=scanner.printer.model_copy(update={"modulus_gpa": 23.0}))
     one, other = sag_of(scanner, *args), sag_of(stiff, *args)
     shaft = (10 * other.rotation_rad - one.rotation_rad) / 9  # what the modulus does not change

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cad.assembly.assembly import make_parts
 from cad.assembly.joints import LENGTHS, _length, joints_of
+from cad.assembly.make import make_parts
 from cad.files.bom import bom_text, items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
@@ -124,7 +124,7 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     joints = joints_of(scanner, assembly, rounds)
     masses = dict.fromkeys(assembly.made, 1.0)
-    items = items_of(scanner, assembly, joints, masses, {"servo_shaft"}, "0123456789ab")
+    items = items_of(scanner, assembly, joints, masses, "0123456789ab")
     assert "slip ring" not in {item.part for item in items}
     lidar = next(item for item in items if item.part == "lidar")
     assert lidar.unit_usd is None and "price unknown" in lidar.note
@@ -164,7 +164,7 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
         assert len(seats) == count and min(hole.length for hole in seats) > INSERT_LENGTH
     by_threads = {(joint.part, joint.onto) for joint in joints_of(made.scanner, *_solids(made))}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
-    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), set(), "0123456789ab")
+    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 6)]
     assert "Melt the inserts in" in instructions_text(scanner, assembly, joints, "0123456789ab")
 

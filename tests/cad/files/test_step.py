@@ -17,8 +17,8 @@ from cad.solids import box, upright
 BUILD = """
 import hashlib, json, sys
 from pathlib import Path
-from cad.files.parts import build_parts
-from cad.files.write_all import export_scanner
+from cad.files.part_files import build_parts
+from cad.files.workshop_files import export_scanner
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from cad.files.parts import build_parts
+from cad.files.part_files import build_parts
 from cad.files.urdf import roll_pitch_yaw
-from cad.layout.deck import mount_offset_mm
+from cad.layout.layout import mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing

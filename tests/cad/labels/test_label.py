@@ -8,7 +8,6 @@ import shapely
 import trimesh
 
 from cad import solids
-from cad.files.parts import config_hash
 from cad.geometry.holes import Piercing
 from cad.geometry.mesh import checked_mesh
 from cad.labels.engrave import engrave, groove_of
@@ -16,6 +15,7 @@ from cad.labels.flats import flat_at, flats_of
 from cad.labels.glyphs import letters, text_width
 from cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
 from cad.labels.sight import Sight
+from cad.layout.layout import config_hash
 from cad.solids import box, upright
 
 STROKE = 0.8
@@ -27,10 +27,18 @@ def groove(made):
 
 
 def test_the_parts_that_hold_the_angles_say_them(made):
-    digest = config_hash(made.scanner)
-    assert label_texts(made.scanner, "alignment_linkage", digest) == ["tilted", "L -20 -70", digest[:DIGITS]]
-    assert label_texts(made.scanner, "base_mount", digest) == ["tilted", "R 0 35", digest[:DIGITS]]
-    assert label_texts(made.scanner, "bearing_cage", digest) == ["tilted", digest[:DIGITS]]
+    digest, parts = config_hash(made.scanner), made.result.assembly.parts
+    assert label_texts(made.scanner, parts["alignment_linkage"], digest) == [
+        "tilted",
+        "L -20 -70",
+        digest[:DIGITS],
+    ]
+    assert label_texts(made.scanner, parts["base_mount"], digest) == [
+        "tilted",
+        "R 0 35",
+        digest[:DIGITS],
+    ]
+    assert label_texts(made.scanner, parts["bearing_cage"], digest) == ["tilted", digest[:DIGITS]]
     assert set(made.result.meshes) >= {"alignment_linkage", "base_mount"}
     named = made.scanner.angles.model_copy(update={"task": "another"})
     assert config_hash(replace(made.scanner, angles=named)) != digest
@@ -51,7 +59,7 @@ def test_engraving_takes_off_the_area_of_its_letters_and_nothing_else(made, groo
         read = trimesh.load(made.folder / "parts" / f"{name}.stl")
         assert read.is_watertight and read.body_count == 1
         lost = checked_mesh(plain, name).volume() - mesh.volume()
-        lines = [*label_texts(made.scanner, name, config_hash(made.scanner))]
+        lines = [*label_texts(made.scanner, made.result.assembly.parts[name], config_hash(made.scanner))]
         if name == "alignment_linkage":
             lines.append("FRONT")
         areas = [sum(part.area for line in lines for part in letters(line, height, STROKE)) for height in (3.6, 4.5)]
@@ -61,10 +69,10 @@ def test_engraving_takes_off_the_area_of_its_letters_and_nothing_else(made, groo
 
 
 def test_front_stands_on_the_seat_towards_the_front(made, groove):
-    R = np.array(made.result.assembly.stack.R_rot_laser)
+    R = np.array(made.result.assembly.layout.stack.R_rot_laser)
     mesh = made.result.meshes["alignment_linkage"]
     local = mesh.vertices @ R
-    floor = local[np.abs(local[:, 2] - (made.result.assembly.linkage.seat - groove.depth)) < 1e-3]
+    floor = local[np.abs(local[:, 2] - (made.result.assembly.layout.linkage.seat - groove.depth)) < 1e-3]
     front = floor[(np.abs(floor[:, 0] - 20.0) < 2.7) & (np.abs(floor[:, 1]) < 11.5)]
     assert len(front) > 50
     assert np.ptp(front[:, 1]) == pytest.approx(text_width("FRONT", 4.5) + STROKE, abs=0.05)
@@ -75,15 +83,15 @@ def test_labels_are_where_an_eye_finds_them(made):
     assembly = made.result.assembly
     bodies = [trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in assembly.meshes().values()]
     scanner = trimesh.util.concatenate(bodies)
-    normal, on_deck = np.array(assembly.deck.normal), np.array(assembly.deck.centre)
+    normal, on_deck = np.array(assembly.layout.deck.normal), np.array(assembly.layout.deck.centre)
     hidden = {finding.subject for finding in made.result.findings if finding.code == "label_hidden"}
     for name in ("alignment_linkage", "base_mount"):
         assert name not in hidden
         mesh, plain = made.result.meshes[name], checked_mesh(assembly.made[name], name)
         known = {tuple(vertex) for vertex in np.round(plain.vertices, 4)}
         new = np.array([vertex for vertex in mesh.vertices if tuple(np.round(vertex, 4)) not in known])
-        R = np.array(assembly.stack.R_rot_laser)
-        seat = assembly.linkage.seat
+        R = np.array(assembly.layout.stack.R_rot_laser)
+        seat = assembly.layout.linkage.seat
         label = new[np.abs(new @ R[:, 2] - seat) > 1.0] if name == "alignment_linkage" else new
         # the letters lie in one plane, and their floors in another
         _, _, axes = np.linalg.svd(label - label.mean(axis=0), full_matrices=False)
@@ -101,11 +109,11 @@ def test_labels_are_where_an_eye_finds_them(made):
 
 def test_faces_that_mate_or_are_covered_are_known(made):
     assembly = made.result.assembly
-    sight, R, seat = Sight(assembly), assembly.stack.R(), assembly.linkage.seat
+    sight, R, seat = Sight(assembly), assembly.layout.stack.R(), assembly.layout.linkage.seat
     on_seat = flat_at(assembly.made["alignment_linkage"], R @ [0.0, 0.0, seat], R[:, 2])
     assert sight.touched(on_seat) and not sight.views(on_seat, np.zeros((1, 2)), True).any()
-    deck = -np.array(assembly.deck.normal)
-    foot = flat_at(assembly.made["base_mount"], np.array(assembly.deck.centre) + 1e-9 * deck, deck)
+    deck = -np.array(assembly.layout.deck.normal)
+    foot = flat_at(assembly.made["base_mount"], np.array(assembly.layout.deck.centre) + 1e-9 * deck, deck)
     assert sight.touched(foot) and not sight.views(foot, np.zeros((1, 2)), False).any()
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
-from cad.layout.direct_stack import stack_of
+from cad.layout.direct.sizing import direct_stack
+from cad.layout.layout import drive_of, layout_of
 from cad.parts.base_mount import base_mount, mount_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -48,9 +49,10 @@ def scanner_for(alpha_rot, beta_rot, deck):
 @pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 90), (0, 0), (180, 0), (66, -52)])
 def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count, alpha_rot, beta_rot):
     scanner = scanner_for(alpha_rot, beta_rot, deck)
-    stack = stack_of(scanner)
-    where = deck_of(scanner, stack)
-    mesh = checked_mesh(base_mount(mount_of(scanner, where)), "base_mount")
+    stack = direct_stack(scanner)
+    layout = layout_of(scanner)
+    where = layout.deck
+    mesh = checked_mesh(base_mount(mount_of(layout)), "base_mount")
     turn = scanner.angles.T_world_rot(0.0)[:3, :3]
     world = mesh.vertices @ turn.T + np.array(where.t_world_rot)
     assert np.abs(world[:, 2]).min() < 1e-6
@@ -64,21 +66,21 @@ def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count
         assert len(rim) > 20
         np.testing.assert_allclose(np.linalg.norm(rim - hole, axis=1), radius, atol=0.01)
         assert reach[reach > radius + 0.5].min() > 2 * radius  # material around it
-    assert stack == stack_of(scanner_for(alpha_rot, beta_rot, None))  # nothing above the mount changes
+    assert stack == direct_stack(scanner_for(alpha_rot, beta_rot, None))  # nothing above the mount changes
 
 
 def test_a_hole_under_the_strut_is_refused_with_the_bound():
     scanner = scanner_for(0, 90, Rectangle(shape="rectangle", size_mm=(50, 50), screw="M4"))
     with pytest.raises(BuildError, match=r"deck.shape = 'rectangle': the hole at \(25, 25\) mm .* needs 30.9 mm"):
-        deck_of(scanner, stack_of(scanner))
+        deck_of(scanner, drive_of(scanner))
 
 
 def test_an_upright_axis_needs_a_mount_only_where_the_deck_has_holes():
     bare, drilled = scanner_for(0, 0, None), scanner_for(0, 0, Circle(shape="circle", diameter_mm=100))
-    assert deck_of(bare, stack_of(bare)).flat and not deck_of(drilled, stack_of(drilled)).flat
+    assert deck_of(bare, drive_of(bare)).flat and not deck_of(drilled, drive_of(drilled)).flat
     usual = scanner_for(0, 40, None)
     named = replace(usual, deck=Rectangle(shape="rectangle"))
-    assert deck_of(usual, stack_of(usual)) == deck_of(named, stack_of(named))
+    assert deck_of(usual, drive_of(usual)) == deck_of(named, drive_of(named))
 
 
 @pytest.mark.parametrize(

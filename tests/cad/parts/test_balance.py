@@ -10,14 +10,14 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cad.assembly.assembly import make_parts
 from cad.assembly.joints import joints_of
+from cad.assembly.make import make_parts
 from cad.assembly.shadow import shadow_of, triangles_of
-from cad.drives.drive import drive_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
-from cad.layout.balance import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight, counterweight_of
-from cad.layout.imbalance import estimated_moment, keeps_flank, torque_nm
+from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
+from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
+from cad.layout.layout import drive_of, layout_of
 from cad.layout.linkage import Ear, linkage_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -43,7 +43,7 @@ def scanner_for(*angles, sensor="UTM-30LX", servo="MX-64R"):
 
 
 def found_for(scanner):
-    return counterweight_of(scanner, linkage_of(scanner, drive_of(scanner).stack))
+    return layout_of(scanner).counterweight
 
 
 @pytest.fixture(scope="module", params=SHIPPED, ids=["ground_ahead", "rolling"])
@@ -80,8 +80,8 @@ def test_the_estimate_that_chooses_the_bar_is_that_of_the_solids(scanner):
     linkage = linkage_of(scanner, drive_of(scanner).stack)
     estimate = estimated_moment(scanner, linkage)
     exact = scanner.servo.model_copy(update={"backlash_deg": 0.0})  # so that no ear is made
-    bare = make_parts(replace(scanner, servo=exact), lambda name: name in ("alignment_linkage", "sub_plate"))
-    assert isinstance(bare.counterweight, LeftOut) and ("sub_plate" in bare.made) == (linkage.ears is not None)
+    bare = make_parts(replace(scanner, servo=exact), lambda spec: spec.name in ("alignment_linkage", "sub_plate"))
+    assert isinstance(bare.layout.counterweight, LeftOut) and ("sub_plate" in bare.made) == (linkage.ears is not None)
     lidar = scanner.lidar
     true = lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * linkage.stack.R()[:2, 2]
     for mesh in meshes(bare, bare.made).values():
@@ -94,15 +94,15 @@ def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made
     bodies = {}
     for name, mesh in assembly.meshes().items():
         bodies[name] = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
-    bar, azimuth = bodies.pop("counterweight"), assembly.counterweight.ear.azimuth
+    bar, azimuth = bodies.pop("counterweight"), assembly.layout.counterweight.ear.azimuth
     for slid in (-TRIM, 0.0, TRIM):
         there = bar.translate((slid * math.cos(azimuth), slid * math.sin(azimuth), 0.0))
         for name, body in bodies.items():
             assert (there ^ body).volume() < 0.05, (name, slid)
             if name != "alignment_linkage":
                 assert there.min_gap(body, 2.0) > 0.9, (name, slid)
-    seen = triangles_of({name: assembly.mesh(name) for name in ("counterweight", "servo_case")})
-    assert not shadow_of(scanner, seen).beams.any()
+    seen = {name: triangles_of(assembly)[name] for name in ("counterweight", "servo_case")}
+    assert not shadow_of(scanner, seen, assembly.turning()).beams.any()
 
 
 def test_screws_from_below_and_a_step_that_says_so(made):
@@ -111,7 +111,7 @@ def test_screws_from_below_and_a_step_that_says_so(made):
     joints = joints_of(scanner, assembly, rounds)
     (joint,) = [joint for joint in joints if joint.onto == "counterweight"]
     assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
-    bar = assembly.counterweight
+    bar = assembly.layout.counterweight
     assert bar.ear.high - bar.ear.low + 6 <= joint.length_mm <= bar.ear.high - bar.ear.low + bar.section[1]
     text = instructions_text(scanner, assembly, joints, "0" * 12)
     assert text.index("Lidar on its seat") < text.index("Counterweight on the linkage") < text.index("Linkage on the")
@@ -175,7 +175,7 @@ def test_a_sweep_that_gravity_holds_on_one_flank_needs_none():
 def test_an_ear_over_the_index_mark_carries_it():
     scanner = scanner_for(0, 90, -80, 0)  # wires and ear at +y
     assembly = make_parts(scanner, lambda name: name == "alignment_linkage")
-    ear = assembly.counterweight.ear
+    ear = assembly.layout.counterweight.ear
     assert math.degrees(ear.azimuth) == pytest.approx(90)
     part = meshes(assembly, ["alignment_linkage"])["alignment_linkage"]
     middle = (ear.low + ear.high) / 2

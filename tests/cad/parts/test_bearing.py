@@ -10,14 +10,15 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cad.assembly.assembly import make_parts, turns
-from cad.assembly.masses import link_bodies
-from cad.checks.remarks import findings_of, left_out_of, rotor_weight
-from cad.files.parts import config_hash
+from cad.assembly.make import make_parts
+from cad.assembly.masses import link_bodies, rotor_weight
+from cad.checks.remarks import findings_of, left_out_of
 from cad.geometry.mesh import checked_mesh
-from cad.layout.direct_stack import stack_of
-from cad.layout.loads import Weight, bearing_of, supported, waist_nm_per_rad
-from cad.parts.bearing_cage import cage_of, stiffness_n_per_m
+from cad.layout.direct.cage import cage_of, stiffness_n_per_m
+from cad.layout.direct.loads import bearing_for, supported, waist_nm_per_rad
+from cad.layout.direct.sizing import direct_stack
+from cad.layout.layout import config_hash
+from cad.layout.loads import Weight
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing, Servo
@@ -73,7 +74,7 @@ def body(meshes, turn=0.0):
 def test_the_horn_stays_within_its_rating(made):
     name, scanner, assembly, _ = made
     bodies = link_bodies(scanner, assembly)
-    weight = rotor_weight(scanner, assembly.stack, bodies)
+    weight = rotor_weight(scanner, assembly.layout.stack, bodies)
     limit = scanner.servo.radial_load_n * 0.010
     assert weight.moment_nm > limit  # so it needs the bearing
     assert not [f for f in findings_of(scanner, assembly, bodies) if f.code == "tilt_moment"]
@@ -84,19 +85,19 @@ def test_the_horn_stays_within_its_rating(made):
 
 
 def test_nothing_in_the_cage_shares_room_and_the_journal_turns(made):
-    _, _, _, meshes = made
+    _, _, assembly, meshes = made
     for one, other in itertools.combinations(meshes, 2):
         if {one, other} & {"bearing_cage", "bearing_inner", "bearing_outer", "cage_base", "slip_ring_adapter"}:
             assert (body([meshes[one]]) ^ body([meshes[other]])).volume() < 0.05, (one, other)
-    rotor = [mesh for name, mesh in meshes.items() if turns(name)]
-    stator = body([mesh for name, mesh in meshes.items() if not turns(name)])
+    rotor = [mesh for name, mesh in meshes.items() if name in assembly.turning()]
+    stator = body([mesh for name, mesh in meshes.items() if name not in assembly.turning()])
     for turn in (17.0, 100.0, 230.0):
         assert (stator ^ body(rotor, turn)).volume() < 0.05
 
 
 def test_seat_and_journal_take_the_bearing(made):
     _, scanner, assembly, meshes = made
-    bearing, fit = assembly.stack.bearing, scanner.printer.fit_clearance_mm
+    bearing, fit = assembly.layout.stack.bearing, scanner.printer.fit_clearance_mm
     low, high = meshes["bearing_outer"].bounds[:, 2]
     assert high - low == pytest.approx(bearing.width_mm, abs=1e-3)
     for name, diameter, sign in (("bearing_cage", bearing.outer_mm, 1), ("alignment_linkage", bearing.bore_mm, -1)):
@@ -128,8 +129,8 @@ def test_wires_of_the_ring_pass_the_bearing(made):
     name, _, assembly, meshes = made
     if name == "no_ring":
         pytest.skip("no ring, no wires")
-    stack = assembly.stack
-    azimuth = sum(assembly.linkage.clamp_azimuths) / 2
+    stack = assembly.layout.stack
+    azimuth = sum(assembly.layout.linkage.clamp_azimuths) / 2
     out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     radius = stack.bearing.bore_mm / 2 - 2.5
     start = radius * out + [0, 0, stack.ring_top + 1]
@@ -143,10 +144,10 @@ def test_wires_of_the_ring_pass_the_bearing(made):
 
 def test_an_upright_axis_is_left_without_and_says_so():
     scanner = scanner_for(0, 0, 60, -45)
-    stack = stack_of(scanner)
+    stack = direct_stack(scanner)
     assert stack.bearing is None and cage_of(scanner, stack) is None
     weak = rated(scanner, 1.0)
-    assert stack_of(weak).bearing.name == "61806-2RS"
+    assert direct_stack(weak).bearing.name == "61806-2RS"
 
 
 def test_none_of_the_catalogue_fits():
@@ -163,7 +164,7 @@ def test_a_case_without_ears_around_the_flange_is_refused():
     servo = Servo.model_validate(scanner.servo.model_dump() | {"case_holes_mm": holes})
     wrong = replace(scanner, servo=servo)
     with pytest.raises(BuildError, match=r"cage_base: ears: case_holes_mm"):
-        cage_of(wrong, stack_of(wrong))
+        cage_of(wrong, direct_stack(wrong))
 
 
 def test_the_bearing_counts_in_the_hash_of_the_parts():
@@ -176,8 +177,8 @@ def test_the_bearing_counts_in_the_hash_of_the_parts():
 @given(alpha_rot=st.floats(-180, 180), beta_rot=degrees, alpha=degrees, beta=degrees)
 def test_a_bearing_changes_the_stack_below_the_shoulder_only(alpha_rot, beta_rot, alpha, beta):
     scanner = scanner_for(alpha_rot, beta_rot, alpha, beta)
-    stack = stack_of(scanner)
-    alone = stack_of(replace(scanner, bearings=()))
+    stack = direct_stack(scanner)
+    alone = direct_stack(replace(scanner, bearings=()))
     assert (stack.h, stack.shoulder, stack.clamp, stack.spigot_top) == (
         alone.h,
         alone.shoulder,
@@ -188,7 +189,7 @@ def test_a_bearing_changes_the_stack_below_the_shoulder_only(alpha_rot, beta_rot
     if min(tilt, 180 - tilt) < 15:
         assert stack.bearing is None
     if 40 < tilt < 140:
-        assert stack.bearing is not None and bearing_of(scanner, alone) == stack.bearing
+        assert stack.bearing is not None and bearing_for(scanner, alone) == stack.bearing
         assert stack.horn == alone.horn - 8.5 - 7.0  # journal, and a waist for a gap
 
 
@@ -216,7 +217,7 @@ def beam(weight, stack, cage):
 @settings(deadline=None, max_examples=20)
 @given(across=st.floats(0.1, 10), along=st.floats(0, 10), lever=st.floats(0.1, 0.2), cage=st.floats(1e4, 1e8))
 def test_horn_and_bearing_share_the_load_as_the_beam_equation_says(across, along, lever, cage):
-    stack = stack_of(SCANNERS["ground_ahead"])
+    stack = direct_stack(SCANNERS["ground_ahead"])
     weight = Weight(across, along, lever, 0.013)
     shared = supported(weight, stack, cage)
     R, moment = beam(weight, stack, cage)
@@ -226,6 +227,6 @@ def test_horn_and_bearing_share_the_load_as_the_beam_equation_says(across, along
 
 def test_a_cage_of_thicker_wall_is_stiffer():
     scanner = SCANNERS["ground_ahead"]
-    cage = cage_of(scanner, stack_of(scanner))
+    cage = cage_of(scanner, direct_stack(scanner))
     assert 1e5 < stiffness_n_per_m(cage) < 1e7
     assert stiffness_n_per_m(replace(cage, opening=cage.opening + 5)) < stiffness_n_per_m(cage)

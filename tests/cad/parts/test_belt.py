@@ -11,26 +11,27 @@ import shapely
 import trimesh
 from cadquery import Vector
 
-from cad.assembly.assembly import make_parts, turns
 from cad.assembly.joints import joints_of, without_traps
+from cad.assembly.make import make_parts
 from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
-from cad.drives.belt import BeltDrive
-from cad.drives.belt_loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
-from cad.drives.direct import DirectDrive
-from cad.drives.drive import drive_of
 from cad.files.bom import items_of
 from cad.files.instructions import instructions_text
-from cad.files.parts import config_hash
 from cad.files.urdf import urdf_text
 from cad.geometry.holes import rounds_of
 from cad.geometry.mesh import mesh_of
-from cad.layout.belt_stack import QUARTERS, TRAVEL, belt_stack_of, drive_corners
-from cad.layout.deck import mount_offset_mm
+from cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, press_newton
+from cad.layout.belt.sizing import QUARTERS, belt_stack
+from cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
+from cad.layout.belt.tower import tower_of
+from cad.layout.direct.stack import DirectStack
+from cad.layout.layout import config_hash, drive_of, mount_offset_mm
 from cad.layout.loads import Weight
-from cad.parts.bearing_tower import bearing_tower, tower_of
+from cad.outlines import polygon
+from cad.parts.bearing_tower import bearing_tower
 from cad.screws import SCREWS
-from cad.solids import polygon, prism, upright
+from cad.solids import prism, upright
+from cad.statics.shaft import belt_shaft_bend
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo, SlipRing
@@ -65,7 +66,7 @@ def made():
     checks, shadow = run_checks(scanner, assembly, lambda _: None)
     found = {(check.kind, check.where): check for check in checks}
     return SimpleNamespace(
-        scanner=scanner, assembly=assembly, stack=assembly.stack, meshes=meshes, checks=found, shadow=shadow
+        scanner=scanner, assembly=assembly, stack=assembly.layout.stack, meshes=meshes, checks=found, shadow=shadow
     )
 
 
@@ -101,9 +102,9 @@ def inner_circle(mesh, z, diameter):
 
 
 def test_a_capsule_gets_the_belt_and_a_bore_the_shaft():
-    assert isinstance(drive_of(scanner_for()), BeltDrive)
-    assert isinstance(drive_of(scanner_for(ring="UH1256-02-0610-06S")), DirectDrive)
-    assert isinstance(drive_of(replace(scanner_for(), slip_ring=None)), DirectDrive)
+    assert isinstance(drive_of(scanner_for()).stack, BeltStack)
+    assert isinstance(drive_of(scanner_for(ring="UH1256-02-0610-06S")).stack, DirectStack)
+    assert isinstance(drive_of(replace(scanner_for(), slip_ring=None)).stack, DirectStack)
 
 
 def test_what_it_is_made_of(made):
@@ -190,13 +191,14 @@ def test_nothing_shares_room_in_any_position(made):
                 made.meshes[other].bounds[0] < made.meshes[one].bounds[1]
             ).all():
                 assert (bodies[one] ^ bodies[other]).volume() < 0.05, (one, other)
-    still = manifold3d.Manifold.batch_boolean([bodies[n] for n in names if not turns(n)], manifold3d.OpType.Add)
+    turning = made.assembly.turning()
+    still = manifold3d.Manifold.batch_boolean([bodies[n] for n in names if n not in turning], manifold3d.OpType.Add)
     for turn in (11.0, 100.0, 200.0):
         for name in names:
-            if turns(name) and name != "lidar_window":
+            if name in turning and name != "lidar_window":
                 assert (still ^ body(made.meshes[name], turn_deg=turn)).volume() < 0.05, (name, turn)
     # the pulley on the horn turns about the horn: what it sweeps meets nothing but the horn
-    (swept,) = (mesh_of(solid) for solid in made.assembly.drive.sweeps().values())
+    swept = made.assembly.outlines()["drive_pulley"]
     swept = body(trimesh.Trimesh(swept.vertices, swept.faces, process=False))
     assert (bodies["drive_pulley"] - swept).volume() < 3  # of 20 000: the chords of its rims
     for name in ("drive_plate", "bearing_tower", "servo_case", "belt", "shaft_pulley"):
@@ -234,7 +236,7 @@ def test_index_grooves_of_hub_and_tower_lie_at_plus_y_whatever_the_servos_side(m
 @pytest.mark.parametrize("axis", [(0, 0), (0, 90), (0, -90), (90, 0), (-90, 0), (180, 0), (45, 30), (110, 20)])
 def test_the_servo_turns_the_same_way_and_clears_the_deck(axis):
     scanner = scanner_for(*axis, alpha=30, beta=-30)
-    stack = belt_stack_of(scanner)
+    stack = belt_stack(scanner)
     turn = stack.turn()
     np.testing.assert_array_equal(turn @ [0, 0, 1], [0, 0, 1])  # its horn looks where the shaft looks
     assert np.linalg.det(turn) == pytest.approx(1)
@@ -331,7 +333,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)
     assert "280 mm" in text and "2048 of 4096" in text and "groove of the hub stands over the groove" in text
     masses = dict.fromkeys(assembly.made, 1.0)
-    rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, set(assembly.metal()), "0" * 12)}
+    rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, "0" * 12)}
     assert (rows["bearing"].quantity, rows["bearing"].total_usd) == (2, 16.0)
     assert rows["belt"].supplier_number == "GT2-6, 140 teeth, 280 mm"
     assert rows["counterweight"].kind == "sawn" and "2 threads M4" in rows["counterweight"].note
@@ -341,7 +343,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     solid = made.assembly.made["main_shaft"]
-    sheet = drawing_of("main_shaft", made.scanner, made.assembly, rounds_of(solid), [], 80.0, {"main_shaft"}, "0" * 12)
+    sheet = drawing_of("main_shaft", made.scanner, made.assembly, rounds_of(solid), 80.0, "0" * 12)
     said = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
     assert [text for text in said if text.startswith("Ø") and ":" not in text] == [
@@ -359,7 +361,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     """Of the pulleys: teeth and bore; of the tower: the seats. What is off the axis is measured from the horn's."""
     said = {}
     for name in ("drive_pulley", "bearing_tower"):
-        solid, rest = made.assembly.made[name], ([], 1.0, set(), "0" * 12)
+        solid, rest = made.assembly.made[name], (1.0, "0" * 12)
         sheet = drawing_of(name, made.scanner, made.assembly, rounds_of(solid), *rest)
         said[name] = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
     assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
@@ -380,13 +382,14 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
 def test_the_frame_chain_names_the_servo_beside_the_axis(made):
     from cad.assembly.masses import link_bodies
 
-    drive, bodies = made.assembly.drive, link_bodies(made.scanner, made.assembly)
+    drive, bodies = made.assembly.layout.drive, link_bodies(made.scanner, made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
     horn = drive.stack.beside()
-    (centre, size), _ = drive.shapes()
-    assert sorted(size) == pytest.approx([40.2, 41.0, 61.1]) and f"{centre[0] / 1000:.6g}" in text
-    assert np.linalg.norm(np.array(centre[:2]) - horn[:2]) < 20
+    low, high = np.array(drive.shapes[0].low), np.array(drive.shapes[0].high)
+    centre = (low + high) / 2
+    assert sorted(high - low) == pytest.approx([40.2, 41.0, 61.1]) and f"{centre[0] / 1000:.6g}" in text
+    assert np.linalg.norm(centre[:2] - horn[:2]) < 20
     side = servo.centre_m[:2] @ horn[:2] / np.linalg.norm(horn[:2])
     assert side > 0.005 and np.linalg.norm(rot.centre_m[:2]) < side  # what stands still leans to the servo
     assert config_hash(made.scanner) != config_hash(replace(made.scanner, belts=(_short(made),)))
@@ -467,7 +470,7 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     """ISO 4032: M4 is 7.0 across and 3.2 high, M3 5.5 and 2.4; the play is the sliding fit of 0.2."""
     scanner = replace(scanner_for(), printer=load_catalogue().products["fdm-0.4-nut"])
     assembly = make_parts(scanner, lambda name: name in ("bearing_tower", "drive_plate", "base_mount"))
-    tower, stack = assembly.made["bearing_tower"], assembly.stack
+    tower, stack = assembly.made["bearing_tower"], assembly.layout.stack
 
     def nut(across, height, at, turn_deg):
         return prism(polygon(across / np.sqrt(3), 6, np.radians(turn_deg)), 0, height).translate(Vector(*at))
@@ -503,11 +506,11 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     assert lengths[("drive_plate", "bearing_tower")] == ("trap", "ISO 4762 M4 x 16", 4)
     assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
     assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, assembly, list(joints.values()))}
-    sheet = drawing_of("bearing_tower", scanner, assembly, rounds["bearing_tower"], [], 1.0, set(), "0" * 12)
+    sheet = drawing_of("bearing_tower", scanner, assembly, rounds["bearing_tower"], 1.0, "0" * 12)
     said = {mark.text for mark in sheet.marks if hasattr(mark, "text")}
     assert {
         "Hexagons under the arms for nuts M4: 7.2 across flats.",
         "Slots in the foot for nuts M3: 5.7 wide, from its corners.",
     } <= said
     wide = replace(stack, flange=stack.flange.model_copy(update={"diameter_mm": 58.0}))
-    assert tower_of(scanner, wide).foot_trap is None and tower_of(scanner, stack).foot_trap is not None
+    assert tower_of(scanner, wide).foot.trap is None and tower_of(scanner, stack).foot.trap is not None

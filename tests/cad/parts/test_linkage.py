@@ -15,11 +15,13 @@ from cad.assembly.linkage_preview import draft_linkage
 from cad.checks.printing import thin_walls
 from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
-from cad.layout.direct_stack import covered_screws, envelope_of, rotor_radius, stack_of
+from cad.layout.direct.sizing import direct_stack
+from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_radius
+from cad.layout.layout import drive_of, layout_of
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.base_mount import base_mount, mount_of
-from cad.parts.sub_plate import ear_screws, sub_plate, sub_plate_of
+from cad.parts.sub_plate import sub_plate, sub_plate_of
 from cad.solids import box, building, checked
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -65,7 +67,7 @@ HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidd
 @pytest.mark.parametrize(("alpha", "beta", "lidar"), HARD)
 def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha, beta, lidar):
     scanner = scanner_for(alpha, beta, lidar)
-    stack = stack_of(scanner)
+    stack = direct_stack(scanner)
     mesh = checked_mesh(alignment_linkage(linkage_of(scanner, stack)), "alignment_linkage")
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     assert body.is_watertight and body.body_count == 1
@@ -92,7 +94,7 @@ COVERED = [(25.5, -21.4, "UTM-30LX"), (-22.3, 22.2, "UTM-30LX"), (7.8, -13.0, "U
 @pytest.mark.parametrize(("alpha", "beta", "lidar"), COVERED)
 def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha, beta, lidar):
     scanner = scanner_for(alpha, beta, lidar)
-    stack = stack_of(scanner)
+    stack = direct_stack(scanner)
     bodies = {
         "plate": sub_plate(sub_plate_of(scanner, stack)),
         "linkage": alignment_linkage(linkage_of(scanner, stack)),
@@ -127,7 +129,7 @@ def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha,
 @given(alpha=degrees, beta=degrees)
 def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     scanner = scanner_for(alpha, beta)
-    stack = stack_of(scanner)
+    stack = direct_stack(scanner)
     assert 45 <= stack.h <= 90 and stack.h % 0.25 == 0
     assert stack.sub_plate is not None or covered_screws(scanner.lidar, stack) == []
     assert (envelope_of(scanner.lidar, stack.sub_plate).corners() @ stack.R()[2]).min() >= stack.hub_bottom + 0.99
@@ -138,8 +140,8 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
 @given(alpha=turns, beta=degrees, alpha_laser=degrees, beta_laser=degrees)
 def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
     scanner = scanner_for(alpha_laser, beta_laser, alpha_rot=alpha, beta_rot=beta)
-    stack = stack_of(scanner)
-    deck = deck_of(scanner, stack)
+    stack = direct_stack(scanner)
+    deck = deck_of(scanner, drive_of(scanner))
     height = deck.t_world_rot[2] * (-1 if deck.hangs else 1)
     assert height > rotor_radius(scanner.lidar, stack.sub_plate)
     a, b = np.radians([alpha, beta])
@@ -153,30 +155,29 @@ def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
 @pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 0.01), (179.99, 0), (0, -90), (66, -52), (135, 45), (-24, 20)])
 def test_a_mount_for_any_axis(alpha_rot, beta_rot):
     scanner = scanner_for(30, -30, alpha_rot=alpha_rot, beta_rot=beta_rot)
-    stack = stack_of(scanner)
-    solid = base_mount(mount_of(scanner, deck_of(scanner, stack)))
+    solid = base_mount(mount_of(layout_of(scanner)))
     assert checked_mesh(solid, "base_mount").is_closed()
 
 
 def test_a_capsule_ring_has_no_place_on_a_shaft():
     capsule = load_catalogue().get("SRC022A-6", SlipRing)
     with pytest.raises(BuildError, match=r"bore_mm = 0: .*stator of a capsule"):
-        stack_of(replace(scanner_for(0, 0), slip_ring=capsule))
+        direct_stack(replace(scanner_for(0, 0), slip_ring=capsule))
 
 
 def test_a_bore_too_small_for_a_shaft_is_refused():
     with pytest.raises(BuildError, match=r"bore_mm = 6: a shaft of 5.5 mm .* bore_mm >= 8.4"):
-        stack_of(with_ring(bore_mm=6.0))
+        direct_stack(with_ring(bore_mm=6.0))
 
 
 def test_a_wide_bore_meets_the_heads_of_the_horn_screws():
     with pytest.raises(BuildError, match=r"servo_shaft: collar radius = 12.5 mm"):
-        stack_of(with_ring(bore_mm=25.4, outer_diameter_mm=86.0))
+        direct_stack(with_ring(bore_mm=25.4, outer_diameter_mm=86.0))
 
 
 def test_an_upside_down_lidar_is_refused():
     with pytest.raises(BuildError, match=r"alignment_linkage: tilt = 120.00 deg"):
-        stack_of(scanner_for(120, 0))
+        direct_stack(scanner_for(120, 0))
 
 
 def test_holes_outside_the_plate_are_refused():
@@ -184,7 +185,7 @@ def test_holes_outside_the_plate_are_refused():
     lidar = scanner.lidar.model_copy(update={"mount_holes_mm": ((29, 0.0), (-29, 0.0), (0.0, 29))})
     wrong = replace(scanner, lidar=lidar)
     with pytest.raises(BuildError, match="alignment_linkage: seat: mount_holes_mm"):
-        linkage_of(wrong, stack_of(wrong))
+        linkage_of(wrong, direct_stack(wrong))
 
 
 def test_no_kernel_exception_reaches_the_user_bare():
@@ -202,7 +203,6 @@ def test_no_kernel_exception_reaches_the_user_bare():
 
 
 def test_the_mount_offset_needs_no_kernel():
-    code = (
-        "import sys, cad.files.parts, cad.layout.deck; assert not {'cadquery', 'OCP', 'trimesh'} & sys.modules.keys()"
-    )
+    imports = "import sys, cad.files.part_files, cad.layout.layout"
+    code = f"{imports}; assert not {{'cadquery', 'OCP', 'trimesh'}} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cad import solids
-from cad.assembly.assembly import make_parts
+from cad import outlines, solids
 from cad.assembly.joints import joints_of, without_traps
+from cad.assembly.make import make_parts
 from cad.files.bom import items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
-from cad.layout.direct_stack import stack_of
+from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.layout.direct.cage import cage_of, has_room
+from cad.layout.direct.sizing import direct_stack
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
-from cad.parts.bearing_cage import cage_of, has_room
-from cad.parts.fit_coupon import coupon_of, fit_coupon
 from cad.screws import SCREWS, trap_of
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue
@@ -39,7 +39,7 @@ def _nut(start, along, turn_deg, length=HEIGHT):
     helper = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
     side = np.cross(helper, along) / np.linalg.norm(np.cross(helper, along))
     frame = np.stack([side, np.cross(along, side), along], axis=1)
-    outline = solids.polygon(ACROSS / math.sqrt(3), 6, math.radians(90.0 + turn_deg))
+    outline = outlines.polygon(ACROSS / math.sqrt(3), 6, math.radians(90.0 + turn_deg))
     return solids.prism(outline, 0.0, length).moved(solids.location(frame, start))
 
 
@@ -91,14 +91,14 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     grub = trapped[("alignment_linkage", "servo_shaft")]
     assert len(trapped) == 2 and (cage.count, cage.fixing, grub.count, grub.fixing) == (4, "trap", 2, "grub")
     assert cage.length_mm >= cage.grip_mm + 3.0 + HEIGHT - 0.1  # the leg, the wall, the nut
-    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), set(), "0123456789ab")
+    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 6
     text = instructions_text(scanner, assembly, joints, "0123456789ab")
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their traps" in text
     assert without_traps(PRINTER, assembly, joints) == []
     plain = [replace(cage, fixing="thread", traps=False), replace(grub, traps=False)]
     assert [finding.subject for finding in without_traps(PRINTER, assembly, plain)] == [cage.onto, grub.part]
-    stack = cage_of(scanner, assembly.stack).stack
+    stack = cage_of(scanner, assembly.layout.stack).stack
     assert has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 15.0, 1.2)
     assert not has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 7.0, 1.2)  # the ring comes down to the nut
 
@@ -107,9 +107,9 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
     setting = Angles(alpha_rot=0, beta_rot=0, alpha_laser=21, beta_laser=-21)
     angles = made.scanner.angles.model_copy(update={"angles_deg": setting, "t_world_rot_mm": (0.0, 0.0, 0.0)})
     scanner = replace(made.scanner, printer=PRINTER, angles=angles)
-    linkage = linkage_of(scanner, stack_of(scanner))
+    linkage = linkage_of(scanner, direct_stack(scanner))
     assert len(linkage.ear_screws) == 4
-    part = alignment_linkage(linkage).moved(solids.location(stack_of(scanner).R().T))  # in the laser frame
+    part = alignment_linkage(linkage).moved(solids.location(direct_stack(scanner).R().T))  # in the laser frame
     low = linkage.top - 8.0
     for x, y in linkage.ear_screws:
         floor = np.array([x, y, low + trap_of(M3, PRINTER).depth])
@@ -122,7 +122,7 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
 
 def test_the_coupon_of_such_a_profile_has_pockets(made):
     scanner = replace(made.scanner, printer=PRINTER)
-    coupon, trap = fit_coupon(coupon_of(scanner, made.result.assembly.stack)), trap_of(M3, PRINTER)
+    coupon, trap = fit_coupon(coupon_of(scanner, made.result.assembly.layout.stack)), trap_of(M3, PRINTER)
     holes = [hole for hole in rounds_of(coupon) if hole.hole and abs(hole.diameter - trap.hole) < 1e-6]
     under = sorted((h for h in holes if h.length < 4.0), key=lambda hole: hole.low[0])
     assert len(under) == 5 and {round(hole.length, 6) for hole in under} == {round(5.0 - trap.depth, 6)}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from cad.files.parts import build_parts
-from cad.layout.deck import mount_offset_mm
+from cad.files.part_files import build_parts
+from cad.layout.layout import mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of

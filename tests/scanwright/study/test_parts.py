@@ -53,7 +53,7 @@ def agrees_with_the_parts(row, task):
     """The numbers of a row by other ways: weighed solid by solid, J of the beams that get past the parts."""
     import numpy as np
 
-    from cad.assembly.assembly import make_parts
+    from cad.assembly.make import make_parts
     from cad.assembly.shadow import PartsWorkshop
     from design.angles import Angles, AngleSet
     from design.objective.problem import problem_of
@@ -67,7 +67,7 @@ def agrees_with_the_parts(row, task):
     record = AngleSet(task="ahead", angles_deg=angles, sensor="URG-04LX", servo="AX-12A", slip_ring=None, motion=motion)
     scanner = scanner_of(record, loaded.task.printer, loaded.products)
     assembly = make_parts(scanner)
-    density = {"servo_shaft": 2.7} if assembly.stack.shaft_diameter < 20 else {}  # too thin to print: aluminium
+    density = {"servo_shaft": 2.7} if assembly.layout.stack.shaft_diameter < 20 else {}  # too thin to print: aluminium
     made = sum(s.Volume() / 1000 * density.get(n, scanner.printer.density_g_cm3) for n, s in assembly.made.items())
     assert float(row["mass_g"]) == pytest.approx(made + loaded.lidar.mass_g + loaded.servo.mass_g, rel=1e-4)
     assert float(row["cost_usd"]) == loaded.lidar.price_usd + loaded.servo.price_usd

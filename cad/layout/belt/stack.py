@@ -2,7 +2,7 @@
 
 The servo stands beside the shaft; its belt is toothed and 1:1, so that its absolute angle stays that of the axis.
 
-Rotation frame at gamma = 0, mm, from the hub of `cad/head.py` downwards:
+Rotation frame at gamma = 0, mm, from the hub of `cad/layout/hub.py` downwards:
 
     hub_bottom        the shaft's spigot begins, which ends in the hub as in direct drive
     pulley_top        LEADS_GAP below: the leads leave the shaft between
@@ -22,26 +22,21 @@ centres, on which the plate slides: `centre` is the distance at which the belt i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.direct_stack import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
-from cad.layout.head import BEARING_STEP, HUB_WALL, Head
+from cad.layout.hub import BEARING_STEP, Hub
 from cad.screws import SCREWS
-from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo, SlipRing
-from design.errors import BuildError
+from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
 from design.frames import Array
-from design.scanner import Scanner
 
 GRUB = SCREWS["M3"]  # of pulley and ring on the shaft
+GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat
 PLATE_SCREW = SCREWS["M4"]
 FOOT_SCREW = SCREWS["M3"]  # between tower and mount
-SPIGOT_DIAMETER = 12.0  # as in direct drive: a wider hub would hide more
 LEADS_GAP = 14.0  # between hub and pulley
-SHAFT_WALL = 4.0  # least, around the bore
 SLIDES = 0.04  # of the shaft in its bearings: the lower end of f7, which slides in by hand
-TUBE_WALL = 2.5  # of the soft tube between rotor and bore
 SPAN = 30.0  # between the middles of the two bearings
 BOSS = 9.0  # height of the pulley's boss, and of the ring under the lower bearing
 BOSS_WALL = 9.0  # around the shaft: thread length of the grub screws
@@ -66,14 +61,10 @@ CASE_ROOM = 2.0  # around the servo's case, beyond the travel
 FOOT = 10.0  # thickness of the tower's foot
 FOOT_HALF = 32.0  # of its square
 FOOT_HOLE = 24.0  # x and y of its screws
-SWEEP_MARGIN = 3.0  # between the turning lidar and the deck
-TEETH_STEP = 10
-TEETH_LEAST = 80  # a smaller pulley makes more of its run-out
-QUARTERS = (3, 2, 0)  # not 1: there the shelf would hide the index groove at +y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BeltStack(Head):
+class BeltStack(Hub):
     """The hollow shaft along its axis, and the servo beside it. Lengths in mm."""
 
     shaft_bore: float
@@ -267,61 +258,10 @@ class BeltStack(Head):
         """Where the horn's axis meets its face, rotation frame, shape (3,)."""
         return self.turn() @ [self.centre, 0.0, self.horn]
 
-
-def belt_stack_of(scanner: Scanner) -> BeltStack:
-    """Lay out the scanner of a capsule ring.
-
-    Raises:
-        BuildError: no bearing or belt of the catalogue fits the capsule, or the lidar would hang upside down.
-    """
-    ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
-    assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
-    bore = ring.rotor.diameter_mm + 2 * TUBE_WALL
-    carrier = _carrier(scanner, ring, bore + 2 * SHAFT_WALL)
-    belt = _belt(scanner, ring)
-    hub = SPIGOT_DIAMETER / 2 + HUB_WALL
-    alone = BeltStack(
-        h=hub_height(scanner.lidar, R, hub, 0.0, None),
-        R_rot_laser=rows_of(R),
-        ring_length=ring.length_mm,
-        ring_radius=ring.outer_diameter_mm / 2,
-        shaft_diameter=SPIGOT_DIAMETER,
-        shaft_bore=bore,
-        bearing=None,
-        sub_plate=None,
-        carrier=carrier,
-        belt=belt,
-        belt_teeth=belt.teeth[-1],
-        teeth=TEETH_LEAST,
-        centre=0.0,
-        quarter=0,
-        flange=ring.flange,
-        rotor=ring.rotor,
-        servo=servo,
-    )
-    _check_tower(alone, ring, scanner)
-    teeth = TEETH_LEAST
-    while replace(alone, teeth=teeth).tip_radius - belt.tooth_height_mm < alone.boss_radius + 1.0:
-        teeth += TEETH_STEP
-    alone = replace(alone, teeth=teeth)
-    least = _least_centre(alone, servo)
-    stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
-    if not stock:
-        raise BuildError(
-            f"drive_pulley: centre distance >= {least:.1f} mm: the longest {belt.name} of the catalogue has "
-            f"{max(belt.teeth)} teeth and reaches {centre_of(max(belt.teeth), teeth, belt.pitch_mm):.1f}; add a longer "
-            "one to its teeth"
-        )
-    stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
-    if covered_screws(scanner.lidar, stack):
-        axis = leaning_least(R)
-        stack = replace(stack, h=hub_height(scanner.lidar, R, hub, 0.0, axis), sub_plate=axis)
-    return replace(stack, quarter=_quarter(scanner, stack))
-
-
-def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
-    """Centre distance at which a belt is tight around two equal pulleys: half of it goes around them."""
-    return (belt_teeth - teeth) * pitch_mm / 2
+    @property
+    def horn_axis(self) -> tuple[float, float]:
+        """Where the horn's axis meets the plane z = 0."""
+        return float(self.beside()[0]), float(self.beside()[1])
 
 
 def case_corners(stack: BeltStack) -> Array:
@@ -338,55 +278,3 @@ def drive_corners(stack: BeltStack) -> Array:
     shelf = [(x, y, z) for x in (0.0, reach) for y in (low, high) for z in (stack.tower_top - SHELF, stack.tower_top)]
     pulley = [(stack.centre + a * rim, b * rim, stack.teeth_top) for a in (1, -1) for b in (1, -1)]
     return np.concatenate([case_corners(stack), np.array([*shelf, *pulley]) @ stack.turn().T])
-
-
-def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
-    fitting = next((bearing for bearing in scanner.bearings if bearing.bore_mm >= least), None)
-    if fitting is None:
-        most = max((bearing.bore_mm for bearing in scanner.bearings), default=0.0)
-        raise BuildError(
-            f"bearing_tower: slip_ring {ring.name}: rotor.diameter_mm = {least - 2 * (TUBE_WALL + SHAFT_WALL):g}: its "
-            f"shaft needs bearings with bore_mm >= {least:g}, the largest of the catalogue has {most:g}; add one, or "
-            "take a smaller capsule"
-        )
-    return fitting
-
-
-def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
-    if not scanner.belts:
-        raise BuildError(
-            f"drive_pulley: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
-            "catalogue has none; add a product of kind = 'belt'"
-        )
-    return scanner.belts[0]
-
-
-def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
-    """The screws of the tower's foot stand around the capsule's chamber."""
-    corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
-    if stack.chamber_radius > corner:
-        most = 2 * (corner - RING_ROOM)
-        raise BuildError(
-            f"bearing_tower: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
-            f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
-        )
-
-
-def _least_centre(stack: BeltStack, servo: Servo) -> float:
-    """Shortest centre distance: case beside the tower, and pulleys beside each other, with the belt put on."""
-    case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
-    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
-
-
-def _quarter(scanner: Scanner, stack: BeltStack) -> int:
-    """The side of the axis where the servo asks for the lowest deck; of equal ones, beside the axis and not above."""
-    up = scanner.angles.T_world_rot(0.0)[2, :3]
-    normal = up if up[2] >= -1e-6 else -up
-    rotor = rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN
-
-    def asks(quarter: int) -> tuple[float, float]:
-        turned = replace(stack, quarter=quarter)
-        below = max(rotor, float((drive_corners(turned) @ -normal).max()))
-        return round(below, 3), round(abs(float(turned.turn()[:, 0] @ normal)), 3)
-
-    return min(QUARTERS, key=asks)

@@ -5,18 +5,15 @@ Importing this module is cheap; the kernel is imported when something is built.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cad.checks.remarks import findings_of, left_out_of
-from cad.drives.drive import drive_of
-from cad.findings import Finding
+from cad.findings import PartFinding
 from cad.kernel import require_kernel
-from cad.layout.deck import deck_of
+from cad.layout.layout import config_hash, mount_offset_mm
+from cad.layout.names import BASE_MOUNT
 from design.errors import BuildError
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -55,7 +52,7 @@ class PartsResult:
     meshes: dict[str, Mesh]
     t_world_rot_mm: tuple[float, float, float]
     parts: tuple[PartReport, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[PartFinding, ...]
     left_out: tuple[LeftOut, ...]
     files: tuple[str, ...]
 
@@ -66,22 +63,23 @@ def build_parts(
     """Make every part and write it into a build folder.
 
     Args:
-        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `deck.mount_offset_mm`, or zero.
+        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `layout.mount_offset_mm`, or zero.
         folder: the build folder; `parts/` is made in it.
         progress: called with a line of text before each step.
-        make: who makes the parts, `assembly.make_parts` or one that may have them already.
+        make: who makes the parts, `make.make_parts` or one that may have them already.
 
     Raises:
         InstallError: the CAD kernel is not installed.
         BuildError: a part cannot be made, or the angle set names another place of the optical centre.
     """
-    drive = drive_of(scanner)  # refuse what cannot be built before seconds go into the kernel
-    deck = deck_of(scanner, drive.stack)
-    _check_offset(scanner, deck.t_world_rot)
+    offset = mount_offset_mm(scanner)  # refuses what cannot be built before seconds go into the kernel
+    _check_offset(scanner, offset)
     progress("loading the CAD kernel")
     require_kernel("the making of parts")
-    from cad.assembly.assembly import alone, as_tree, make_parts
-    from cad.assembly.masses import density_g_cm3, link_bodies
+    from cad.assembly.assembly import alone, as_tree
+    from cad.assembly.make import make_parts
+    from cad.assembly.masses import link_bodies
+    from cad.checks.remarks import findings_of, left_out_of
     from cad.files.step import step_text
     from cad.files.urdf import urdf_text
     from cad.geometry.mesh import checked, stl_bytes
@@ -97,21 +95,23 @@ def build_parts(
     labels = labelled_parts(scanner, assembly, digest)
     for name, solid in (assembly.made | labels.parts).items():
         progress(f"meshing and writing {name}")
+        part = assembly.parts[name]
         mesh = labels.meshes[name] if name in labels.meshes else checked(assembly.mesh(name), solid, name)
         meshes_of_parts[name] = mesh
-        files[f"parts/{name}.step"] = step_text(alone(name, solid), f"{name} config={digest}").encode("ascii")
+        text = step_text(alone(name, solid, part.colour), f"{name} config={digest}")
+        files[f"parts/{name}.step"] = text.encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
-        reports.append(_report(name, solid.Volume(), density_g_cm3(name, scanner, assembly), mesh))
+        reports.append(_report(name, solid.Volume(), part.density_g_cm3(scanner.printer), mesh))
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(scanner, assembly)
     meshes = {"servo": assembly.standing_parts(), "rot": assembly.turning_parts()}
-    files["scanner.urdf"] = urdf_text(scanner, drive, bodies, meshes).encode("utf-8")
+    files["scanner.urdf"] = urdf_text(scanner, assembly.layout.drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
     return PartsResult(
         assembly=assembly,
         meshes=meshes_of_parts,
-        t_world_rot_mm=deck.t_world_rot,
+        t_world_rot_mm=offset,
         parts=tuple(reports),
         findings=(*findings_of(scanner, assembly, bodies), *labels.findings),
         left_out=(*left_out_of(assembly), *labels.left_out),
@@ -127,27 +127,6 @@ def write_files(folder: Path, files: dict[str, bytes]) -> None:
         path.write_bytes(content)
 
 
-def config_hash(scanner: Scanner) -> str:
-    """Twelve hex digits of everything that shapes the parts: angles, products, and the name on their labels; not J."""
-    angles, drive = scanner.angles, drive_of(scanner)
-    # the journal's bearing has had its place in the list since before there were others
-    others: list[dict[str, Any] | None] = [
-        product.model_dump() for product in drive.products() if product != drive.stack.bearing
-    ]
-    content = {
-        "task": angles.task,
-        "angles": angles.angles_deg.model_dump(),
-        "delta": angles.delta_rotvec_rot_deg,
-        "deck": None if scanner.deck is None else scanner.deck.model_dump(),
-        "products": [
-            None if product is None else product.model_dump()
-            for product in (scanner.lidar, scanner.servo, scanner.slip_ring, drive.stack.bearing, scanner.printer)
-        ]
-        + others,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]
-
-
 def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
@@ -158,6 +137,6 @@ def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:
     given = scanner.angles.t_world_rot_mm
     if any(given) and max(abs(a - b) for a, b in zip(given, offset, strict=True)) > 1e-3:
         raise BuildError(
-            f"base_mount: t_world_rot_mm = {list(given)}: the mount of these angles puts the optical centre at "
+            f"{BASE_MOUNT}: t_world_rot_mm = {list(given)}: the mount of these angles puts the optical centre at "
             f"{list(offset)}; build the angle set again, or set it to 0"
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from cad.layout.direct_stack import PLATE_THICKNESS, Box
+from cad.layout.envelope import PLATE_THICKNESS, Box
 from cad.layout.linkage import AlignmentLinkage
 from design.frames import Array
 

@@ -6,16 +6,15 @@ import math
 
 import numpy as np
 
-from cad.layout.direct_stack import PLATE_THICKNESS
-from cad.layout.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.envelope import PLATE_THICKNESS
 from cad.layout.linkage import AlignmentLinkage, neck_corners
-from cad.layout.loads import STANDARD_GRAVITY, tilt_sine
+from cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
 from design.frames import Array
 from design.motion import Sweep
 from design.scanner import Scanner
 
 CELL = 2.0
-FAR_MM = 10_000.0  # where play is compared with the noise of the ranges
 
 
 def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:

@@ -1,12 +1,11 @@
 """The upper end of every scanner: the hub that carries the linkage on its shaft, whatever drives it. Plain numpy.
 
-What is below the hub is a layout of its own: `cad/layout/direct_stack.py` with the servo on the axis,
-`cad/layout/belt_stack.py` with it beside the axis.
+What is below the hub is a layout of its own: `cad/layout/direct/` with the servo on the axis, `cad/layout/belt/` with
+it beside the axis.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +26,7 @@ Axis = Literal["x", "y"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Head(ABC):
+class Hub:
     """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
 
     Where the hub would cover a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
@@ -86,31 +85,6 @@ class Head(ABC):
     def flat(self) -> float:
         """Distance from the axis of the flat that keys the spigot."""
         return self.shaft_diameter / 2 - 1.0
-
-    @property
-    @abstractmethod
-    def ring_top(self) -> float:
-        """Height of the ring's upper face."""
-
-    @property
-    @abstractmethod
-    def ring_bottom(self) -> float:
-        """Height of the ring's lower face."""
-
-    @property
-    @abstractmethod
-    def horn(self) -> float:
-        """Height of the servo's horn face."""
-
-    @property
-    @abstractmethod
-    def shadow_half_angle(self) -> float:
-        """Half angle [rad] of the cone about -z that what stands still hides from the optical centre, all around."""
-
-    @property
-    @abstractmethod
-    def sure_half_angle(self) -> float:
-        """Half angle [rad] of that cone by solids of revolution only, a little inside their edges."""
 
     def R(self) -> Array:
         """Laser in the rotation frame, shape (3, 3)."""

@@ -15,17 +15,17 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from cad import solids
+from cad import outlines, solids
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at
 from cad.labels.glyphs import letters, text_width
-from cad.layout.head import Head
+from cad.layout.hub import Hub
+from cad.layout.names import FIT_COUPON
 from cad.screws import SCREWS, Trap, trap_of
 from cad.solids import building, checked
 from design.frames import Array
 from design.scanner import Scanner
 
-PART = "fit_coupon"
 NUT = SCREWS["M3"]  # that the parts trap
 THICKNESS = 5.0
 LETTER = 4.5
@@ -48,7 +48,7 @@ class FitCoupon:
     trap: Trap | None
 
 
-def coupon_of(scanner: Scanner, stack: Head) -> FitCoupon:
+def coupon_of(scanner: Scanner, stack: Hub) -> FitCoupon:
     """Parameters of the coupon of one scanner's printer."""
     printer = scanner.printer
     fits = _around(printer.fit_clearance_mm)
@@ -84,18 +84,18 @@ def fit_coupon(p: FitCoupon) -> cq.Solid:
             bore = nominal + fit if trap is None else trap.hole
             holes.append(solids.upright(bore / 2, -1.0, THICKNESS + 1.0, x, middle))
             if trap is not None:
-                pocket = solids.polygon((nominal + fit) / math.sqrt(3), 6)
+                pocket = outlines.polygon((nominal + fit) / math.sqrt(3), 6)
                 holes.append(solids.prism(pocket + np.array([x, middle]), THICKNESS - trap.depth, THICKNESS + 1.0))
             mark = f"{fit:.2f}".rstrip("0").ljust(3, "0")
             words.append((mark, x - text_width(mark, LETTER) / 2, y))
-    with building(PART, "plate and holes", "rows", len(p.rows)):
+    with building(FIT_COUPON, "plate and holes", "rows", len(p.rows)):
         plate = solids.box((0.0, 0.0, 0.0), (width, depth, THICKNESS)).cut(*holes)
-        plate = checked(plate, PART, "plate and holes", "rows", len(p.rows))
-    with building(PART, "lettering", "title", p.title):
+        plate = checked(plate, FIT_COUPON, "plate and holes", "rows", len(p.rows))
+    with building(FIT_COUPON, "lettering", "title", p.title):
         top = flat_at(plate, np.array([0.5, 0.5, THICKNESS]), np.array([0.0, 0.0, 1.0]))
         assert top is not None
-        outlines = [outline for word in words for outline in _letters(*word, p.groove.width, top)]
-        return checked(engrave(plate, [(top, outlines)], p.groove.depth), PART, "lettering", "title", p.title)
+        grooves = [outline for word in words for outline in _letters(*word, p.groove.width, top)]
+        return checked(engrave(plate, [(top, grooves)], p.groove.depth), FIT_COUPON, "lettering", "title", p.title)
 
 
 def _letters(text: str, x: float, y: float, stroke: float, top: Flat) -> list[shapely.Polygon]:

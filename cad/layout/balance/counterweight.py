@@ -15,20 +15,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.layout.deck import FOOT_THICKNESS, FREE, Deck, deck_of
-from cad.layout.direct_stack import Stack, rotor_radius
-from cad.layout.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from cad.layout.head import CLAMP_ABOVE_BOTTOM
-from cad.layout.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.balance.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from cad.layout.deck import FOOT_THICKNESS, FREE, Deck
+from cad.layout.direct.loads import horn_bears, horn_bears_balanced
+from cad.layout.direct.stack import DirectStack
+from cad.layout.envelope import rotor_radius
+from cad.layout.hub import CLAMP_ABOVE_BOTTOM
 from cad.layout.linkage import CLAMP_DRIVER, AlignmentLinkage, Ear, neck_corners
-from cad.layout.loads import horn_bears, horn_bears_balanced, tilt_sine
+from cad.layout.loads import STEEL_G_CM3, tilt_sine
+from cad.layout.names import COUNTERWEIGHT
 from cad.screws import SCREWS
 from design.frames import Array
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
-PART = "counterweight"
-STEEL_G_CM3 = 7.85
 # bright steel bar as it is sold (EN 10278), across and along the axis, lightest first
 SECTIONS = (
     (8, 8),
@@ -101,11 +102,12 @@ class Counterweight:
         return replace(self, length=SAW * round(length / SAW))
 
 
-def counterweight_of(scanner: Scanner, linkage: AlignmentLinkage) -> Counterweight | LeftOut:
+def counterweight_of(scanner: Scanner, deck: Deck, linkage: AlignmentLinkage) -> Counterweight | LeftOut:
     """The lightest bar that balances the rotor and has room, or why there is none.
 
     Args:
         scanner: angles and products.
+        deck: that the bar must stay clear of.
         linkage: without an ear.
     """
     if not play_matters(scanner):
@@ -118,7 +120,7 @@ def counterweight_of(scanner: Scanner, linkage: AlignmentLinkage) -> Counterweig
     if keeps_flank(scanner, moment):
         return _without("all over the sweep gravity keeps the gears on one flank")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
-    deck, neck, fault = deck_of(scanner, linkage.stack), neck_corners(linkage, 0), ""
+    neck, fault = neck_corners(linkage, 0), ""
     for section in SECTIONS:
         bar = _bar(scanner, linkage, azimuth, section)
         bar = bar.balancing(moment + _ear_moment(scanner, linkage, bar.ear))
@@ -132,7 +134,7 @@ def counterweight_of(scanner: Scanner, linkage: AlignmentLinkage) -> Counterweig
 
 
 def _without(why: str) -> LeftOut:
-    return LeftOut(PART, why, 1, "parts")
+    return LeftOut(COUNTERWEIGHT, why, 1, "parts")
 
 
 def _direction(azimuth: float) -> Array:
@@ -172,7 +174,7 @@ def _fault(scanner: Scanner, linkage: AlignmentLinkage, deck: Deck, neck: Array,
     rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
     if _height_over(deck, rims) < FOOT_THICKNESS + FREE / 2:
         return "would come too near to the deck"
-    if isinstance(stack, Stack) and _overloads(scanner, stack, bar):
+    if isinstance(stack, DirectStack) and _overloads(scanner, stack, bar):
         return f"would be more than the horn of {scanner.servo.name} bears alone"
     of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
     of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
@@ -190,7 +192,7 @@ def _fault(scanner: Scanner, linkage: AlignmentLinkage, deck: Deck, neck: Array,
     return ""
 
 
-def _overloads(scanner: Scanner, stack: Stack, bar: Counterweight) -> bool:
+def _overloads(scanner: Scanner, stack: DirectStack, bar: Counterweight) -> bool:
     """Whether it is the bar that makes the rotor too heavy for a horn without a bearing."""
     if stack.bearing is not None or not horn_bears(scanner, stack):
         return False

@@ -11,14 +11,15 @@ from cad.drawings.files import drawing_files
 from cad.files.bom import bom_text, items_of
 from cad.files.glb_scenes import scene_files
 from cad.files.instructions import instructions_text
-from cad.files.parts import PartsResult, config_hash, write_files
+from cad.files.part_files import PartsResult, write_files
 from cad.files.threemf import threemf_bytes
-from cad.findings import Finding
+from cad.findings import PartFinding
 from cad.geometry.holes import rounds_of
 from cad.geometry.mesh import Mesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
-from cad.parts.fit_coupon import PART as FIT_COUPON
-from cad.parts.fit_coupon import coupon_of, fit_coupon
+from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.layout.layout import config_hash
+from cad.layout.names import FIT_COUPON
 from design.concurrency.second_process import Begin, in_turn
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -30,7 +31,7 @@ class Exports:
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[PartFinding, ...]
 
 
 def export_scanner(
@@ -40,27 +41,26 @@ def export_scanner(
 
     Args:
         scanner: angles and products.
-        made: its parts, of `build.build_parts`.
+        made: its parts, of `part_files.build_parts`.
         folder: the build folder.
         progress: called with a line of text before each step.
         begin: who draws the parts.
     """
     assembly, digest = made.assembly, config_hash(scanner)
     masses = {report.name: report.mass_g for report in made.parts}
-    metal = set(assembly.metal())
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     joints = joints_of(scanner, assembly, rounds)
     progress("drawing the parts")
-    drawn = begin(drawing_files, scanner, assembly, rounds, joints, masses, metal, digest)
+    drawn = begin(drawing_files, scanner, assembly, rounds, masses, digest)
     progress("writing print files")
-    files, left_out = _prints(scanner, made.meshes, metal, digest)
+    files, left_out = _prints(scanner, made.meshes, assembly.metal(), digest)
     progress("making the fit coupon")
-    coupon = fit_coupon(coupon_of(scanner, assembly.stack))
+    coupon = fit_coupon(coupon_of(scanner, assembly.layout.stack))
     files |= _print_file(scanner, FIT_COUPON, checked_mesh(coupon, FIT_COUPON), digest)
     progress("writing assembly.glb and exploded.glb")
-    files |= scene_files(scanner, assembly, made.meshes, digest, metal)
+    files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv and assembly.md")
-    items = items_of(scanner, assembly, joints, masses, metal, digest)
+    items = items_of(scanner, assembly, joints, masses, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
     files |= drawn()
@@ -70,7 +70,7 @@ def export_scanner(
 
 
 def _prints(
-    scanner: Scanner, meshes: dict[str, Mesh], metal: set[str], digest: str
+    scanner: Scanner, meshes: dict[str, Mesh], metal: frozenset[str], digest: str
 ) -> tuple[dict[str, bytes], list[LeftOut]]:
     """`print/<part>.3mf` of every printed part."""
     files: dict[str, bytes] = {}

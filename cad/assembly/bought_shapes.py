@@ -1,0 +1,148 @@
+"""Shapes of bought products, true to size as far as the catalogue knows them. Millimetres.
+
+The lidar is made in its body frame (origin on the base at the optical axis, x to the front, z up), the servo with its
+horn's axis as z, ring, bearing and belt in the rotation frame at gamma = 0. The teeth of the belt are left out: they
+fill the grooves of the pulleys; so are the balls of a bearing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cadquery as cq
+
+from cad import outlines, solids
+from cad.layout.belt.stack import BeltStack
+from cad.layout.belt.tower import flange_centres
+from cad.layout.direct.stack import DirectStack
+from cad.layout.joints import horn_thread_mm, lidar_thread_mm
+from cad.layout.names import BELT, RING_STATOR
+from cad.screws import SCREWS
+from cad.solids import building, checked
+from design.catalogue.products import Bearing, Lidar, Servo
+
+CAP_INSET = 1.5
+EAR_ROOM = 3.6  # radius of the recess around a case hole
+BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
+STUB = 0.4  # between the stub of a capsule's rotor and its body
+
+
+def lidar_body(lidar: Lidar) -> cq.Solid:
+    """Below the window, with its threaded holes."""
+    half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
+    radius = SCREWS[lidar.mount_screw].nominal / 2
+    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.mount_holes_mm]
+    return solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low)).cut(*threads).Solids()[0]
+
+
+def lidar_window(lidar: Lidar) -> cq.Solid:
+    """Where the beams leave."""
+    return solids.upright(lidar.window_radius_mm, *lidar.window_z_mm)
+
+
+def lidar_cap(lidar: Lidar) -> cq.Solid:
+    """Above the window."""
+    return solids.upright(min(lidar.body_mm[:2]) / 2 - CAP_INSET, lidar.window_z_mm[1], lidar.body_mm[2])
+
+
+def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
+    """The straight stub of the cable that leaves at a y."""
+    start = (-lidar.body_mm[0] / 2, y, lidar.cable_z_mm)
+    return solids.cylinder(lidar.cable_diameter_mm / 2, start, (-1.0, 0.0, 0.0), lidar.cable_straight_mm)
+
+
+def servo_case(servo: Servo, z: float) -> cq.Solid:
+    """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
+    (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
+    recesses = [
+        solids.upright(EAR_ROOM, z + servo.case_holes_z_mm, z + z1 + 1.0, *hole) for hole in servo.case_holes_mm
+    ]
+    recesses += [
+        solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.case_rear_holes_z_mm, *hole)
+        for hole in servo.case_rear_holes_mm
+    ]
+    return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
+
+
+def servo_horn(servo: Servo, z: float) -> cq.Solid:
+    """The horn's disc with its threaded holes and boss, its face at height z."""
+    disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
+    radius = SCREWS[servo.horn_screw].nominal / 2
+    first, low = math.radians(90.0 + servo.horn_first_hole_deg), z - horn_thread_mm(servo)
+    centres = outlines.polygon(servo.horn_circle_mm / 2, servo.horn_holes, first)
+    disc = disc.cut(*(solids.upright(radius, low, z + 1.0, float(x), float(y)) for x, y in centres))
+    if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
+        disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))
+    return disc.Solids()[0]
+
+
+def ring_stator(stack: DirectStack) -> cq.Solid:
+    """Of a through-bore ring; the split to its rotor is not in any drawing."""
+    low, high = stack.ring_bottom, stack.ring_top
+    stator = solids.upright(stack.ring_radius, low + 1.0, high - 1.0)
+    return stator.cut(solids.upright(_split(stack), low - 1.0, high + 1.0)).Solids()[0]
+
+
+def ring_rotor(stack: DirectStack) -> cq.Solid:
+    """Of a through-bore ring."""
+    low, high = stack.ring_bottom, stack.ring_top
+    rotor = solids.upright(_split(stack) - 0.2, low, high)
+    return rotor.cut(solids.upright(stack.ring_bore / 2, low - 1.0, high + 1.0)).Solids()[0]
+
+
+def _split(stack: DirectStack) -> float:
+    bore = stack.ring_bore / 2
+    return bore + 0.4 * (stack.ring_radius - bore)
+
+
+def bearing_inner(bearing: Bearing, high: float) -> cq.Solid:
+    """Inner ring, its upper face at a height."""
+    inner = bearing.bore_mm / 2
+    return _tube(inner, inner + _race(bearing), high - bearing.width_mm, high)
+
+
+def bearing_outer(bearing: Bearing, high: float) -> cq.Solid:
+    """Outer ring, its upper face at a height."""
+    outer = bearing.outer_mm / 2
+    return _tube(outer - _race(bearing), outer, high - bearing.width_mm, high)
+
+
+def _race(bearing: Bearing) -> float:
+    return 0.3 * (bearing.outer_mm / 2 - bearing.bore_mm / 2)
+
+
+def _tube(inner: float, outer: float, low: float, high: float) -> cq.Solid:
+    return solids.lathe([(inner, low), (outer, low), (outer, high), (inner, high)])
+
+
+def capsule(stack: BeltStack) -> cq.Solid:
+    """Body and flange, hollow where the rotor's stub comes out."""
+    flange = stack.flange
+    with building(RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm):
+        body = solids.upright(stack.ring_radius, stack.ring_bottom, stack.ring_top).fuse(
+            solids.upright(flange.diameter_mm / 2, stack.disc_top, stack.flange_top)
+        )
+        low, high = stack.disc_top - 1.0, stack.flange_top + 1.0
+        holes = [solids.upright(flange.hole_mm / 2, low, high, x, y) for x, y in flange_centres(stack)]
+        capsule = checked(body.cut(*holes), RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm)
+    return capsule.moved(solids.location(stack.turn()))
+
+
+def capsule_rotor(stack: BeltStack) -> cq.Solid:
+    """The stub that the soft tube goes on."""
+    return solids.upright(stack.rotor.diameter_mm / 2, stack.ring_top + STUB, stack.ring_top + stack.rotor.length_mm)
+
+
+def belt(stack: BeltStack) -> cq.Solid:
+    """Its back, around both pulleys."""
+    half = stack.belt.width_mm / 2
+    low, high = stack.belt_middle - half, stack.belt_middle + half
+    inner, outer = stack.tip_radius + BELT_GAP, stack.belt_radius + BELT_GAP
+    with building(BELT, "loop", "centre distance", stack.centre):
+        loops = []
+        for radius, beyond in ((outer, 0.0), (inner, 1.0)):
+            ends = [solids.upright(radius, low - beyond, high + beyond, x) for x in (0.0, stack.centre)]
+            middle = solids.box((0.0, -radius, low - beyond), (stack.centre, radius, high + beyond))
+            loops.append(middle.fuse(*ends).clean())
+        back = checked(loops[0].cut(loops[1]), BELT, "loop", "centre distance", stack.centre)
+    return back.moved(solids.location(stack.turn()))

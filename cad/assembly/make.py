@@ -1,0 +1,49 @@
+"""Making the parts of one scanner, and the bought bodies around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from cad.assembly.assembly import Assembly
+from cad.assembly.bought import BodySpec, bought_of
+from cad.assembly.masses import rotor_moment
+from cad.layout.layout import layout_of
+from cad.layout.names import COUNTERWEIGHT
+from cad.parts.all_parts import parts_of
+from cad.parts.counterweight import counterweight_spec
+from cad.parts.part_spec import PartSpec
+from design.left_out import LeftOut
+from design.scanner import Scanner
+
+Wanted = Callable[[PartSpec | BodySpec], bool]
+
+
+def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
+    """Make every part that this scanner needs, and the bought ones around them; of these, those that are wanted.
+
+    Raises:
+        BuildError: a part cannot be made; the message names part, feature, parameter and value.
+    """
+    layout = layout_of(scanner)
+    parts = {spec.name: spec for spec in parts_of(layout)}
+    bodies = {spec.name: spec for spec in bought_of(layout)}
+    last = parts.pop(COUNTERWEIGHT, None)
+    made = {name: spec.make() for name, spec in parts.items() if wanted(spec)}
+    bought = {name: spec.make() for name, spec in bodies.items() if wanted(spec)}
+    assembly = Assembly(layout, parts, bodies, made, bought)
+    return assembly if last is None or not wanted(last) else _balanced(assembly)
+
+
+def _balanced(assembly: Assembly) -> Assembly:
+    """With the counterweight, cut to the solids; without linkage and sub-plate, to their estimate."""
+    layout = assembly.layout
+    bar = layout.counterweight
+    assert not isinstance(bar, LeftOut)
+    if len(assembly.carriers()) == sum(part.seat is not None for part in assembly.parts.values()):
+        bar = bar.balancing(rotor_moment(layout.scanner, assembly))
+    layout = replace(layout, counterweight=bar)
+    spec = counterweight_spec(layout)
+    assert spec is not None
+    parts, made = assembly.parts | {spec.name: spec}, assembly.made | {spec.name: spec.make()}
+    return replace(assembly, layout=layout, parts=parts, made=made)

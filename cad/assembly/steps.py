@@ -1,0 +1,46 @@
+"""The steps of putting a scanner together, in the order that always works: those of its parts and of what is bought."""
+
+from __future__ import annotations
+
+from cad.assembly.assembly import Assembly
+from cad.layout.belt.stack import BeltStack
+from cad.layout.joints import screws
+from cad.layout.layout import Layout
+from cad.layout.names import BEARING_TOWER, DECK, LIDAR, LIDAR_BODY, RING, SERVO_CASE, SLIP_RING_ADAPTER
+from cad.parts.part_spec import Step
+
+ON_DECK = Step(
+    "Servo on the deck",
+    "The axis stands upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
+    f"{screws(SERVO_CASE, DECK)} Leave room for the plugs.",
+)
+LIDAR_STEP = Step(
+    "Lidar on its seat",
+    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables over the square "
+    f"notch. {screws(LIDAR_BODY)}",
+)
+RING_STEP = Step(
+    "Slip ring",
+    "Lower the ring over the shaft, the rotor's leads upwards, and clamp its rotor to the shaft with its own set "
+    "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
+)
+CAPSULE_STEP = Step(
+    "Capsule into the tower",
+    "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
+    f"below until the soft tube sits in the shaft. {screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
+)
+
+
+def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
+    """Part or product that a step puts in, and the step."""
+    steps = {name: assembly.parts[name].step for name in assembly.made} | _of_bought(assembly.layout)
+    return sorted(steps.items(), key=lambda item: assembly.layout.drive.built.index(item[0]))
+
+
+def _of_bought(layout: Layout) -> dict[str, Step]:
+    steps = {LIDAR: LIDAR_STEP}
+    if layout.scanner.slip_ring is not None:
+        steps[RING] = CAPSULE_STEP if isinstance(layout.stack, BeltStack) else RING_STEP
+    if layout.deck.flat:
+        steps[DECK] = ON_DECK
+    return steps

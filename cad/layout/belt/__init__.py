@@ -1,0 +1,1 @@
+"""The servo beside the axis, for capsule rings: hollow shaft in two bearings, and a belt."""

@@ -1,0 +1,106 @@
+"""The servo beside the axis, for capsule rings, as a `Drive`: belt, hollow shaft, tower."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cad.layout import names
+from cad.layout.belt.sizing import belt_stack
+from cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
+from cad.layout.drive import Block, Drive, Mass, Mounted, Rod
+from design.frames import Array
+from design.left_out import LeftOut
+from design.scanner import Scanner
+
+BUILT = (
+    names.SLIP_RING_ADAPTER,
+    names.BEARING_TOWER,
+    names.SHAFT_PULLEY,
+    names.MAIN_SHAFT,
+    names.SHAFT_RING,
+    names.RING,
+    names.DRIVE_PLATE,
+    names.DRIVE_PULLEY,
+    names.BASE_MOUNT,
+    names.LIDAR,
+    names.SUB_PLATE,
+    names.COUNTERWEIGHT,
+    names.ALIGNMENT_LINKAGE,
+)
+STACKED = (
+    names.BASE_MOUNT,
+    names.SLIP_RING_ADAPTER,
+    names.RING,
+    names.SHAFT_RING,
+    names.BEARING_TOWER,
+    names.BEARING,
+    names.MAIN_SHAFT,
+    names.SERVO,
+    names.DRIVE_PLATE,
+    names.DRIVE_PULLEY,
+    names.BELT,
+    names.SHAFT_PULLEY,
+    names.ALIGNMENT_LINKAGE,
+)
+SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
+RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
+
+
+def belt_drive(scanner: Scanner) -> Drive:
+    """The drive of a scanner with a capsule ring.
+
+    Raises:
+        BuildError: it cannot be laid out.
+    """
+    stack, ring = belt_stack(scanner), scanner.slip_ring
+    assert ring is not None
+    corners = case_corners(stack)
+    case = _block(corners.min(axis=0), corners.max(axis=0))
+    capsule = Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top)
+    outer, half = stack.carrier.outer_mm / 2, stack.carrier.width_mm / 2
+    bearings = [Rod(outer, middle - half, middle + half) for middle in (stack.upper_middle, stack.lower_middle)]
+    return Drive(
+        stack=stack,
+        shaft=names.MAIN_SHAFT,
+        products=(stack.carrier, stack.carrier, stack.belt),
+        mounted=_mounted(stack),
+        masses=(
+            Mass(stack.servo.mass_g, case),
+            Mass(stack.belt.mass_g, _around_belt(stack)),
+            Mass(ring.mass_g, capsule.block(), turning=0.5),
+            *(Mass(stack.carrier.mass_g, bearing.block(), turning=0.5) for bearing in bearings),
+        ),
+        shapes=(case, capsule),
+        built=BUILT,
+        stacked=STACKED,
+        left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
+        ring_needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
+    )
+
+
+def _mounted(stack: BeltStack) -> Mounted:
+    """The tower."""
+    foot = [(x, y, stack.tower_bottom) for x in (-FOOT_HALF, FOOT_HALF) for y in (-FOOT_HALF, FOOT_HALF)]
+    return Mounted(
+        onto=names.BEARING_TOWER,
+        rear=stack.tower_bottom,
+        ears=stack.tower_bottom,
+        screw=FOOT_SCREW,
+        holes=tuple((a * FOOT_HOLE, b * FOOT_HOLE) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
+        corners=np.concatenate([drive_corners(stack), np.array(foot)]),
+        discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
+        stands_alone=False,
+    )
+
+
+def _around_belt(stack: BeltStack) -> Block:
+    corner = stack.turn() @ [stack.centre + stack.belt_radius, stack.belt_radius, 0.0]
+    start = stack.turn() @ [-stack.belt_radius, -stack.belt_radius, 0.0]
+    width = np.array([0.0, 0.0, stack.belt.width_mm / 2])
+    middle = np.array([0.0, 0.0, stack.belt_middle])
+    return _block(np.minimum(corner, start) + middle - width, np.maximum(corner, start) + middle + width)
+
+
+def _block(low: Array, high: Array) -> Block:
+    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
+    return Block((x0, y0, z0), (x1, y1, z1))

@@ -1,0 +1,64 @@
+"""Every number of the plate that holds the servo beside the axis. No kernel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cad.layout.belt.stack import PLATE_SCREW, BeltStack
+from cad.layout.names import DRIVE_PLATE
+from cad.screws import SCREWS, Screw, passing_hole
+from design.catalogue.products import Servo
+from design.errors import BuildError
+from design.scanner import Scanner
+
+UNDER_HEAD = 2.5  # of the plate
+HORN_ROOM = 1.5  # around the foot of the pulley
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivePlate:
+    """Lengths in mm, servo's frame."""
+
+    stack: BeltStack
+    opening: float  # radius
+    ears: float  # z of the planes around the front holes
+    screw: Screw
+    hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+    slot: float  # width
+
+
+def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
+    """Parameters of the plate of one scanner.
+
+    Raises:
+        BuildError: the case has no four front holes beside the horn.
+    """
+    servo, printer = scanner.servo, scanner.printer
+    screw = SCREWS[servo.case_screw]
+    hole = passing_hole(screw, printer)
+    opening = max(pulley_foot_radius(servo), servo.horn_diameter_mm / 2) + HORN_ROOM
+    least = opening + hole / 2 + printer.min_wall_mm
+    free = [(x, y) for x, y in servo.case_holes_mm if math.hypot(x, y) >= least]
+    widest = max((x for x, _ in free), default=0.0)
+    ys = sorted(y for x, y in free if x == widest and (-x, y) in free)
+    if len(ys) < 2:
+        raise BuildError(
+            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two pairs of front "
+            f"holes at least {least:.2f} mm from its axis, beside the pulley"
+        )
+    return DrivePlate(
+        stack=stack,
+        opening=opening,
+        ears=stack.horn + servo.case_holes_z_mm,
+        screw=screw,
+        hole=hole,
+        holes=tuple((side * widest, y) for y in (ys[0], ys[-1]) for side in (1.0, -1.0)),
+        slot=passing_hole(PLATE_SCREW, printer),
+    )
+
+
+def pulley_foot_radius(servo: Servo) -> float:
+    """Of what lies on the horn, under the drive pulley."""
+    return servo.horn_circle_mm / 2 + SCREWS[servo.horn_screw].nominal / 2 + 2.0

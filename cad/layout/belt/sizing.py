@@ -1,0 +1,138 @@
+"""Laying out the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from cad.layout.belt.stack import (
+    CASE_ROOM,
+    FOOT_HOLE,
+    FOOT_SCREW,
+    PULLEY_GAP,
+    RING_ROOM,
+    TRAVEL,
+    BeltStack,
+    drive_corners,
+)
+from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
+from cad.layout.hub import HUB_WALL
+from design.catalogue.products import Bearing, Belt, Servo, SlipRing
+from design.errors import BuildError
+from design.scanner import Scanner
+
+SPIGOT_DIAMETER = 12.0  # as in direct drive: a wider hub would hide more
+SHAFT_WALL = 4.0  # least, around the bore
+TUBE_WALL = 2.5  # of the soft tube between rotor and bore
+SWEEP_MARGIN = 3.0  # between the turning lidar and the deck
+TEETH_STEP = 10
+TEETH_LEAST = 80  # a smaller pulley makes more of its run-out
+QUARTERS = (3, 2, 0)  # not 1: there the shelf would hide the index groove at +y
+
+
+def belt_stack(scanner: Scanner) -> BeltStack:
+    """Lay out the scanner of a capsule ring.
+
+    Raises:
+        BuildError: no bearing or belt of the catalogue fits the capsule, or the lidar would hang upside down.
+    """
+    ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
+    assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
+    bore = ring.rotor.diameter_mm + 2 * TUBE_WALL
+    carrier = _carrier(scanner, ring, bore + 2 * SHAFT_WALL)
+    belt = _belt(scanner, ring)
+    hub = SPIGOT_DIAMETER / 2 + HUB_WALL
+    alone = BeltStack(
+        h=hub_height(scanner.lidar, R, hub, 0.0, None),
+        R_rot_laser=rows_of(R),
+        ring_length=ring.length_mm,
+        ring_radius=ring.outer_diameter_mm / 2,
+        shaft_diameter=SPIGOT_DIAMETER,
+        shaft_bore=bore,
+        bearing=None,
+        sub_plate=None,
+        carrier=carrier,
+        belt=belt,
+        belt_teeth=belt.teeth[-1],
+        teeth=TEETH_LEAST,
+        centre=0.0,
+        quarter=0,
+        flange=ring.flange,
+        rotor=ring.rotor,
+        servo=servo,
+    )
+    _check_tower(alone, ring, scanner)
+    teeth = TEETH_LEAST
+    while replace(alone, teeth=teeth).tip_radius - belt.tooth_height_mm < alone.boss_radius + 1.0:
+        teeth += TEETH_STEP
+    alone = replace(alone, teeth=teeth)
+    least = _least_centre(alone, servo)
+    stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
+    if not stock:
+        raise BuildError(
+            f"drive_pulley: centre distance >= {least:.1f} mm: the longest {belt.name} of the catalogue has "
+            f"{max(belt.teeth)} teeth and reaches {centre_of(max(belt.teeth), teeth, belt.pitch_mm):.1f}; add a longer "
+            "one to its teeth"
+        )
+    stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
+    if covered_screws(scanner.lidar, stack):
+        axis = leaning_least(R)
+        stack = replace(stack, h=hub_height(scanner.lidar, R, hub, 0.0, axis), sub_plate=axis)
+    return replace(stack, quarter=_quarter(scanner, stack))
+
+
+def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
+    """Centre distance at which a belt is tight around two equal pulleys: half of it goes around them."""
+    return (belt_teeth - teeth) * pitch_mm / 2
+
+
+def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
+    fitting = next((bearing for bearing in scanner.bearings if bearing.bore_mm >= least), None)
+    if fitting is None:
+        most = max((bearing.bore_mm for bearing in scanner.bearings), default=0.0)
+        raise BuildError(
+            f"bearing_tower: slip_ring {ring.name}: rotor.diameter_mm = {least - 2 * (TUBE_WALL + SHAFT_WALL):g}: its "
+            f"shaft needs bearings with bore_mm >= {least:g}, the largest of the catalogue has {most:g}; add one, or "
+            "take a smaller capsule"
+        )
+    return fitting
+
+
+def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
+    if not scanner.belts:
+        raise BuildError(
+            f"drive_pulley: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
+            "catalogue has none; add a product of kind = 'belt'"
+        )
+    return scanner.belts[0]
+
+
+def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
+    """The screws of the tower's foot stand around the capsule's chamber."""
+    corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
+    if stack.chamber_radius > corner:
+        most = 2 * (corner - RING_ROOM)
+        raise BuildError(
+            f"bearing_tower: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
+            f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
+        )
+
+
+def _least_centre(stack: BeltStack, servo: Servo) -> float:
+    """Shortest centre distance: case beside the tower, and pulleys beside each other, with the belt put on."""
+    case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
+    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
+
+
+def _quarter(scanner: Scanner, stack: BeltStack) -> int:
+    """The side of the axis where the servo asks for the lowest deck; of equal ones, beside the axis and not above."""
+    up = scanner.angles.T_world_rot(0.0)[2, :3]
+    normal = up if up[2] >= -1e-6 else -up
+    rotor = rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN
+
+    def asks(quarter: int) -> tuple[float, float]:
+        turned = replace(stack, quarter=quarter)
+        below = max(rotor, float((drive_corners(turned) @ -normal).max()))
+        return round(below, 3), round(abs(float(turned.turn()[:, 0] @ normal)), 3)
+
+    return min(QUARTERS, key=asks)

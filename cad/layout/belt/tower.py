@@ -1,0 +1,55 @@
+"""Every number of the bearing tower and of what stands in it: screws of plate, foot and disc. No kernel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cad import outlines
+from cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
+from cad.screws import SCREWS, Thread, passing_hole, thread_in_part
+from design.scanner import Scanner
+
+DISC_SCREW = SCREWS["M3"]
+DISC_SCREWS = 3
+SCREW_DEPTH = 10.0  # of a radial screw in the disc
+UNDER_HEAD = 3.5  # of the wall
+UNDER_FOOT_NUT = 4.0  # of the foot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingTower:
+    """Lengths in mm."""
+
+    stack: BeltStack
+    fit: float  # diametral clearance of a sliding fit
+    plate: Thread  # of the plate's screws; nuts below the arms
+    foot: Thread  # of the mount's screws; nuts from the corners of the foot
+    disc_hole: float  # diameter
+
+
+def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
+    """Parameters of the tower of one scanner."""
+    printer = scanner.printer
+    foot = thread_in_part(FOOT_SCREW, printer)
+    free = math.sqrt(2) * FOOT_HOLE - printer.min_wall_mm - stack.chamber_radius
+    if foot.trap is not None and foot.trap.corner > free:
+        foot = thread_in_part(FOOT_SCREW, printer, room_for_nut=False)
+    return BearingTower(
+        stack=stack,
+        fit=printer.fit_clearance_mm,
+        plate=thread_in_part(PLATE_SCREW, printer),
+        foot=foot,
+        disc_hole=passing_hole(DISC_SCREW, printer),
+    )
+
+
+def disc_azimuths(stack: BeltStack) -> list[float]:
+    """Of the radial screws that hold the capsule's disc [rad], servo's frame: between the screws of its flange."""
+    return [math.pi / stack.flange.holes + 2 * math.pi * k / DISC_SCREWS + math.pi / 2 for k in range(DISC_SCREWS)]
+
+
+def flange_centres(stack: BeltStack) -> list[tuple[float, float]]:
+    """Of the flange's holes, servo's frame; one at its +y."""
+    centres = outlines.polygon(stack.flange.circle_mm / 2, stack.flange.holes, math.pi / 2)
+    return [(float(x), float(y)) for x, y in centres]

@@ -1,0 +1,59 @@
+"""Every number of the slip-ring adapter: its fork on the servo's ears, or the base of a cage. No kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cad.layout.direct.cage import FOOT_RADIUS, BearingCage, cage_of, plate_half_x
+from cad.layout.direct.stack import DirectStack
+from cad.layout.names import SLIP_RING_ADAPTER
+from cad.screws import SCREWS, Screw, passing_hole
+from design.errors import BuildError
+from design.scanner import Scanner
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlipRingAdapter:
+    """Lengths in mm; the servo's x and y are those of the rotation frame."""
+
+    stack: DirectStack
+    front: float  # z of the case's front
+    ears: float  # z of the planes around the front holes
+    opening: float  # half width of the fork
+    half_x: float
+    screw: Screw
+    hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+    cage: BearingCage | None
+
+
+def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
+    """Parameters of the adapter of one scanner.
+
+    Raises:
+        BuildError: the case has no four holes beside the turning flange.
+    """
+    servo = scanner.servo
+    screw = SCREWS[servo.case_screw]
+    hole = passing_hole(screw, scanner.printer)
+    opening = stack.flange_radius + 1.5
+    behind = sorted({y for _, y in servo.case_holes_mm if y < -opening + 2.0 - FOOT_RADIUS}, reverse=True)
+    rows = [sorted(h for h in servo.case_holes_mm if h[1] == y) for y in behind]
+    widest = max((row[-1][0] for row in rows), default=0.0)
+    rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
+    if len(rows) < 2:
+        raise BuildError(
+            f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two "
+            f"pairs of front holes at y < {-opening + 2.0 - FOOT_RADIUS:g}, behind the turning flange"
+        )
+    return SlipRingAdapter(
+        stack=stack,
+        front=stack.horn + servo.case_max_mm[2],
+        ears=stack.horn + servo.case_holes_z_mm,
+        opening=opening,
+        half_x=plate_half_x(servo, screw),
+        screw=screw,
+        hole=hole,
+        holes=(*rows[0], *rows[-1]),
+        cage=cage_of(scanner, stack),
+    )

@@ -1,0 +1,161 @@
+"""Every number of the bearing's cage: its base on the servo's ears, and how stiff it holds the bearing. No kernel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.layout.direct.loads import Supported, hanging, supported
+from cad.layout.direct.stack import DirectStack
+from cad.layout.loads import Weight
+from cad.layout.names import CAGE_BASE
+from cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from design.catalogue.products import Bearing, Servo
+from design.errors import BuildError
+from design.scanner import Scanner
+
+BASE_HEIGHT = 12.0
+RING_ABOVE_BASE = 1.5
+SEAT_GAP = 0.2  # the feet carry, not the plate
+FOOT_RADIUS = 3.0
+UNDER_HEAD = 3.0  # of the plate
+HEAD_WALL = 2.0  # beside the recess of a head
+CAGE_SCREW = SCREWS["M3"]
+SCREW_DEPTH = 10.0  # of a radial screw in the boss
+UNDER_CAGE_HEAD = 3.5  # of a leg
+TRAP_WALL = 3.0  # of the boss outside a nut
+WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x, the ring's wires leave at +-y
+PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
+POISSON = 0.35
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingCage:
+    """Lengths in mm, azimuths in rad; the servo's x and y are those of the rotation frame."""
+
+    stack: DirectStack
+    bearing: Bearing
+    front: float  # z of the case's front
+    ears: float  # z of the planes around the front holes
+    opening: float  # radius, around the horn flange
+    half_x: float
+    screw: Screw
+    hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+    cage_hole: float  # diameter, in the legs
+    thread: Thread  # of the radial screws, in the boss
+    legs: tuple[float, ...]  # azimuths of the bell's radial screws
+    fit: float  # diametral clearance of a sliding fit
+
+    @property
+    def low(self) -> float:
+        """Height of the base's lower face."""
+        return self.front + SEAT_GAP
+
+    @property
+    def high(self) -> float:
+        """Height of the boss, and of the whole base."""
+        return _boss_top(self.stack, self.low)
+
+    @property
+    def foot(self) -> float:
+        """Height of the flange that the bell stands on."""
+        return (self.low + self.high) / 2
+
+
+def cage_of(scanner: Scanner, stack: DirectStack) -> BearingCage | None:
+    """Parameters of the cage of one scanner; None where the horn carries the rotor alone.
+
+    Raises:
+        BuildError: the case has no four holes beside the turning flange.
+    """
+    if stack.bearing is None:
+        return None
+    servo, printer = scanner.servo, scanner.printer
+    screw = SCREWS[servo.case_screw]
+    hole = passing_hole(screw, printer)
+    opening = stack.flange_radius + 1.0
+    least = opening + hole / 2 + printer.min_wall_mm
+    free = [(x, y) for x, y in servo.case_holes_mm if math.hypot(x, y) >= least]
+    widest = max((x for x, _ in free), default=0.0)
+    holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
+    if len(holes) < 4:
+        raise BuildError(
+            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two pairs of front "
+            f"holes at least {least:.2f} mm from the axis, outside the turning flange"
+        )
+    thread = thread_in_part(CAGE_SCREW, printer)
+    front = stack.horn + servo.case_max_mm[2]
+    if thread.trap is not None and not has_room(thread.trap, stack, front + SEAT_GAP, printer.min_wall_mm):
+        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False)
+    return BearingCage(
+        stack=stack,
+        bearing=stack.bearing,
+        front=front,
+        ears=stack.horn + servo.case_holes_z_mm,
+        opening=opening,
+        half_x=plate_half_x(servo, screw),
+        screw=screw,
+        hole=hole,
+        holes=holes,
+        cage_hole=passing_hole(CAGE_SCREW, printer),
+        thread=thread,
+        legs=tuple(_leg_screw(middle, holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
+        fit=printer.fit_clearance_mm,
+    )
+
+
+def plate_half_x(servo: Servo, screw: Screw) -> float:
+    """Half width of a plate on the servo's front: that of the case, or what the heads of the ears' screws need."""
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.case_holes_mm) + screw.head_room + HEAD_WALL)
+
+
+def _boss_top(stack: DirectStack, low: float) -> float:
+    return min(low + BASE_HEIGHT, stack.ring_bottom - RING_ABOVE_BASE)
+
+
+def has_room(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
+    """Whether a nut in the boss has a floor below it and does not reach the ring above."""
+    quarter = (_boss_top(stack, low) - low) / 4
+    return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2
+
+
+def stiffness_n_per_m(p: BearingCage) -> float:
+    """Sideways stiffness at the bearing, of legs (shear, bending, rocking) and base by beam formulas, halved.
+
+    Screws and plates are stiffer or softer than beams: taken for right within a factor of two.
+    """
+    stack, E = p.stack, PLASTIC_PA * 1e-6  # N/mm2
+    G = E / (2 + 2 * POISSON)
+    radius, wall = (stack.cage_inner + stack.cage_outer) / 2, stack.cage_outer - stack.cage_inner
+    half_window = math.asin(WINDOW_HALF_WIDTH / stack.cage_inner) if stack.ring_length > 0 else 0.0
+    width = radius * (math.pi / 2 - 2 * half_window)
+    length, lever = stack.cage_roof - p.foot, stack.bearing_middle - p.foot
+    # four legs at 45 deg: two of them bend and shear across their width, all four stretch
+    bending = length**3 / (2 * E * wall * width**3)
+    shear = length / (2 * 5 / 6 * G * wall * width)
+    rocking = (lever - length / 2) ** 2 * length / (4 * E * wall * width * radius**2 / 2)
+    reach, span = radius * math.sqrt(0.5), 2 * radius * math.sqrt(0.5)
+    beyond = reach - max(y for _, y in p.holes)
+    second_moment = (stack.cage_inner - p.opening) * 2 * (p.high - p.low) ** 3 / 12
+    base = (lever / span) ** 2 * beyond**3 / (3 * E * second_moment)
+    return 0.5e3 / (bending + shear + rocking + base)
+
+
+def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius: float) -> float:
+    """Azimuth [rad] within a leg whose radial screw stays furthest from the ears' screws."""
+
+    def clearance(azimuth: float) -> float:
+        reach = np.linspace(radius - SCREW_DEPTH, radius, 11)
+        line = np.stack([np.cos(azimuth) * reach, np.sin(azimuth) * reach], axis=1)
+        return min(float(np.linalg.norm(line - hole, axis=1).min()) for hole in holes)
+
+    return max((math.radians(middle_deg + turn) for turn in (0.0, 15.0, -15.0)), key=lambda a: round(clearance(a), 6))
+
+
+def share_weight(scanner: Scanner, stack: DirectStack, weight: Weight) -> Supported:
+    """How horn and bearing share the weight of all that turns."""
+    cage = cage_of(scanner, stack)
+    return hanging(weight, stack) if cage is None else supported(weight, stack, stiffness_n_per_m(cage))

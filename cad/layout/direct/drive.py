@@ -1,0 +1,112 @@
+"""The servo on the axis, as a `Drive`: horn, shaft through the ring, hub."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cad.layout import names
+from cad.layout.direct.sizing import direct_stack
+from cad.layout.direct.stack import DirectStack
+from cad.layout.drive import Block, Drive, Mass, Mounted, Rod
+from cad.screws import SCREWS
+from design.catalogue.products import Servo
+from design.left_out import LeftOut
+from design.scanner import Scanner
+
+# The order that always works: what comes over the shaft follows what carries it.
+BUILT = (
+    names.BASE_MOUNT,
+    names.DECK,
+    names.SERVO_SHAFT,
+    names.SLIP_RING_ADAPTER,
+    names.CAGE_BASE,
+    names.RING,
+    names.BEARING_CAGE,
+    names.LIDAR,
+    names.SUB_PLATE,
+    names.COUNTERWEIGHT,
+    names.ALIGNMENT_LINKAGE,
+)
+STACKED = (
+    names.BASE_MOUNT,
+    names.SERVO,
+    names.SERVO_SHAFT,
+    names.CAGE_BASE,
+    names.SLIP_RING_ADAPTER,
+    names.RING,
+    names.BEARING_CAGE,
+    names.BEARING,
+    names.ALIGNMENT_LINKAGE,
+)
+ADAPTER_ARMS = 8.0  # beyond the ring
+CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
+
+
+def direct_drive(scanner: Scanner) -> Drive:
+    """The drive of a scanner whose ring lets the shaft through, or that has none.
+
+    Raises:
+        BuildError: it cannot be laid out.
+    """
+    stack, ring = direct_stack(scanner), scanner.slip_ring
+    (x0, y0, z0), (x1, y1, z1) = scanner.servo.case_min_mm, scanner.servo.case_max_mm
+    case = Block((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1))
+    masses = [Mass(scanner.servo.mass_g, Block(case.low, (x1, y1, stack.horn)))]  # with its horn
+    rods: list[Rod] = []
+    if ring is not None:
+        rods.append(Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
+        masses.append(Mass(ring.mass_g, rods[0].block(), turning=0.5))
+    if stack.bearing is not None:
+        top = stack.bearing_top
+        bearing = Rod(stack.bearing.outer_mm / 2, top - stack.bearing.width_mm, top)
+        masses.append(Mass(stack.bearing.mass_g, bearing.block(), turning=0.5))
+    return Drive(
+        stack=stack,
+        shaft=names.SERVO_SHAFT,
+        products=() if stack.bearing is None else (stack.bearing,),
+        mounted=_mounted(scanner.servo, stack),
+        masses=tuple(masses),
+        shapes=(case, *rods),
+        built=BUILT,
+        stacked=STACKED,
+        left_out=tuple(_left_out(scanner, stack)),
+        ring_needs=() if ring is None else (("cable tie around the ring's stator", "groove of the adapter"),),
+    )
+
+
+def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
+    """The servo's case."""
+    xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
+    around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), stack.ring_top
+    if stack.bearing is not None:
+        around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
+    return Mounted(
+        onto=names.SERVO_CASE,
+        rear=stack.horn + servo.case_min_mm[2],
+        ears=stack.horn + servo.case_rear_holes_z_mm,
+        screw=SCREWS[servo.case_screw],
+        holes=_corner_holes(servo.case_rear_holes_mm),
+        corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
+        discs=((around, stack.horn), (around, top)),
+        stands_alone=True,
+    )
+
+
+def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
+    if scanner.slip_ring is None:
+        yield LeftOut(names.SLIP_RING_ADAPTER, "this scanner has no slip ring", 1, "parts")
+    if stack.bearing is None:
+        servo = scanner.servo
+        why = f"the horn of {servo.name} carries an axis this upright alone"
+        if servo.radial_load_n is None:
+            why = f"{why}, by what such a horn is trusted with: its maker rates none"
+        yield LeftOut(names.BEARING_CAGE, why, 1, "parts")
+
+
+def _corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """The four holes of the widest column pair that lie furthest apart along y."""
+    widest = max(x for x, _ in holes)
+    ys = sorted(y for x, y in holes if x == widest)
+    return ((widest, ys[-1]), (-widest, ys[-1]), (-widest, ys[0]), (widest, ys[0]))

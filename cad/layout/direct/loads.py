@@ -1,0 +1,133 @@
+"""What the rotor's weight does to the horn, and the bearing that a tilted axis needs. No kernel: plain numpy.
+
+Without a bearing the horn carries the whole tilt moment. With one the shaft is a beam, clamped in the horn and held at
+the height of the bearing by the cage, a spring; its waist is a hinge of known stiffness. SI units; lengths of the
+stack are millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cad.layout.direct.stack import WAIST, DirectStack
+from cad.layout.loads import (
+    ALUMINIUM_G_CM3,
+    ALUMINIUM_PA,
+    STANDARD_GRAVITY,
+    Weight,
+    rated_moment_nm,
+    tilt_sine,
+    weight_of,
+)
+from design.catalogue.products import Bearing
+from design.scanner import Scanner
+
+UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
+LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
+LINKAGE_OFF_AXIS_MM = 20.0
+JOURNAL_WALL = 1.8  # between bore and wires
+WIRE_DEPTH = 6.0  # least depth of the channel for the ring's wires
+HUB_STEP = 1.0  # by which the hub is wider than the journal
+
+
+@dataclass(frozen=True, slots=True)
+class Supported:
+    """How horn and bearing share the weight."""
+
+    horn_moment_nm: float
+    horn_force_n: float
+    bearing_force_n: float
+    slope_rad: float  # of the shaft at the hub
+
+
+def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
+    """The bearing that this scanner needs: the smallest that fits, where the horn is not rated for the rotor.
+
+    Whether one is needed is decided on the heaviest linkage that any angles give, so that a scanner without a bearing
+    is safe. A horn that its maker does not rate is trusted with little. None as well where nothing in the catalogue
+    fits.
+    """
+    if horn_bears(scanner, stack):
+        return None
+    least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * WIRE_DEPTH)
+    most = 2 * (stack.hub_radius - HUB_STEP)
+    return next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
+
+
+def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
+    """Whether the horn alone bears the heaviest linkage."""
+    return _is_rated(scanner, _heaviest(scanner, stack).moment_nm)
+
+
+def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
+    """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
+    weight = _heaviest(scanner, stack)
+    bar = bar_g / 1000 * STANDARD_GRAVITY * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
+    return _is_rated(scanner, weight.across_n * weight.lever_m + bar)
+
+
+def _is_rated(scanner: Scanner, moment_nm: float) -> bool:
+    rated = rated_moment_nm(scanner)
+    return moment_nm <= (UNRATED_NM if rated is None else rated)
+
+
+def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float) -> Supported:
+    """Share the weight between horn and bearing: the deflections of shaft and cage are equal at the bearing.
+
+    Args:
+        weight: of all that turns.
+        stack: with a bearing.
+        cage_n_per_m: sideways stiffness of the cage at the bearing.
+    """
+    b = (stack.bearing_middle - stack.horn) / 1000
+    F, L = weight.across_n, weight.lever_m
+    moment = weight.along_n * weight.off_axis_m
+    waist = 1 / waist_nm_per_rad(stack)
+    EI = ALUMINIUM_PA * _second_moment(stack.shaft_diameter)
+    pushed = F * b**2 * (3 * L - b) / (6 * EI) + moment * b**2 / (2 * EI) + waist * b * (F * L + moment)
+    held = b**3 / (3 * EI) + waist * b**2 + 1 / cage_n_per_m
+    R = pushed / held
+    slope = (F * (2 * L * b - b**2) - R * b**2) / (2 * EI) + moment * b / EI + waist * (F * L + moment - R * b)
+    return Supported(
+        horn_moment_nm=abs(F * L + moment - R * b), horn_force_n=abs(R - F), bearing_force_n=R, slope_rad=abs(slope)
+    )
+
+
+def hanging(weight: Weight, stack: DirectStack) -> Supported:
+    """The horn alone carries: a cantilever up to the hub, which is stiff."""
+    free = (stack.hub_bottom - stack.horn) / 1000
+    EI = ALUMINIUM_PA * _second_moment(stack.shaft_diameter)
+    across, moment = weight.across_n, weight.along_n * weight.off_axis_m
+    slope = (across * (weight.lever_m * free - free**2 / 2) + moment * free) / EI
+    return Supported(weight.moment_nm, across, 0.0, slope)
+
+
+def waist_nm_per_rad(stack: DirectStack) -> float:
+    """Bending stiffness of the waist of an aluminium shaft."""
+    return ALUMINIUM_PA * _second_moment(2 * stack.waist_radius) / (WAIST / 1000)
+
+
+def _second_moment(diameter_mm: float) -> float:
+    """Second moment of area of a round bar [m4]."""
+    return math.pi / 64 * (diameter_mm / 1000) ** 4
+
+
+def _heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
+    """Weight of the rotor with the heaviest linkage."""
+    lidar, ring = scanner.lidar, scanner.slip_ring
+    normal = stack.R()[:, 2]
+    middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
+    shaft_length = stack.spigot_top - stack.horn
+    shaft_g = math.pi * (stack.shaft_diameter / 20) ** 2 * (shaft_length / 10) * ALUMINIUM_G_CM3
+    bodies = [  # mass [g], height, distance from the axis
+        (lidar.mass_g, middle * float(normal[2]), abs(middle) * math.hypot(normal[0], normal[1])),
+        (LINKAGE_CM3 * scanner.printer.density_g_cm3, -stack.h / 2, LINKAGE_OFF_AXIS_MM),
+        (shaft_g, (stack.spigot_top + stack.horn) / 2, 0.0),
+    ]
+    if ring is not None:
+        bodies.append((ring.mass_g / 2, (stack.ring_top + stack.ring_bottom) / 2, 0.0))
+    mass = sum(body[0] for body in bodies)
+    lever = sum(m * (z - stack.horn) for m, z, _ in bodies) / mass
+    off_axis = sum(m * r for m, _, r in bodies) / mass
+    return weight_of(scanner, mass / 1000, lever / 1000, off_axis / 1000)

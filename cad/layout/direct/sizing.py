@@ -1,0 +1,96 @@
+"""Laying out the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from cad.layout.direct.loads import bearing_for
+from cad.layout.direct.stack import DirectStack
+from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
+from cad.layout.hub import HUB_WALL
+from cad.screws import SCREWS
+from design.catalogue.products import Servo
+from design.errors import BuildError
+from design.scanner import Scanner
+
+SHAFT_PLAIN = 12.0  # without a ring
+SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
+SHAFT_MIN = 8.0
+
+
+def direct_stack(scanner: Scanner) -> DirectStack:
+    """Lay out the stack of one scanner with its servo on the axis.
+
+    Raises:
+        BuildError: the ring has no bore, a bore too small for a shaft, or the lidar would hang upside down.
+    """
+    R = lidar_pose(scanner)
+    shaft, length, radius, bore = _ring(scanner)
+    flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
+    h = hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius, None)
+    alone = DirectStack(
+        h=h,
+        R_rot_laser=rows_of(R),
+        ring_length=length,
+        ring_radius=radius,
+        ring_bore=bore,
+        shaft_diameter=shaft,
+        flange_radius=flange_radius,
+        flange_thickness=flange_thickness,
+        collar_radius=collar_radius,
+        collar_height=collar_height,
+        bearing=None,
+        sub_plate=None,
+    )
+    bearing = bearing_for(scanner, alone)
+    stack = replace(alone, bearing=bearing)
+    if not covered_screws(scanner.lidar, stack):
+        return stack
+    axis = leaning_least(R)
+    return replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
+
+
+def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
+    """Shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
+    ring = scanner.slip_ring
+    if ring is None:
+        return SHAFT_PLAIN, 0.0, 0.0, 0.0
+    if ring.bore_mm == 0:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
+            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {_least_bore():.1f}"
+        )
+    # half millimetres: bar stock and reamers come in them
+    shaft = math.floor((ring.bore_mm - SHAFT_RUNNING_GAP) * 2) / 2
+    if shaft < SHAFT_MIN:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
+            f"take a ring with bore_mm >= {_least_bore():.1f}"
+        )
+    if ring.bore_mm + 4.0 > ring.outer_diameter_mm:
+        raise BuildError(
+            f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: leaves no ring in outer_diameter_mm = "
+            f"{ring.outer_diameter_mm:g}"
+        )
+    return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
+
+
+def _least_bore() -> float:
+    return SHAFT_MIN + SHAFT_RUNNING_GAP
+
+
+def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:
+    """Radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
+    screw = SCREWS[servo.horn_screw]
+    circle = servo.horn_circle_mm / 2
+    radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)
+    collar = max(shaft_diameter / 2, servo.horn_boss_diameter_mm / 2 + 2.4)
+    room = circle - screw.head_diameter / 2
+    if collar > room:
+        raise BuildError(
+            f"servo_shaft: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
+            f"{servo.horn_circle_mm:g} mm leave {room:g} mm; take a ring with a smaller bore"
+        )
+    thickness = 4.0
+    return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)

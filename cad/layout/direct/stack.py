@@ -1,0 +1,119 @@
+"""Every number of the direct drive that more than one part needs. No kernel: plain numpy.
+
+Rotation frame at gamma = 0, mm: origin at the optical centre, z the rotation axis out of the servo horn, +y
+towards the servo's +Y face, where the index marks meet. Everything that turns stays above the plane of the
+ring's top, everything that stands still beside the shaft stays below it: clearance of a whole turn needs no stepping.
+
+    z = 0             optical centre
+    -h                top of the linkage's hub
+    shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
+    hub_bottom        bottom of the hub: the shoulder, or below it the journal that sits in a bearing
+    ring_top          HUB_GAP below: the rotor's wires leave here
+    ring_bottom       the ring's length below
+                      RING_GAP, or the shaft's waist, below: top of the shaft's collar
+    horn              the servo's horn face
+
+A tilted axis whose rotor is too heavy for the horn alone gets a bearing on the journal (`cad/layout/direct/loads.py`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cad.layout.hub import HUB_GAP, Hub
+
+RING_GAP = 3.0
+WAIST = 10.0  # length of the shaft's waist: it bends where horn and bearing are not quite in line
+CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
+CAGE_WALL = 5.0
+CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
+BEARING_PLAY = 0.3  # along the axis: the horn alone carries along it
+CAGE_GAP = 1.0  # between hub and cage
+WINDOWS_REACH = 3.0  # of the cage's windows into its roof
+CAGE_SEAT_WALL = 4.0  # around the bearing
+STRIP = 0.3  # under the top of a ring's stator that its drawing does not vouch for
+CAGE_LIP = 1.5  # under the bearing's outer ring, thick and wide
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DirectStack(Hub):
+    """The scanner along its axis with the servo on it: horn, shaft through the ring, hub (rotation frame, mm)."""
+
+    ring_bore: float
+    flange_radius: float
+    flange_thickness: float
+    collar_radius: float
+    collar_height: float
+
+    @property
+    def bearing_middle(self) -> float:
+        """Height of the bearing's balls."""
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm / 2)
+
+    @property
+    def cage_inner(self) -> float:
+        """Inner radius of the bearing's cage, around the ring."""
+        return max(self.ring_radius + CAGE_TIE, CAGE_MIN)
+
+    @property
+    def cage_outer(self) -> float:
+        """Outer radius of the bearing's cage."""
+        return self.cage_inner + CAGE_WALL
+
+    @property
+    def cage_top(self) -> float:
+        """Height of the cage's upper face."""
+        return self.shoulder - CAGE_GAP
+
+    @property
+    def cage_seat(self) -> float:
+        """Height of the lip that the bearing lies on, if it falls down its play."""
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_PLAY
+
+    @property
+    def cage_roof(self) -> float:
+        """Height at which the cage starts to narrow towards the bearing, at 45 deg."""
+        if self.bearing is None:
+            return self.cage_seat
+        return self.cage_seat - CAGE_LIP - (self.cage_inner - self.bearing.outer_mm / 2 + CAGE_LIP)
+
+    @property
+    def ring_top(self) -> float:
+        """Height of the ring's upper face."""
+        return self.hub_bottom - HUB_GAP
+
+    @property
+    def ring_bottom(self) -> float:
+        """Height of the ring's lower face."""
+        return self.ring_top - self.ring_length
+
+    @property
+    def horn(self) -> float:
+        """Height of the servo's horn face."""
+        return self.ring_bottom - (RING_GAP if self.bearing is None else WAIST) - self.collar_height
+
+    @property
+    def waist_radius(self) -> float:
+        """Of the shaft's waist."""
+        return self.shaft_diameter / 4
+
+    @property
+    def shadow_half_angle(self) -> float:
+        """Half angle [rad] of the cone about -z that ring, or cage, hide from the optical centre."""
+        ring = math.atan2(max(self.ring_radius, self.hub_radius), -self.ring_top)
+        if self.bearing is None:
+            return ring
+        seat = math.atan2(self.bearing.outer_mm / 2 + CAGE_SEAT_WALL, -self.cage_top)
+        return max(ring, seat, math.atan2(self.cage_outer, -self.cage_roof))
+
+    @property
+    def sure_half_angle(self) -> float:
+        """Half angle [rad] of that cone by solids of revolution only, a little inside their edges."""
+        rims = []
+        if self.ring_radius > 0:
+            rims.append((self.ring_radius, self.ring_top - 1.0 - STRIP))
+        if self.bearing is not None:
+            rims.append((self.bearing.outer_mm / 2 + CAGE_SEAT_WALL, self.cage_top))
+            rims.append((self.cage_outer - WINDOWS_REACH, self.cage_roof + WINDOWS_REACH))
+        return max((math.atan2(radius, -z) for radius, z in rims), default=0.0)

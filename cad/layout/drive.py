@@ -1,0 +1,103 @@
+"""How the servo turns the shaft, as data: what a layout is made of, what stands where, and in which order it is built.
+
+Rotation frame at gamma = 0, mm. `cad/layout/direct/drive.py` and `cad/layout/belt/drive.py` fill it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.stack import DirectStack
+from cad.screws import Screw
+from design.catalogue.products import Bearing, Belt
+from design.frames import Array
+from design.left_out import LeftOut
+
+Stack = DirectStack | BeltStack
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A box along the axes between two corners."""
+
+    low: Point
+    high: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Rod:
+    """A cylinder about the rotation axis."""
+
+    radius: float
+    low: float
+    high: float
+
+    def block(self) -> Block:
+        """The box around it."""
+        r = self.radius
+        return Block((-r, -r, self.low), (r, r, self.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Mass:
+    """What a bought product weighs, as a homogeneous box; `turning` is the share of it that turns."""
+
+    mass_g: float
+    box: Block
+    turning: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mounted:
+    """What a base mount holds: the servo's case, or a tower, above the mount's rails.
+
+    Attributes:
+        onto: body that its screws end in.
+        rear: height of its face towards the mount.
+        ears: height of the faces around its holes.
+        screw: that goes through the mount into them.
+        holes: x and y of the four.
+        corners: of boxes around all that stands still, shape (n, 3).
+        discs: radius and height of what else must stay clear of the deck, round about the axis.
+        stands_alone: whether it may stand on a flat deck without a mount where the axis is upright.
+    """
+
+    onto: str
+    rear: float
+    ears: float
+    screw: Screw
+    holes: tuple[tuple[float, float], ...]
+    corners: Array
+    discs: tuple[tuple[float, float], ...]
+    stands_alone: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """One layout of one scanner.
+
+    Attributes:
+        stack: every number along the axis.
+        shaft: the part that carries the linkage.
+        products: what is bought beside lidar, servo and ring, as often as it is needed.
+        mounted: what the base mount holds.
+        masses: of the bought products between mount and linkage.
+        shapes: simple bodies that stand still.
+        built: parts and products in the order in which they are put in.
+        stacked: parts and products from the deck to the linkage, in which the exploded view lifts them.
+        left_out: parts that this scanner does not need.
+        ring_needs: small things that the ring asks for, each with its source.
+    """
+
+    stack: Stack
+    shaft: str
+    products: tuple[Bearing | Belt, ...]
+    mounted: Mounted
+    masses: tuple[Mass, ...]
+    shapes: tuple[Block | Rod, ...]
+    built: tuple[str, ...]
+    stacked: tuple[str, ...]
+    left_out: tuple[LeftOut, ...]
+    ring_needs: tuple[tuple[str, str], ...]

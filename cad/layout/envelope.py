@@ -1,0 +1,173 @@
+"""What belongs to the lidar, as boxes: they give the height of the hub, and are cut from the linkage. Plain numpy, mm.
+
+The same boxes do both, so the two cannot disagree.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.layout.hub import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from cad.screws import SCREWS
+from design.catalogue.products import Lidar
+from design.errors import BuildError
+from design.frames import Array
+from design.scanner import Scanner
+
+PLATE_THICKNESS = 8.0
+BODY_GAP = 0.6  # around the lidar's body
+SUB_PLATE_THICKNESS = 4.0  # thickness
+EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
+EAR_HALF_WIDTH = 10.0
+EAR_SCREW = SCREWS["M3"]
+EAR_SCREW_OFFSET = 5.5  # half the distance of the two screws of an ear
+H_FLOOR = (45.0, 58.0)  # for an upright lidar and from 60 deg of tilt: stiffness and shadow (measured study)
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """What belongs to the lidar, as boxes (low corner, high corner) in the laser frame.
+
+    Attributes:
+        body: the lidar.
+        cables: where they leave, straight.
+        plate: of the linkage, with a sub-plate if there is one.
+        under: heads of the lidar's screws below the plate, or the ears of the sub-plate.
+    """
+
+    body: Box
+    cables: tuple[Box, ...]
+    plate: Box
+    under: Box
+
+    def corners(self) -> Array:
+        """Corners of all boxes, shape (n, 3)."""
+        return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.under)])
+
+
+def lidar_pose(scanner: Scanner) -> Array:
+    """Laser in the rotation frame, shape (3, 3).
+
+    Raises:
+        BuildError: the lidar would hang upside down.
+    """
+    R = exact(scanner.angles.R_rot_laser())
+    if R[2, 2] < -1e-9:
+        tilt = math.degrees(math.acos(R[2, 2]))
+        raise BuildError(
+            f"alignment_linkage: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
+            "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
+        )
+    return R
+
+
+def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:
+    """A matrix (3, 3) as a record holds it."""
+    return tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
+
+
+def leaning_least(R: Array) -> Axis:
+    """The laser's axis along which a sub-plate's ears reach no lower than the lidar's corners."""
+    return "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
+
+
+def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
+    """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
+    return [i for i, hole in enumerate(lidar.mount_holes_mm) if not _driver_passes(lidar, stack, hole)]
+
+
+def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
+    """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
+    R, room = stack.R(), SCREWS[lidar.mount_screw].head_room
+    depth = np.linspace(0.0, 150.0, 601)
+    line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
+    reach = np.hypot(line[:, 0], line[:, 1]) - room
+    hub = (line[:, 2] > stack.shoulder - room) & (line[:, 2] < room - stack.h)
+    journal = (line[:, 2] > stack.hub_bottom - room) & (line[:, 2] < stack.hub_bottom + stack.journal)
+    radius = 0.0 if stack.bearing is None else stack.bearing.bore_mm / 2
+    return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
+
+
+def envelope_of(lidar: Lidar, sub_plate: Axis | None) -> Envelope:
+    """The boxes of one lidar, gaps included, in the laser frame (origin at the optical centre)."""
+    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    seat = -lidar.optical_height_mm
+    top = lidar.body_mm[2] - lidar.optical_height_mm
+    room = lidar.cable_diameter_mm / 2 + 2.0
+    back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
+    cables = tuple(
+        (
+            (back, y - room, seat + max(lidar.cable_z_mm - room, 0.5)),
+            (1.0 - half_x, y + room, seat + lidar.cable_z_mm + room),
+        )
+        for y in lidar.cable_y_mm
+    )
+    gap = BODY_GAP
+    if sub_plate is None:
+        lower = seat - PLATE_THICKNESS
+        under = (-half_x, -half_y, lower - SCREWS[lidar.mount_screw].head_height - 0.5), (half_x, half_y, lower)
+    else:
+        lower = seat - SUB_PLATE_THICKNESS - PLATE_THICKNESS
+        x, y = ear_corner(lidar, sub_plate)
+        under = (-x, -y, lower), (x, y, seat)
+    return Envelope(
+        body=((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)),
+        cables=cables,
+        plate=((-half_x, -half_y, lower), (half_x, half_y, seat)),
+        under=under,
+    )
+
+
+def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
+    """Half extents of the strip that holds the two ears of a sub-plate."""
+    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    if sub_plate == "x":
+        return half_x + EAR_REACH, EAR_HALF_WIDTH
+    return EAR_HALF_WIDTH, half_y + EAR_REACH
+
+
+def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
+    """Centres of the ears' screws: their heads stand clear of the lidar's body."""
+    half = (lidar.body_mm[0] if axis == "x" else lidar.body_mm[1]) / 2
+    away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
+    along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
+    return tuple(along if axis == "x" else [(y, x) for x, y in along])
+
+
+def rotor_radius(lidar: Lidar, sub_plate: Axis | None) -> float:
+    """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
+    return float(np.linalg.norm(envelope_of(lidar, sub_plate).corners(), axis=1).max())
+
+
+def box_corners(box: Box) -> Array:
+    """The eight corners, shape (8, 3)."""
+    low, high = box
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def exact(R: Array) -> Array:
+    """Cosines of 90 deg are 6e-17 in floating point: make them 0, so that right angles stay planar in the kernel."""
+    return np.where(np.abs(R) < 1e-12, 0.0, R)
+
+
+def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None) -> float:
+    """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
+    envelope = envelope_of(lidar, sub_plate)
+    lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
+    plate = float((box_corners(envelope.plate) @ R[2]).min())
+    heads = float((box_corners(envelope.under) @ R[2]).min())
+    wishes = [1.0 - z for z in lowest]
+    wishes.append(1.0 - heads - HUB_HEIGHT)
+    wishes.append(1.0 - plate - (HUB_HEIGHT - CLAMP_ABOVE_BOTTOM - 3.0))  # a driver reaches the radial screws
+    if ring_radius > hub_radius:
+        # the hub stays inside the cone that the ring hides anyway
+        wishes.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
+    tilt = math.degrees(math.acos(min(1.0, R[2, 2])))
+    low, high = H_FLOOR
+    wishes.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))
+    return math.ceil(max(wishes) * 4 - 1e-6) / 4

@@ -1,0 +1,43 @@
+"""Every part that a scanner may have, in the order of their drawing numbers: a new part is listed here."""
+
+from __future__ import annotations
+
+from cad.layout.layout import Layout
+from cad.parts.alignment_linkage import linkage_spec
+from cad.parts.base_mount import mount_spec
+from cad.parts.bearing_cage import base_spec, bell_spec
+from cad.parts.bearing_tower import tower_spec
+from cad.parts.capsule_holder import holder_spec
+from cad.parts.counterweight import counterweight_spec
+from cad.parts.drive_plate import plate_spec
+from cad.parts.main_shaft import main_shaft_spec
+from cad.parts.part_spec import PartSpec
+from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from cad.parts.servo_shaft import shaft_spec
+from cad.parts.shaft_ring import shaft_ring_spec
+from cad.parts.slip_ring_adapter import adapter_spec
+from cad.parts.sub_plate import sub_plate_spec
+
+ALL_PARTS = (
+    shaft_spec,
+    main_shaft_spec,
+    shaft_pulley_spec,
+    shaft_ring_spec,
+    tower_spec,
+    adapter_spec,
+    holder_spec,
+    base_spec,
+    bell_spec,
+    plate_spec,
+    drive_pulley_spec,
+    linkage_spec,
+    sub_plate_spec,
+    mount_spec,
+    counterweight_spec,
+)
+
+
+def parts_of(layout: Layout) -> list[PartSpec]:
+    """The parts that one scanner needs."""
+    specs = (spec_of(layout) for spec_of in ALL_PARTS)
+    return [spec for spec in specs if spec is not None]

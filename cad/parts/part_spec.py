@@ -1,0 +1,104 @@
+"""What is to know of a made part beside its shape: who moves it, how it is made, drawn, put in and called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import cadquery as cq
+
+from cad.layout.fits import OnSheet
+from cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
+from cad.layout.names import BASE_MOUNT
+from design.catalogue.products import Printer
+
+Process = Literal["printed", "turned", "sawn"]
+Colour = tuple[float, float, float]
+STEEL: Colour = (0.60, 0.62, 0.66)
+COLOURS: Mapping[Process, Colour] = {"printed": (0.93, 0.45, 0.10), "turned": (0.75, 0.76, 0.78), "sawn": STEEL}
+HORN = (
+    "servo.horn_boss_diameter_mm",
+    "servo.horn_boss_height_mm",
+    "servo.horn_circle_mm",
+    "servo.horn_holes",
+    "servo.horn_first_hole_deg",
+    "servo.horn_screw",
+)
+TURNED_FROM = "aluminium or steel"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of putting a scanner together: a title, and words with marks of `cad/layout/joints.py` for screws."""
+
+    title: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartSpec:
+    """One part of one scanner.
+
+    Attributes:
+        name: of `cad/layout/names.py`.
+        turns: whether it turns about the rotation axis, or stands still.
+        make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
+        step: that puts it in.
+        process: how it is made.
+        material: what it is made from, where that is not what the printer prints.
+        work: what else is done to it.
+        why_metal: why no printer makes it.
+        sheet: what its drawing says beyond its shape.
+        shaped_by: fields of products, as "kind.field", that shape it, and what they shape of this scanner: words.
+        angles: those that shape it and stand on its label.
+        seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
+        lifted: along what the exploded view moves it.
+        sweep: what it fills where it turns about an axis of its own.
+    """
+
+    name: str
+    turns: bool
+    make: Callable[[], cq.Solid]
+    step: Step
+    process: Process = "printed"
+    material: str = ""
+    work: str = ""
+    why_metal: str = ""
+    sheet: OnSheet = field(default_factory=OnSheet)
+    shaped_by: Mapping[str, str] = field(default_factory=dict)
+    angles: Literal["none", "rot", "laser"] = "none"
+    seat: float | None = None
+    lifted: Literal["axis", "radius", "lidar"] = "axis"
+    sweep: Callable[[], cq.Solid] | None = None
+
+    @property
+    def colour(self) -> Colour:
+        """SRGB."""
+        return COLOURS[self.process]
+
+    @property
+    def frame(self) -> Literal["servo", "rot"]:
+        """That it moves with."""
+        return "rot" if self.turns else "servo"
+
+    @property
+    def metal(self) -> bool:
+        """Whether no printer makes it."""
+        return self.process != "printed"
+
+    def density_g_cm3(self, printer: Printer) -> float:
+        """Of its material."""
+        densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
+        return densities[self.process]
+
+
+def shapes(what: str, *fields: str) -> dict[str, str]:
+    """Entries of `PartSpec.shaped_by` with the same words."""
+    return dict.fromkeys(fields, what)
+
+
+def on_servo_front(name: str) -> dict[str, str]:
+    """Entries of what stands on the servo's front, where the servo stands on the axis."""
+    both = shapes(f"{name} and {BASE_MOUNT}", "servo.case_max_mm", "servo.case_screw")
+    return both | shapes(name, "servo.horn_thickness_mm", "servo.case_holes_mm", "servo.case_holes_z_mm")
