@@ -9,8 +9,7 @@ from cad.assembly.joints import Joint
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
-from cad.drawings.views import views_of
-from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.files.bom import drawing_number
 from cad.geometry.holes import Round
 from cad.layout.balance import PART as COUNTERWEIGHT
@@ -38,7 +37,7 @@ def drawing_files(
         sheet = drawing_of(name, scanner, assembly, rounds[name], joints, masses_g[name], metal, config_hash)
         files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
         files[f"drawings/{name}.svg"] = svg_bytes(sheet)
-        files[f"drawings/{name}.dxf"] = dxf_text(sheet).encode("utf-8")
+        files[f"drawings/{name}.dxf"] = dxf_bytes(sheet)
     return files
 
 
@@ -57,7 +56,6 @@ def drawing_of(
     lathed = name in assembly.drive.turned()
     said = assembly.drive.on_sheets().get(name, OnSheet())
     part = part_of(assembly.made[name], rounds, lidar_axis, said)
-    views = views_of(part)
     material = "aluminium or steel, turned" if lathed else f"{scanner.printer.name}, solid"
     if isinstance(assembly.counterweight, Counterweight) and name == COUNTERWEIGHT:
         material = assembly.counterweight.stock
@@ -72,7 +70,7 @@ def drawing_of(
         ("made by", "scanwright"),
     )
     notes = _notes(scanner, part, said, [] if lathed else [_making(scanner, name)])
-    return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
+    return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
 def _carriers(joints: list[Joint]) -> set[str]:
