@@ -1,20 +1,31 @@
-"""Dimensions of one view as marks on paper: ordinates from the view's origin, call-outs with leaders, angles.
+"""Dimensions of one view: ordinates from the view's origin, diameters and other call-outs with leaders, angles.
 
 Ordinates are the running dimensions of ISO 129: every value is measured from 0, nothing adds up, and what lies close
-together is spread without crossing.
+together is spread without crossing. Places are millimetres of paper.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from cad.drawings.marks import TEXT, Bow, Head, Mark, Point, Stroke, Text
 from cad.drawings.patterns import number
+from cad.drawings.pen import ANGLE, DIAMETER, ORDINATE_X, ORDINATE_Y, TEXT, Pen, Point, width_of
 
 GAP = 1.5  # between an edge and the line that starts at it
 REACH = 6.0  # from the view to the bend of an ordinate
 STEP = TEXT * 1.35  # between two texts
+RIGHT = 0.5 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Callout:
+    """Words that point at a place in a view [mm of the model]; with a diameter they say it first, after a count."""
+
+    at: Point
+    words: str
+    centre: Point | None = None
 
 
 def spread(wanted: Sequence[float], step: float) -> list[float]:
@@ -32,91 +43,88 @@ def spread(wanted: Sequence[float], step: float) -> list[float]:
     return places
 
 
-def thinned(values: dict[float, float]) -> dict[float, float]:
-    """One of several values that read the same on paper to a tenth."""
-    out: dict[float, float] = {}
+def ordinates(pen: Pen, values: dict[float, float], edge: float, *, below: bool, sign: float = 1.0) -> None:
+    """Horizontal positions under a view, or vertical ones at its left.
+
+    Args:
+        pen: about the view's origin.
+        values: position: where across it the feature lies that it belongs to [mm of the model].
+        edge: of the view, lower or left.
+        below: which of them.
+        sign: -1 where the axis that is measured points to the left.
+    """
+    places = thinned(values)
+    for (value, aside), place in zip(places, spread([v * pen.scale for v, _ in places], STEP), strict=True):
+        feature = (aside * pen.scale, value * pen.scale)
+        bends = ((feature[0] - GAP, feature[1]), (edge - REACH / 2, feature[1]), (edge - REACH, place))
+        words, end = number(sign * value), edge - REACH - 2.0
+        base = place + (TEXT / 2 - 0.3 if below else 0.2 - TEXT / 2)
+        middle = (end - width_of(words) / 2, place)
+        path = [*bends, (edge - REACH - GAP, place), (end, base), middle, feature]
+        points = [(y, x) if below else (x, y) for x, y in path]
+        own = pen.dimension(
+            ORDINATE_X if below else ORDINATE_Y,
+            "-<>" if words.startswith("-") else "<>",
+            points[5],
+            defpoint=(0.0, 0.0),
+            defpoint2=points[6],
+            defpoint3=points[3],
+        )
+        own.stroke("DIMENSION", points[:4])
+        own.text(points[4], words, anchor="right", angle=90.0 if below else 0.0)
+
+
+def thinned(values: dict[float, float]) -> list[tuple[float, float]]:
+    """Positions in ascending order; of several that read the same on paper to a tenth the first one."""
+    out: list[tuple[float, float]] = []
     for value in sorted(values):
-        if not out or value - max(out) > 0.05:
-            out[value] = values[value]
+        if not out or value - out[-1][0] > 0.05:
+            out.append((value, values[value]))
     return out
 
 
-def ordinates_below(values: dict[float, float], scale: float, edge: float, sign: float = 1.0) -> list[Mark]:
-    """Horizontal positions under a view.
-
-    Args:
-        values: model position: height [paper mm] of the feature that it belongs to.
-        scale: paper over model.
-        edge: lower edge of the view [paper mm].
-        sign: -1 where the axis that is measured points to the left.
-    """
-    marks: list[Mark] = []
-    order = sorted(values)
-    for value, place in zip(order, spread([v * scale for v in order], STEP), strict=True):
-        x = value * scale
-        bend = edge - REACH / 2
-        line = ((x, values[value] - GAP), (x, bend), (place, edge - REACH), (place, edge - REACH - 1.5))
-        marks.append(Stroke("dimension", line))
-        marks.append(
-            Text((place + TEXT / 2 - 0.3, edge - REACH - 2.0), number(sign * value), anchor="right", angle=90.0)
-        )
-    return marks
+def callouts_right(pen: Pen, callouts: list[Callout], edge: float) -> None:
+    """Texts in a column at the right of a view, each with a leader to what it tells of."""
+    order = sorted(callouts, key=lambda callout: (callout.at[1], -callout.at[0], callout.words))
+    places = spread([callout.at[1] * pen.scale for callout in order], TEXT * 1.7)
+    for callout, y in zip(order, places, strict=True):
+        x, own = edge + REACH, pen
+        tip = (callout.at[0] * pen.scale, callout.at[1] * pen.scale)
+        if callout.centre is not None:
+            across = 2 * callout.centre[0] * pen.scale - tip[0], 2 * callout.centre[1] * pen.scale - tip[1]
+            said = f"Ø{number(2 * math.dist(callout.at, callout.centre))}"
+            text_at = (x + 2.8 + width_of(callout.words) / 2, y)
+            own = pen.dimension(DIAMETER, callout.words.replace(said, "<>", 1), text_at, defpoint=across, defpoint4=tip)
+        own.stroke("DIMENSION", (tip, (x, y), (x + 2.0, y)))
+        own.head(tip, math.atan2(tip[1] - y, tip[0] - x))
+        own.text((x + 2.8, y - TEXT / 2 + 0.2), callout.words)
 
 
-def ordinates_left(values: dict[float, float], scale: float, edge: float) -> list[Mark]:
-    """Vertical positions at the left of a view; `values` maps to the x of the feature, `edge` is the left edge."""
-    marks: list[Mark] = []
-    order = sorted(values)
-    for value, place in zip(order, spread([v * scale for v in order], STEP), strict=True):
-        y = value * scale
-        bend = edge - REACH / 2
-        line = ((values[value] - GAP, y), (bend, y), (edge - REACH, place), (edge - REACH - 1.5, place))
-        marks.append(Stroke("dimension", line))
-        marks.append(Text((edge - REACH - 2.0, place - TEXT / 2 + 0.2), number(value), anchor="right"))
-    return marks
-
-
-def callouts_right(targets: list[tuple[Point, str]], edge: float) -> list[Mark]:
-    """Texts in a column at the right of a view, each with a leader to its target [paper mm]."""
-    marks: list[Mark] = []
-    order = sorted(targets, key=lambda target: (target[0][1], -target[0][0], target[1]))
-    places = spread([point[1] for point, _ in order], TEXT * 1.7)
-    for (point, words), y in zip(order, places, strict=True):
-        bend = (edge + REACH, y)
-        marks.append(Stroke("dimension", (point, bend, (edge + REACH + 2.0, y))))
-        marks.append(Head(point, math.atan2(point[1] - y, point[0] - bend[0])))
-        marks.append(Text((edge + REACH + 2.8, y - TEXT / 2 + 0.2), words))
-    return marks
-
-
-def angle_between(at: Point, first: float, second: float, radius: float, words: str) -> list[Mark]:
+def angle_between(pen: Pen, at: Point, first: float, second: float, radius: float, words: str) -> None:
     """An angle between two directions [rad] with a common end, in a box: theoretically exact (ISO 1101)."""
     low, high = sorted((first, second))
     if high - low > math.pi:
         low, high = high, low + 2 * math.pi
-    x, y = at
-    marks: list[Mark] = [Bow("dimension", at, radius, low, high)]
-    for angle, turn in ((low, -1.0), (high, 1.0)):
-        reach = radius + 4.0
-        end = (x + reach * math.cos(angle), y + reach * math.sin(angle))
-        marks.append(Stroke("centre", (at, end)))
-        tip = (x + radius * math.cos(angle), y + radius * math.sin(angle))
-        marks.append(Head(tip, angle + turn * math.pi / 2))
-    middle = (low + high) / 2
-    half, height = Text(at, words).width / 2 + 0.8, TEXT + 1.6
-    cx = x + (radius + 2.5 + half * abs(math.cos(middle))) * math.cos(middle)
-    cy = y + (radius + 2.5 + height / 2 * abs(math.sin(middle))) * math.sin(middle)
-    box = ((cx - half, cy - height / 2), (cx + half, cy - height / 2), (cx + half, cy + height / 2))
-    marks.append(Stroke("dimension", (*box, (cx - half, cy + height / 2), (cx - half, cy - height / 2))))
-    marks.append(Text((cx, cy - TEXT / 2 + 0.2), words, anchor="middle"))
-    return marks
+
+    def out(angle: float, reach: float, wide: float = 0.0, tall: float = 0.0) -> Point:
+        c, s = math.cos(angle), math.sin(angle)
+        return at[0] + (reach + wide * abs(c)) * c, at[1] + (reach + tall * abs(s)) * s
+
+    middle, half, height = (low + high) / 2, width_of(words) / 2 + 0.8, TEXT / 2 + 0.8
+    x, y = out(middle, radius + 2.5, half, height)
+    ends = {"defpoint2": out(low, radius), "defpoint3": out(high, radius), "defpoint4": at}
+    own = pen.dimension(ANGLE, "<>", (x, y), defpoint=out(middle, radius), **ends)
+    own.arc("DIMENSION", at, radius, low, high)
+    for angle, turn in ((low, -RIGHT), (high, RIGHT)):
+        own.stroke("CENTRE", (at, out(angle, radius + 4.0)))
+        own.head(out(angle, radius), angle + turn)
+    box = [(x - half, y - height), (x + half, y - height), (x + half, y + height), (x - half, y + height)]
+    own.stroke("DIMENSION", [*box, box[0]])
+    own.text((x, y - TEXT / 2 + 0.2), words, anchor="middle")
 
 
-def centre_mark(at: Point, radius: float) -> list[Mark]:
+def centre_mark(pen: Pen, at: Point, radius: float) -> None:
     """A cross through a hole."""
-    reach = radius + 1.5
-    x, y = at
-    return [
-        Stroke("centre", ((x - reach, y), (x + reach, y))),
-        Stroke("centre", ((x, y - reach), (x, y + reach))),
-    ]
+    reach, (x, y) = radius + 1.5, at
+    pen.stroke("CENTRE", ((x - reach, y), (x + reach, y)))
+    pen.stroke("CENTRE", ((x, y - reach), (x, y + reach)))

@@ -8,8 +8,7 @@ from cad.assembly.assembly import Assembly
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
-from cad.drawings.views import views_of
-from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import Round
 from cad.layout.fits import OnSheet
 from design.catalogue.products import Printer
@@ -31,7 +30,7 @@ def drawing_files(
         sheet = drawing_of(name, scanner, assembly, rounds[name], masses_g[name], config_hash)
         files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
         files[f"drawings/{name}.svg"] = svg_bytes(sheet)
-        files[f"drawings/{name}.dxf"] = dxf_text(sheet).encode("utf-8")
+        files[f"drawings/{name}.dxf"] = dxf_bytes(sheet)
     return files
 
 
@@ -47,7 +46,6 @@ def drawing_of(
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
     part = part_of(assembly.made[name], rounds, lidar_axis, spec.sheet)
-    views = views_of(part)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),
@@ -60,7 +58,7 @@ def drawing_of(
         ("made by", "scanwright"),
     )
     notes = _notes(scanner, part, spec.sheet, [] if spec.metal else [_clearances(scanner.printer)])
-    return sheet_of(part, views, Title(cells, tuple(notes)), f"{name} {config_hash}")
+    return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
 def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:

@@ -62,13 +62,14 @@ class Chain:
 Curve = Line | Arc | Chain
 
 
-def project(solid: cq.Solid, right: Array, up: Array, *, hidden: bool = True) -> list[Curve]:
+def project(solid: cq.Solid, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
     """The lines of a solid in the plane of a view, in a fixed order.
 
     Args:
         solid: what is drawn.
         right: unit vector that points to the right of the view.
         up: unit vector that points up in it; the viewer is at right x up.
+        zero: point that the plane has its zero at.
         hidden: whether hidden lines are wanted.
     """
     towards = np.cross(right, up)
@@ -81,7 +82,7 @@ def project(solid: cq.Solid, right: Array, up: Array, *, hidden: bool = True) ->
     algorithm.Update()
     algorithm.Hide()
     shapes = HLRBRep_HLRToShape(algorithm)
-    origin = np.array([middle @ right, middle @ up])
+    origin = np.array([(middle - zero) @ right, (middle - zero) @ up])
     pieces: list[tuple[Array, bool]] = []
     for compound in (shapes.VCompound(), shapes.OutLineVCompound()):
         pieces += [(points + origin, False) for points in _edges(compound)]

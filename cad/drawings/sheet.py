@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.drawings.marks import GLYPH_WIDTH, Bow, Mark, Point, Stroke, Text, box_of, moved
+from ezdxf.document import Drawing
+
 from cad.drawings.part import Part
-from cad.drawings.views import View, draw
+from cad.drawings.pen import GLYPH_WIDTH, Pen, Point, document_at
+from cad.drawings.sizes import draw, sizes_of
+from cad.drawings.views import views_of
 
 A3, A2 = (420.0, 297.0), (594.0, 420.0)
 LEFT, EDGE = 20.0, 10.0  # margins of the frame (ISO 5457)
@@ -19,6 +22,7 @@ SCALES = ((5.0, A3), (2.0, A3), (1.0, A3), (1.0, A2), (0.5, A3), (0.5, A2), (0.2
 PAD = 8.0  # between views
 
 Size = tuple[float, float]
+Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,35 +35,41 @@ class Title:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """All marks of a drawing, the scale of its views (paper over model), and the size of the paper."""
+    """A drawing, its views full size; the scale of its views on paper, and the size of the paper."""
 
-    marks: tuple[Mark, ...]
+    document: Drawing
     scale: float
     size: Size
     name: str
 
 
-def sheet_of(part: Part, views: list[View], title: Title, name: str) -> Sheet:
+def sheet_of(part: Part, title: Title, name: str) -> Sheet:
     """Lay out a drawing."""
+    views = [(view, sizes_of(view, part)) for view in views_of(part)]
     for scale, size in SCALES:
-        blocks = [draw(view, part, scale) for view in views]
-        placed = _placed(blocks, size, 4) or _placed(blocks, size, 3, force=(scale, size) == SCALES[-1])
-        if placed is not None:
+        pens = [Pen(None, scale) for _ in views]
+        for pen, (view, sizes) in zip(pens, views, strict=True):
+            draw(pen, view, sizes, part)
+        boxes = [pen.box() for pen in pens]
+        places = _placed(boxes, size, 4) or _placed(boxes, size, 3, force=(scale, size) == SCALES[-1])
+        if places is not None:
             break
+    document = document_at(scale)
+    space = document.modelspace()
+    for place, (view, sizes) in zip(places or (), views, strict=True):
+        draw(Pen(space, scale, place), view, sizes, part)
     ratio = f"{scale:g}:1" if scale >= 1 else f"1:{1 / scale:g}"
-    ratio += "   A3" if size == A3 else "   A2"
-    marks = (*(placed or ()), *_frame(size), *_notes(title), *_title_block(title, ratio, size))
-    return Sheet(marks, scale, size, name)
+    _frame(Pen(space, scale), title, f"{ratio}   {'A3' if size == A3 else 'A2'}", size)
+    return Sheet(document, scale, size, name)
 
 
-def _placed(blocks: list[list[Mark]], size: Size, joined: int, *, force: bool = False) -> list[Mark] | None:
-    """Views in their places; None if they do not fit.
+def _placed(boxes: list[Box], size: Size, joined: int, *, force: bool = False) -> list[Point] | None:
+    """Places of the views' origins, each view's box being about it; None if they do not fit.
 
     First angle: the top view below the front view, the view from the left at its right; they share their origins.
     Where four are joined the isometric stands below that; the others are in columns further right, and it is the first
     of them where three are joined, as a long part wants it.
     """
-    boxes = [box_of(block) for block in blocks]
     room_x, room_y = size[0] - LEFT - EDGE - 2 * PAD, size[1] - 2 * EDGE - STRIP - 2 * PAD
     left = max(-boxes[0][0], -boxes[1][0])
     right = max(boxes[0][2], boxes[1][2])
@@ -86,45 +96,35 @@ def _placed(blocks: list[list[Mark]], size: Size, joined: int, *, force: bool = 
         return None
     dx = LEFT + PAD + max(0.0, (room_x - total) / 2)
     dy = size[1] - EDGE - PAD - max(0.0, (room_y + bottom) / 2)
-    return [moved(mark, x + dx, y + dy) for block, (x, y) in zip(blocks, at, strict=True) for mark in block]
+    return [(x + dx, y + dy) for x, y in at]
 
 
-def _frame(size: Size) -> list[Mark]:
-    left, bottom, right, top = LEFT, EDGE, size[0] - EDGE, size[1] - EDGE
-    return [Stroke("frame", ((left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)))]
-
-
-def _notes(title: Title) -> list[Mark]:
-    top = EDGE + STRIP - 5.0
-    return [Text((LEFT + 4.0, top - 4.2 * i), line, height=2.2) for i, line in enumerate(title.notes)]
-
-
-def _title_block(title: Title, ratio: str, size: Size) -> list[Mark]:
-    """Cells in rows of three; the last one holds the scale and the symbol of first-angle projection."""
-    bottom, right = EDGE, size[0] - EDGE
+def _frame(pen: Pen, title: Title, ratio: str, size: Size) -> None:
+    """Frame, notes, and the title block: rows of three cells, the last one with scale and symbol of projection."""
+    bottom, right, top = EDGE, size[0] - EDGE, size[1] - EDGE
+    pen.stroke("FRAME", ((LEFT, bottom), (right, bottom), (right, top), (LEFT, top), (LEFT, bottom)))
+    for i, line in enumerate(title.notes):
+        pen.text((LEFT + 4.0, EDGE + STRIP - 5.0 - 4.2 * i), line, height=2.2)
     left = right - BLOCK
     rows = -(-(len(title.cells) + 1) // 3)
     height, width = STRIP / rows, BLOCK / 3
-    marks: list[Mark] = [Stroke("frame", ((left, bottom), (left, bottom + STRIP), (right, bottom + STRIP)))]
+    pen.stroke("FRAME", ((left, bottom), (left, bottom + STRIP), (right, bottom + STRIP)))
     cells = [*title.cells, ("scale, projection (ISO 5456-2)", ratio)]
     for i, (name, content) in enumerate(cells):
         x, y = left + width * (i % 3), bottom + STRIP - height * (i // 3 + 1)
-        marks.append(Stroke("dimension", ((x, y), (x + width, y), (x + width, y + height))))
-        marks.append(Text((x + 1.5, y + height - 3.2), name, height=1.8))
+        pen.stroke("DIMENSION", ((x, y), (x + width, y), (x + width, y + height)))
+        pen.text((x + 1.5, y + height - 3.2), name, height=1.8)
         fitting = min(3.5, (width - 3.0) / max(len(content), 1) / GLYPH_WIDTH)
-        marks.append(Text((x + 1.5, y + 2.2), content, height=fitting))
-    x, y = left + width * ((len(cells) - 1) % 3) + width - 22.0, bottom + height / 2 - 1.0
-    return [*marks, *_first_angle(x, y)]
+        pen.text((x + 1.5, y + 2.2), content, height=fitting)
+    x = left + width * ((len(cells) - 1) % 3) + width - 22.0
+    _first_angle(pen, x, bottom + height / 2 - 1.0)
 
 
-def _first_angle(x: float, y: float) -> list[Mark]:
+def _first_angle(pen: Pen, x: float, y: float) -> None:
     """The cone: seen from its side, then from its small end at the right."""
-    turn = 6.283185307179586
-    return [
-        Stroke("visible", ((x, y - 1.5), (x + 7.0, y - 3.0), (x + 7.0, y + 3.0), (x, y + 1.5), (x, y - 1.5))),
-        Stroke("centre", ((x - 1.5, y), (x + 8.5, y))),
-        Bow("visible", (x + 14.0, y), 1.5, 0.0, turn),
-        Bow("visible", (x + 14.0, y), 3.0, 0.0, turn),
-        Stroke("centre", ((x + 9.8, y), (x + 18.2, y))),
-        Stroke("centre", ((x + 14.0, y - 4.2), (x + 14.0, y + 4.2))),
-    ]
+    pen.stroke("VISIBLE", ((x, y - 1.5), (x + 7.0, y - 3.0), (x + 7.0, y + 3.0), (x, y + 1.5), (x, y - 1.5)))
+    pen.stroke("CENTRE", ((x - 1.5, y), (x + 8.5, y)))
+    pen.arc("VISIBLE", (x + 14.0, y), 1.5)
+    pen.arc("VISIBLE", (x + 14.0, y), 3.0)
+    pen.stroke("CENTRE", ((x + 9.8, y), (x + 18.2, y)))
+    pen.stroke("CENTRE", ((x + 14.0, y - 4.2), (x + 14.0, y + 4.2)))

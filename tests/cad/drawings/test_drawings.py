@@ -10,22 +10,28 @@ import ezdxf
 import numpy as np
 import pytest
 import trimesh
+from ezdxf.disassemble import recursive_decompose
 from hypothesis import given
 from hypothesis import strategies as st
 from svglib.svglib import svg2rlg
 
 from cad.drawings.dimensions import spread
-from cad.drawings.marks import Bow, Head, Stroke, Text, box_of
 from cad.drawings.patterns import number, patterns_of
+from cad.drawings.pen import DIAMETER, TURN, Pen, document_at
 from cad.drawings.project import Arc, Chain, Line, project
-from cad.drawings.sheet import A2, A3
+from cad.drawings.sheet import A2, A3, Sheet
 from cad.drawings.slots import slot_words, slots_of
-from cad.drawings.write import dxf_text, pdf_bytes, svg_bytes
+from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import rounds_of
 from cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)
 SVG = "{http://www.w3.org/2000/svg}"
+
+
+def said_in(entities):
+    """Texts, those in the pictures of dimensions too."""
+    return [entity.plain_text() for entity in recursive_decompose(entities) if entity.dxftype() == "TEXT"]
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +44,7 @@ def sheets(made):
         svg = ET.parse(made.folder / "drawings" / f"{part.name}.svg")
         out[part.name] = SimpleNamespace(
             dxf=document,
-            said=[entity.dxf.text.replace("%%c", "Ø").replace("%%d", "°") for entity in document.query("TEXT")],
+            said=said_in(document.modelspace()),
             svg=[element.text for element in svg.iter(f"{SVG}text")],
             mesh=trimesh.load(made.folder / "parts" / f"{part.name}.stl"),
         )
@@ -156,6 +162,34 @@ def test_the_bearing_has_a_fit_on_both_of_its_sheets(sheets):
     assert "Ø29.9  ±0.1" in sheets["alignment_linkage"].said
 
 
+def test_every_dimension_measures_what_it_says(sheets):
+    for sheet in sheets.values():
+        dimensions = list(sheet.dxf.query("DIMENSION"))
+        assert len(dimensions) > 5
+        for dimension in dimensions:
+            kind, measured = dimension.dimtype, dimension.get_measurement()
+            if kind == 6:
+                measured = abs(measured.x if dimension.dxf.dimtype & 64 else measured.y)
+            value = {3: "Ø", 5: "", 6: ""}[kind] + number(measured) + {3: "", 5: "°", 6: ""}[kind]
+            words = dimension.dxf.text.replace("<>", value).replace("%%c", "Ø")
+            assert said_in([dimension]) == [words]
+        measured = {text for dimension in dimensions for text in said_in([dimension])}
+        loose = set(sheet.said) - measured  # diameters on the axis and ordinates are all measured
+        assert not [text for text in loose if re.fullmatch(r"-?[\d.]+°?|Ø[\d.]+(  [+±].*)?", text)]
+
+
+def test_a_diameter_spans_the_circle_that_it_names(sheets):
+    holes = [d for d in sheets["servo_shaft"].dxf.query("DIMENSION") if d.dxf.text == "8x <> THRU ON %%c22"]
+    circles = {
+        tuple(np.round(c.dxf.center.xyz[:2], 6)): c.dxf.radius for c in sheets["servo_shaft"].dxf.query("CIRCLE")
+    }
+    (hole,) = holes
+    centre = tuple(np.round(((hole.dxf.defpoint + hole.dxf.defpoint4) / 2).xyz[:2], 6))
+    near = min(circles, key=lambda at: np.hypot(at[0] - centre[0], at[1] - centre[1]))
+    np.testing.assert_allclose(near, centre, atol=0.01)
+    assert circles[near] == pytest.approx(hole.get_measurement() / 2, abs=2e-3)
+
+
 def test_geometry_in_the_dxf_is_true_to_size(sheets):
     sheet = sheets["servo_shaft"]
     circles = [entity for entity in sheet.dxf.query("CIRCLE") if entity.dxf.layer == "VISIBLE"]
@@ -175,7 +209,7 @@ def test_svg_is_read_and_the_pdf_is_one_page(made, sheets):
 
 
 def drawn(solid, right, up):
-    curves = project(solid, right, up)
+    curves = project(solid, right, up, np.zeros(3))
     return [c for c in curves if not c.hidden], [c for c in curves if c.hidden]
 
 
@@ -253,25 +287,44 @@ def test_spread_keeps_order_distance_and_mean(wanted, step):
         np.testing.assert_allclose(places, wanted, atol=1e-9)
 
 
-def test_every_kind_of_mark_is_written_in_every_format():
-    marks = (
-        Stroke("hidden", ((10, 10), (20, 10), (20, 30))),
-        Bow("visible", (50, 50), 10, 0.0, 2 * np.pi),
-        Bow("centre", (50, 50), 20, 0.5, 4.0),
-        Text((30, 30), "Ø5 <90°>", anchor="middle", angle=90.0),
-        Head((10, 10), 0.0),
-    )
-    sheet = SimpleNamespace(marks=marks, scale=0.5, size=A3, name="a & b")
-    assert [svg_bytes(sheet), pdf_bytes(sheet), dxf_text(sheet)] == [
-        svg_bytes(sheet),
-        pdf_bytes(sheet),
-        dxf_text(sheet),
-    ]
-    document = ezdxf.read(io.StringIO(dxf_text(sheet)))
+def test_everything_that_a_pen_draws_is_in_every_format():
+    def sheet():
+        document = document_at(0.5)
+        pen = Pen(document.modelspace(), 0.5, (10.0, 10.0))
+        pen.stroke("HIDDEN", ((0, 0), (10, 0), (10, 20)))
+        pen.arc("VISIBLE", (40, 40), 10)
+        pen.arc("CENTRE", (40, 40), 20, 0.5, 4.0)
+        own = pen.dimension(DIAMETER, "2x <> <90°>", (20, 20), defpoint=(30, 40), defpoint4=(50, 40))
+        own.text((20, 20), "2x Ø40 <90°>", anchor="middle", angle=90.0)
+        own.head((0, 0), 0.0)
+        return pen, Sheet(document, 0.5, A3, "a & b")
+
+    (pen, first), (_, second) = sheet(), sheet()
+    for write in (dxf_bytes, svg_bytes, pdf_bytes):
+        assert write(first) == write(second)
+    document = ezdxf.read(io.StringIO(dxf_bytes(first).decode("utf-8")))
     kinds = sorted(entity.dxftype() for entity in document.modelspace())
-    assert kinds == ["ARC", "CIRCLE", "LWPOLYLINE", "SOLID", "TEXT"]
+    assert kinds == ["ARC", "CIRCLE", "DIMENSION", "LWPOLYLINE"]
     assert document.query("CIRCLE")[0].dxf.radius == 20  # views are 1:1, the sheet grows
-    assert ET.fromstring(svg_bytes(sheet)).find(f".//{SVG}text").text == "Ø5 <90°>"
-    left, low, right, top = box_of(list(marks))
-    assert (left, right, top) == (pytest.approx(7.8), pytest.approx(50 + 20 * np.cos(0.5)), pytest.approx(70, abs=0.2))
-    assert low == pytest.approx(9.65)
+    assert document.query("DIMENSION")[0].get_measurement() == pytest.approx(40)
+    page = ET.fromstring(svg_bytes(first))
+    text = page.find(f".//{SVG}text")
+    assert text.text == "2x Ø40 <90°>" and (text.get("x"), text.get("y")) == ("30", "267")
+    circle = next(path for path in page.iter(f"{SVG}path") if path.get("d").count("C") > 3)
+    assert circle.get("d").startswith("M60 247 C")  # the right end of the circle, on paper, y down
+    left, low, right, top = pen.box()
+    assert (left, right, top) == (pytest.approx(-2.2), pytest.approx(40 + 20 * np.cos(0.5)), pytest.approx(60, abs=0.2))
+    assert low == pytest.approx(-0.35)
+    assert pen.box() == measured_box()
+
+
+def measured_box():
+    """Of the same, drawn on nothing."""
+    pen = Pen(None, 0.5)
+    pen.stroke("HIDDEN", ((0, 0), (10, 0), (10, 20)))
+    pen.arc("VISIBLE", (40, 40), 10, 0.0, TURN)
+    pen.arc("CENTRE", (40, 40), 20, 0.5, 4.0)
+    own = pen.dimension(DIAMETER, "<>", (20, 20))
+    own.text((20, 20), "2x Ø40 <90°>", anchor="middle", angle=90.0)
+    own.head((0, 0), 0.0)
+    return pen.box()

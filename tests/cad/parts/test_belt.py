@@ -15,6 +15,7 @@ from cad.assembly.joints import joints_of, without_traps
 from cad.assembly.make import make_parts
 from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
+from cad.drawings.write import Words, drawn
 from cad.files.bom import items_of
 from cad.files.instructions import instructions_text
 from cad.files.urdf import urdf_text
@@ -344,7 +345,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     solid = made.assembly.made["main_shaft"]
     sheet = drawing_of("main_shaft", made.scanner, made.assembly, rounds_of(solid), 80.0, "0" * 12)
-    said = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
+    said = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
     assert [text for text in said if text.startswith("Ø") and ":" not in text] == [
         "Ø24.96  +0.02/0",
@@ -363,7 +364,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     for name in ("drive_pulley", "bearing_tower"):
         solid, rest = made.assembly.made[name], (1.0, "0" * 12)
         sheet = drawing_of(name, made.scanner, made.assembly, rounds_of(solid), *rest)
-        said[name] = [mark.text for mark in sheet.marks if hasattr(mark, "text")]
+        said[name] = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
     assert any(
         text == "Ø37.1 ±0.1: seat of 61805-2RS, from size for size to a sliding fit." for text in said["bearing_tower"]
@@ -507,7 +508,7 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
     assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, assembly, list(joints.values()))}
     sheet = drawing_of("bearing_tower", scanner, assembly, rounds["bearing_tower"], 1.0, "0" * 12)
-    said = {mark.text for mark in sheet.marks if hasattr(mark, "text")}
+    said = {item.text for item in drawn(sheet) if isinstance(item, Words)}
     assert {
         "Hexagons under the arms for nuts M4: 7.2 across flats.",
         "Slots in the foot for nuts M3: 5.7 wide, from its corners.",

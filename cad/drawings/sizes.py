@@ -1,0 +1,210 @@
+"""What a view says of a part's sizes, and the view drawn with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad import solids
+from cad.drawings.dimensions import Callout, angle_between, callouts_right, centre_mark, ordinates
+from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
+from cad.drawings.patterns import Pattern, number
+from cad.drawings.pen import Layer, Pen, Point
+from cad.drawings.project import Arc, Line
+from cad.drawings.slots import slot_words
+from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
+
+NEARLY = 0.2  # an extent that differs less from a radius is that radius, notched
+OVER = 3.0  # of a centre line beyond the part
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Of a view, about its origin, model mm.
+
+    Attributes:
+        box: left, bottom, right and top of its lines.
+        below: horizontal positions, and the height of what lies there.
+        beside: vertical positions, and where what lies there is.
+        callouts: diameters, holes and slots.
+        holes: what gets a cross: middle and half of its size.
+        circles: that holes lie on: middle and radius.
+    """
+
+    box: tuple[float, float, float, float]
+    below: dict[float, float]
+    beside: dict[float, float]
+    callouts: list[Callout]
+    holes: list[tuple[Point, float]]
+    circles: list[tuple[Point, float]]
+
+
+def sizes_of(view: View, part: Part) -> Sizes:
+    """Of the holes and slots that the view looks along; in front and top view also those of the whole part."""
+    measure = Pen(None, 1.0)
+    _outline(measure, view)
+    sizes = Sizes(measure.box(), {}, {}, [], [], [])
+    if view.kind not in ("iso", "angle"):
+        _holes(sizes, view, part)
+        if view.kind == "front":
+            _cylinders(sizes, part)
+        _faces(sizes, view, part)
+        left, low, _, _ = sizes.box
+        for values, edge in ((sizes.below, low), (sizes.beside, left)):
+            if values:
+                values.setdefault(0.0, 0.0 if view.kind == "onto" else edge)
+    return sizes
+
+
+def draw(pen: Pen, view: View, sizes: Sizes, part: Part) -> None:
+    """One view with its dimensions, about its origin."""
+    left, low, right, high = (c * pen.scale for c in sizes.box)
+    pen.reached.extend(((left, low), (right, high)))
+    if pen.space is not None:
+        _outline(pen, view)
+    if view.kind != "iso":
+        _centre_lines(pen, view, part, (left, low, right, high))
+    for middle, radius in sizes.circles:
+        pen.arc("CENTRE", pen.paper(middle), radius * pen.scale)
+    for middle, radius in sizes.holes:
+        centre_mark(pen, pen.paper(middle), radius * pen.scale)
+    sign = -1.0 if view.kind == "left" else 1.0  # it looks along the axis that points to the left
+    ordinates(pen, sizes.below, low, below=True, sign=sign)
+    ordinates(pen, sizes.beside, left, below=False)
+    callouts_right(pen, sizes.callouts, right)
+    told = [p for p in part.patterns if len(p.holes) >= 3 and shows_angle(view, p)]
+    if told and view.kind in ("front", "left", "angle"):
+        _angle(pen, view, told[0], part, high + OVER)
+    if view.title:
+        pen.text(((left + right) / 2, pen.box()[3] + 2.5), view.title, anchor="middle")
+
+
+def _outline(pen: Pen, view: View) -> None:
+    for curve in view.curves:
+        layer: Layer = "HIDDEN" if curve.hidden else "VISIBLE"
+        if isinstance(curve, Arc):
+            pen.arc(layer, pen.paper(curve.centre), curve.radius * pen.scale, curve.start, curve.end)
+        else:
+            points = (curve.start, curve.end) if isinstance(curve, Line) else curve.points
+            pen.stroke(layer, [pen.paper(point) for point in points])
+
+
+def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, float, float]) -> None:
+    """The rotation axis and, where the lidar sits, the optical centre."""
+    left, low, right, high = box
+    if parallel(view.up, Z) and view.kind != "onto":
+        top = high + OVER
+        if part.lidar_axis is not None:
+            x, y = pen.paper(view.flat((0.0, 0.0, 0.0)))
+            top = max(top, y + OVER)
+            pen.arc("DIMENSION", (x, y), 1.5)
+            centre_mark(pen, (x, y), 1.5)
+            if view.kind != "left":
+                pen.text((x - 3.0, y + 1.0), "OPTICAL CENTRE", anchor="right")
+        pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, top)))
+    elif parallel(view.towards, Z):
+        pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, high + OVER)))
+        pen.stroke("CENTRE", ((left - OVER, 0.0), (right + OVER, 0.0)))
+
+
+def _holes(sizes: Sizes, view: View, part: Part) -> None:
+    for pattern in part.patterns:
+        if not parallel(pattern.direction, view.towards):
+            if view.kind == "top" and not _seen_along(pattern, view, part):
+                sizes.callouts.append(_slanted(view, pattern, part))
+            continue
+        flat = [view.flat(hole.low) for hole in pattern.holes]
+        radius = pattern.holes[0].diameter / 2
+        if pattern.circle:
+            sizes.circles.append((view.flat(pattern.centre), pattern.circle / 2))
+        last = _crossed(sizes, flat, radius, placed=not pattern.circle)
+        diagonal = radius * math.sqrt(0.5)
+        sizes.callouts.append(Callout((last[0] + diagonal, last[1] + diagonal), pattern.words(), last))
+    for slots in part.slots:
+        if parallel(slots[0].direction, view.towards):
+            flat = [view.flat(slot.middle) for slot in slots]
+            x, y = _crossed(sizes, flat, slots[0].length / 2, placed=True)
+            sizes.callouts.append(Callout((x + slots[0].width / 2, y), slot_words(slots)))
+
+
+def _crossed(sizes: Sizes, middles: list[Point], half: float, *, placed: bool) -> Point:
+    """Mark holes, with their positions or without; the last one, which gets the call-out."""
+    for x, y in middles:
+        sizes.holes.append(((x, y), half))
+        if placed:
+            sizes.below[_key(x)] = min(y, sizes.below.get(_key(x), math.inf))
+            sizes.beside[_key(y)] = min(x, sizes.beside.get(_key(y), math.inf))
+    return max(middles, key=lambda p: (round(p[0], 2), round(p[1], 2)))
+
+
+def _cylinders(sizes: Sizes, part: Part) -> None:
+    """Diameters and ends of those about the axis, seen from the front."""
+    for item in part.axial:
+        z = (item.low[2] + item.high[2]) / 2 - part.datum
+        words = f"Ø{number(item.diameter)}{part.tolerance(item)}"
+        if item.hole and not item.through:
+            words += f" x {number(item.length)} DEEP"
+        sizes.callouts.append(Callout((item.diameter / 2, z), words, (0.0, z)))
+        for end in (item.low, item.high):
+            sizes.beside[_key(end[2] - part.datum)] = sizes.box[0]
+
+
+def _faces(sizes: Sizes, view: View, part: Part) -> None:
+    """Positions of plane faces, and the extent."""
+    left, low, _, _ = sizes.box
+    if view.kind == "front":
+        optical = [] if part.lidar_axis is None else [0.0]
+        for z in (*planes_across(part.solid, view.up), *optical):
+            sizes.beside[_key(z - part.datum)] = left
+    elif view.kind in ("top", "onto"):
+        for values, way, edge in ((sizes.below, view.right, low), (sizes.beside, view.up, left)):
+            for value in planes_across(part.solid, way, SIDE_MM2):
+                values.setdefault(_key(value - float(view.origin @ way)), edge)
+    if view.kind in ("front", "top"):
+        xs, ys = _extent(part, view)
+        rim = max((item.diameter / 2 for item in part.axial if not item.hole), default=0.0)
+        known = [rim, -rim] if view.kind == "top" else []  # a diameter says it already
+        for values, ends, edge in ((sizes.beside, ys, left), (sizes.below, xs if view.kind == "top" else (), low)):
+            for end in ends:
+                if all(abs(end - other) > NEARLY for other in known):
+                    values.setdefault(_key(end), edge)
+
+
+def _slanted(view: View, pattern: Pattern, part: Part) -> Callout:
+    """Of a hole that no view looks along: where it points, and its height."""
+    hole = max(pattern.holes, key=lambda h: round(float(np.hypot(*h.high[:2])), 3))
+    outer = max(hole.low, hole.high, key=lambda end: round(math.hypot(end[0], end[1]), 3))
+    azimuth = azimuth_deg(np.array(outer))
+    way = "RADIAL" if abs(hole.direction[2]) < STRAIGHT else "INCLINED"
+    words = f"{pattern.words()}, {way} AT {number(azimuth)}°, Z {number(outer[2] - part.datum)}"
+    return Callout(view.flat(outer), words)
+
+
+def _extent(part: Part, view: View) -> tuple[Point, Point]:
+    """What a view shows, from left to right and from the lowest to the highest point, exact."""
+    frame = np.stack([view.right, view.up, view.towards], axis=1)
+    box = part.solid.moved(solids.location(frame).inverse).BoundingBox()
+    x, y = float(view.origin @ view.right), float(view.origin @ view.up)
+    return (box.xmin - x, box.xmax - x), (box.ymin - y, box.ymax - y)
+
+
+def _seen_along(pattern: Pattern, top: View, part: Part) -> bool:
+    """Whether another view looks along the holes: from the front, from the left, or onto inclined ones."""
+    onto = [other.direction for other in part.patterns if has_view(other)]
+    return any(parallel(pattern.direction, along) for along in (top.right, top.up, *onto))
+
+
+def _angle(pen: Pen, view: View, pattern: Pattern, part: Part, above: float) -> None:
+    """The angle between rotation axis and holes: at the optical centre where the lidar sits, else above the view."""
+    outwards = outwards_of(pattern, part)
+    outwards = outwards if outwards[2] > -1e-9 else -outwards
+    across, along = float(outwards @ view.right), float(outwards @ view.up)
+    tilt = math.degrees(math.acos(max(-1.0, min(1.0, float(outwards[2])))))
+    at = (0.0, above) if part.lidar_axis is None else pen.paper(view.flat((0.0, 0.0, 0.0)))
+    angle_between(pen, at, math.pi / 2, math.atan2(along, across), 12.0, f"{number(tilt)}°")
+
+
+def _key(value: float) -> float:
+    return round(value, 2) + 0.0
