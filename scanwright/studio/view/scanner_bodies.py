@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from design.frames import Array
 from design.scanner import Scanner
 
 
@@ -36,19 +35,17 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     Raises:
         BuildError: the kernel is missing, or a part cannot be made.
     """
-    from cad.assembly.assembly import make_parts, turns
-    from cad.assembly.linkage_preview import coarse, draft_linkage
+    from cad.assembly.assembly import colour_of, make_parts, turns
+    from cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from cad.layout.linkage import PART
 
     assembly = make_parts(scanner, lambda name: name != PART and turns(name) == turning)
-    meshes = {name: coarse(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    meshes = {name: coarse_mesh(solid) for name, solid in (assembly.made | assembly.bought).items()}
     if turning:
         meshes[PART] = draft_linkage(assembly.linkage)
-    return tuple(_body(name, *mesh) for name, mesh in meshes.items())
-
-
-def _body(name: str, vertices_mm: Array, faces: Array) -> BodyMesh:
-    from cad.assembly.assembly import colour_of
-
-    red, green, blue = (round(255 * c) for c in colour_of(name))
-    return BodyMesh(name, (vertices_mm * 1e-3).astype(np.float32), faces.astype(np.uint32), (red, green, blue))
+    bodies = []
+    for name, mesh in meshes.items():
+        red, green, blue = (round(255 * c) for c in colour_of(name))
+        vertices_m = (mesh.vertices * 1e-3).astype(np.float32)
+        bodies.append(BodyMesh(name, vertices_m, mesh.faces.astype(np.uint32), (red, green, blue)))
+    return tuple(bodies)
