@@ -44,9 +44,9 @@ class Mesh:
         return bool(len(np.unique(forth)) == len(forth) and np.array_equal(forth, back))
 
 
-def mesh_of(solid: cq.Solid) -> Mesh:
-    """Tessellate a solid canonically."""
-    points, triangles = _tessellated(solid)
+def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> Mesh:
+    """Tessellate a solid canonically, within a chord error [mm] and angle [rad]."""
+    points, triangles = _tessellated(solid, chord_error, chord_angle)
     raw = np.round(points, DECIMALS) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
     faces = index.reshape(-1)[triangles]
@@ -57,10 +57,10 @@ def mesh_of(solid: cq.Solid) -> Mesh:
     return Mesh(vertices, faces[np.lexsort(faces.T[::-1])])
 
 
-def _tessellated(solid: cq.Solid) -> tuple[Array, NDArray[np.int64]]:
+def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tuple[Array, NDArray[np.int64]]:
     """Points face by face, shape (n, 3), and triangles, (m, 3), without the vectors that cadquery makes of them."""
     shape = solid.copy()
-    shape.mesh(CHORD_ERROR, CHORD_ANGLE)
+    shape.mesh(chord_error, chord_angle)
     points: list[tuple[float, float, float]] = []
     triangles = []
     for face in shape.Faces():

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from design.angles import Angles, AngleSet, standard_settings
+from design.angles import AngleSet, standard_settings
 from design.frames import Array
 from design.left_out import LeftOut
-from design.motion import Shortest, Sweep
+from design.motion import Shortest
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.coarse import Progress
@@ -143,21 +143,15 @@ def directions_left_out(problem: Problem) -> list[LeftOut]:
 
 def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
     """The designed angle set of a family; J is rounded to its error."""
-    task = loaded.task
-    assert not isinstance(task.motion, Shortest)  # the search has put the period that it found
-    alpha_rot, beta_rot, alpha_laser, beta_laser = family.angles_deg
+    assert not isinstance(loaded.task.motion, Shortest)  # the search has put the period that it found
     J, J_error = rounded_to_error(family.score.J, family.score.J_error)
-    return AngleSet(
-        task=task.name,
-        task_sha256=loaded.sha256(),
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha_laser, beta_laser=beta_laser),
-        sensor=task.sensor,
-        servo=task.servo,
-        slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
-        motion=task.motion,
-        J=J,
-        J_error=J_error,
-        versions={"scanwright": version("scanwright")},
+    return loaded.angle_set(family.angles_deg).model_copy(
+        update={
+            "task_sha256": loaded.sha256(),
+            "J": J,
+            "J_error": J_error,
+            "versions": {"scanwright": version("scanwright")},
+        }
     )
 
 

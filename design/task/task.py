@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from design.angles import AngleSet
+from design.angles import Angles, AngleSet
 from design.camera import Camera
 from design.catalogue.catalogue import Catalogue, load_catalogue
 from design.catalogue.products import Lidar, Printer, Servo, SlipRing
@@ -146,6 +146,18 @@ class LoadedTask:
     products: Catalogue
     maps: tuple[Array, ...]
     surface: Surface | None = None
+
+    def angle_set(self, angles_deg: Sequence[float]) -> AngleSet:
+        """Mounting angles with the products of this task, in the order of `NAMES`; the motion is open where it is."""
+        task = self.task
+        return AngleSet(
+            task=task.name,
+            angles_deg=Angles(**dict(zip(NAMES, angles_deg, strict=True))),
+            sensor=task.sensor,
+            servo=task.servo,
+            slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
+            motion=None if isinstance(task.motion, Shortest) else task.motion,
+        )
 
     def scanner(self, angles: AngleSet) -> Scanner:
         """The scanner of an angle set, with the printer and the deck of this task.

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -11,23 +13,27 @@ import tomli_w
 from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import Map, Mesh
-from design.task.task import LoadedTask
+from design.task.task import LoadedTask, Task
 from scanwright.pipeline.manifest import enter, write_json
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
     """`task.toml` with every default written out; files that it names come along, so the folder builds by itself."""
     table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # it makes no part
-    for key in ("weight", "mask"):
-        for i, region in enumerate(getattr(loaded.task, key)):
-            if isinstance(region, Map | Mesh):
-                table[key][i]["file"] = _bring(folder, loaded.source.parent / region.file, f"{key}-{i}")
-    if loaded.task.scene is not None:
-        table["scene"]["file"] = _bring(folder, loaded.source.parent / loaded.task.scene.file, "scene")
-    table["catalogue"] = [
-        _bring(folder, loaded.source.parent / extra, f"catalogue-{i}") for i, extra in enumerate(loaded.task.catalogue)
-    ]
+    rename_files(table, loaded.task, lambda file, role: _bring(folder, loaded.source.parent / file, role))
     (folder / "task.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
+
+
+def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], str]) -> None:
+    """Give every file that a task names another name in its table; `name` gets the present one and what the file is."""
+    for key in ("weight", "mask"):
+        for i, region in enumerate(getattr(task, key)):
+            if isinstance(region, Map | Mesh):
+                table[key][i]["file"] = name(region.file, f"{key}-{i}")
+    if task.scene is not None:
+        table["scene"]["file"] = name(task.scene.file, "scene")
+    if task.catalogue:
+        table["catalogue"] = [name(extra, f"catalogue-{i}") for i, extra in enumerate(task.catalogue)]
 
 
 def write_search(folder: Path, result: SearchResult) -> None:

@@ -64,7 +64,7 @@ class ConeOnMap:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class BuildAnswer:
     """What a setting sees, computed from `task.toml` and `angles.json`, as `scanwright evaluate` does, without parts.
 
     Attributes:
@@ -94,7 +94,7 @@ class Hidden:
     share: float
 
 
-def answer(problem: Problem, angles: AngleSet) -> Answer:
+def answer(problem: Problem, angles: AngleSet) -> BuildAnswer:
     """What the angle set sees on its task (`problem_as_built`), and the standard alignments beside it."""
     setting = mounting_rad(angles)
     logarithmic = problem.objective.name == "log"
@@ -105,7 +105,7 @@ def answer(problem: Problem, angles: AngleSet) -> Answer:
         J, J_error = rounded_to_error(found.J, found.J_error)
         standard.append(Standard(name, J, J_error, factor, _seen(problem, other, found)))
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
-    return Answer(
+    return BuildAnswer(
         own=_seen(problem, setting, score(problem, setting)),
         standard=tuple(standard),
         cones=tuple(

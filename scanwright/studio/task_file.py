@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from design.errors import TaskError
 from design.record import explain
-from design.task.shapes import Map, Mesh
 from design.task.task import NAMES, LoadedTask, Task, load_task
+from scanwright.pipeline.records import rename_files
 from scanwright.studio.state import Setting
 
 
@@ -29,18 +29,7 @@ def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None
     """
     table = loaded.task.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | {"name": name}
     table["motion"] = loaded.task.motion.model_dump(mode="json")
-
-    def led(file: str) -> str:
-        return os.path.relpath(loaded.source.parent / file, folder)
-
-    for key in ("weight", "mask"):
-        for i, region in enumerate(getattr(loaded.task, key)):
-            if isinstance(region, Map | Mesh):
-                table[key][i]["file"] = led(region.file)
-    if loaded.task.scene is not None:
-        table["scene"]["file"] = led(loaded.task.scene.file)
-    if loaded.task.catalogue:
-        table["catalogue"] = [led(extra) for extra in loaded.task.catalogue]
+    rename_files(table, loaded.task, lambda file, _: os.path.relpath(loaded.source.parent / file, folder))
     if fixed is not None:
         table["angles"] = table.get("angles", {}) | {
             f"{angle}_deg": value for angle, value in zip(NAMES, fixed.angles_deg, strict=True)

@@ -36,10 +36,6 @@ class LatestOnly(Generic[T]):
             self._wishes = [wish]
             self._changed.notify_all()
 
-    def outdated(self) -> bool:
-        """Whether something newer waits: long work may ask and stop."""
-        return bool(self._wishes) or not self._open
-
     def settled(self, timeout_s: float) -> bool:
         """Wait until all is done; False where that takes longer."""
         with self._changed:

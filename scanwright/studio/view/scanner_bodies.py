@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from design.frames import Array
 from design.scanner import Scanner
 
 
@@ -36,17 +35,17 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     Raises:
         BuildError: the kernel is missing, or a part cannot be made.
     """
-    from cad.assembly.linkage_preview import coarse, draft_linkage
+    from cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from cad.assembly.make import make_parts
     from cad.layout.names import ALIGNMENT_LINKAGE
 
     assembly = make_parts(scanner, lambda spec: spec.name != ALIGNMENT_LINKAGE and spec.turns == turning)
-    meshes = {name: coarse(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    meshes = {name: coarse_mesh(solid) for name, solid in (assembly.made | assembly.bought).items()}
     if turning:
         meshes[ALIGNMENT_LINKAGE] = draft_linkage(assembly.layout.linkage)
-    return tuple(_body(name, assembly.spec(name).colour, *mesh) for name, mesh in meshes.items())
-
-
-def _body(name: str, colour: tuple[float, float, float], vertices_mm: Array, faces: Array) -> BodyMesh:
-    red, green, blue = (round(255 * c) for c in colour)
-    return BodyMesh(name, (vertices_mm * 1e-3).astype(np.float32), faces.astype(np.uint32), (red, green, blue))
+    bodies = []
+    for name, mesh in meshes.items():
+        red, green, blue = (round(255 * c) for c in assembly.spec(name).colour)
+        vertices_m = (mesh.vertices * 1e-3).astype(np.float32)
+        bodies.append(BodyMesh(name, vertices_m, mesh.faces.astype(np.uint32), (red, green, blue)))
+    return tuple(bodies)

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import viser
+import viser.transforms
 
 from design.frames import Array, R_world_rot
 from design.objective.problem import Problem
@@ -105,7 +106,7 @@ class View3D:
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Put up the half of the scanner that turns, or the one that stands, in place of what stood there."""
         half = "turning" if turning else "standing"
-        self._scanner.wxyz = _wxyz(R_world_rot(*setting.angles_rad[:2]))
+        self._scanner.wxyz = viser.transforms.SO3.from_matrix(R_world_rot(*setting.angles_rad[:2])).wxyz
         new = {f"/scanner/{half}/{body.name}": body for body in bodies}
         for handle in self._bodies[turning]:
             if handle.name not in new:
@@ -148,11 +149,3 @@ def _linear(colours: Colours) -> Colours:
     """What the page's renderer takes colours of tiles for: linear light, not sRGB."""
     c = colours / 255.0
     return np.round(255 * np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)).astype(np.uint8)
-
-
-def _wxyz(R: Array) -> Array:
-    """Quaternion of a rotation matrix, shape (4,)."""
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(R).as_quat()
-    return np.array([w, x, y, z])

@@ -13,13 +13,11 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import ParamSpec, TypeVar
 
-from design.angles import Angles, AngleSet
 from design.concurrency.second_process import kill, spawn_pool
 from design.errors import ScanwrightError
-from design.motion import Shortest, Sweep
 from design.objective.problem import Problem
 from design.scanner import Scanner
-from design.task.task import NAMES, LoadedTask
+from design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.preview_scan import preview_scan
@@ -54,16 +52,7 @@ class Order:
         Raises:
             TaskError: a product is not in the catalogue.
         """
-        task = self.loaded.task
-        angles = AngleSet(
-            task=task.name,
-            angles_deg=Angles(**dict(zip(NAMES, self.setting.angles_deg, strict=True))),
-            sensor=task.sensor,
-            servo=task.servo,
-            slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
-            motion=None if isinstance(task.motion, Shortest) else task.motion,
-        )
-        return self.loaded.scanner(angles)
+        return self.loaded.scanner(self.loaded.angle_set(self.setting.angles_deg))
 
 
 class Workers:

@@ -81,7 +81,8 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     walls = thin_walls(mesh, scanner.printer.min_wall_mm)
     assert walls.area_mm2 < 0.01 * walls.surface_mm2
     # the draft that a page shows is the same body, off by what its chords leave out
-    draft = trimesh.Trimesh(*draft_linkage(linkage_of(scanner, stack)), process=False)
+    drawn = draft_linkage(linkage_of(scanner, stack))
+    draft = trimesh.Trimesh(drawn.vertices, drawn.faces, process=False)
     assert draft.is_watertight and draft.volume == pytest.approx(body.volume, rel=1e-3)
     assert np.abs(draft.bounds - body.bounds).max() < 0.2
     # two radial screws reach the spigot: the body is open there
