@@ -20,6 +20,8 @@ from design.errors import RecordingError
 from design.task.task import LoadedTask
 from design.task.task import load_task as load_task
 from firmware_io.assembly.own_body import own_body_beside
+from firmware_io.clouds.files import read_clouds, write_clouds
+from firmware_io.clouds.record import Cloud
 from scanwright.pipeline.build import Build, build_task
 
 if TYPE_CHECKING:
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from design.search.optimum import Optimum
     from firmware_io.assembly.assemble import AssembleSummary
     from firmware_io.calibration.session import Calibration
-    from firmware_io.clouds.record import Cloud
     from firmware_io.lidar.scip.driver import Lidar
     from firmware_io.recording.arrays import RecordingArrays
     from firmware_io.recording.importer import ImportSummary
@@ -477,8 +478,6 @@ def read_cloud(path: str | Path) -> Cloud:
         InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
     """
-    from firmware_io.clouds.files import read_clouds
-
     clouds, _unread = read_clouds(Path(path))
     if len(clouds) != 1:
         raise RecordingError(
@@ -501,8 +500,5 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any]) -> list[s
         InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is not known, or the file cannot be written.
     """
-    from firmware_io.clouds.files import write_clouds
-    from firmware_io.clouds.record import Cloud
-
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud))
     return write_clouds(Path(path), [record])[1]

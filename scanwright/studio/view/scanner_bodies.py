@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cad.layout.names import ALIGNMENT_LINKAGE
 from design.scanner import Scanner
 
 
@@ -37,7 +38,6 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     """
     from cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from cad.assembly.make import make_parts
-    from cad.layout.names import ALIGNMENT_LINKAGE
 
     assembly = make_parts(scanner, lambda spec: spec.name != ALIGNMENT_LINKAGE and spec.turns == turning)
     meshes = {name: coarse_mesh(solid) for name, solid in (assembly.made | assembly.bought).items()}
