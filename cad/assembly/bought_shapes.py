@@ -7,15 +7,13 @@ fill the grooves of the pulleys; so are the balls of a bearing.
 
 from __future__ import annotations
 
-import math
-
 import cadquery as cq
 
-from cad import outlines, solids
+from cad import solids
 from cad.layout.belt.stack import BeltStack
 from cad.layout.belt.tower import flange_centres
 from cad.layout.direct.stack import DirectStack
-from cad.layout.joints import horn_thread_mm, lidar_thread_mm
+from cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
 from cad.layout.names import BELT, RING_STATOR
 from cad.screws import SCREWS
 from cad.solids import building, checked
@@ -68,8 +66,7 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
     """The horn's disc with its threaded holes and boss, its face at height z."""
     disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
     radius = SCREWS[servo.horn_screw].nominal / 2
-    first, low = math.radians(90.0 + servo.horn_first_hole_deg), z - horn_thread_mm(servo)
-    centres = outlines.polygon(servo.horn_circle_mm / 2, servo.horn_holes, first)
+    low, centres = z - horn_thread_mm(servo), horn_centres(servo)
     disc = disc.cut(*(solids.upright(radius, low, z + 1.0, float(x), float(y)) for x, y in centres))
     if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
         disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))

@@ -12,10 +12,11 @@ from cad.layout.deck import Deck
 from cad.layout.direct.cage import share_weight
 from cad.layout.direct.stack import DirectStack
 from cad.layout.drive import Drive
+from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from cad.layout.names import BASE_MOUNT, SERVO_SHAFT
 from cad.screws import SCREWS, passing_hole
-from design.catalogue.products import Product
+from design.catalogue.products import Printer, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -63,6 +64,22 @@ def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     if layout.deck.flat:
         out.append(LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)
+
+
+def without_traps(printer: Printer, joints: list[Joint]) -> list[PartFinding]:
+    """Screws that hold in plain threads although the printer's profile asks for nuts."""
+    if printer.thread != "nut":
+        return []
+    return [
+        PartFinding(
+            "no_nut_trap",
+            "note",
+            joint.holder,
+            f"{joint.holder}: no nut trap fits at its {joint.count} {joint.screw.name}: they hold in plain threads",
+        )
+        for joint in joints
+        if joint.thread is not None and not joint.traps
+    ]
 
 
 def _turn_from_metal(part: str, why: str) -> PartFinding:

@@ -9,7 +9,7 @@ from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
-from cad.geometry.holes import Round
+from cad.geometry.holes import rounds_of
 from cad.layout.fits import OnSheet
 from design.catalogue.products import Printer
 from design.scanner import Scanner
@@ -20,14 +20,13 @@ AT_M = 10.0  # distance at which a wrong angle is judged
 def drawing_files(
     scanner: Scanner,
     assembly: Assembly,
-    rounds: dict[str, list[Round]],
     masses_g: dict[str, float],
     config_hash: str,
 ) -> dict[str, bytes]:
-    """Draw every made part; `rounds` are its cylinders, the other arguments those of `bom.items_of`."""
+    """Draw every made part; arguments as for `bom.items_of`."""
     files: dict[str, bytes] = {}
     for name in assembly.made:
-        sheet = drawing_of(name, scanner, assembly, rounds[name], masses_g[name], config_hash)
+        sheet = drawing_of(name, scanner, assembly, masses_g[name], config_hash)
         files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
         files[f"drawings/{name}.svg"] = svg_bytes(sheet)
         files[f"drawings/{name}.dxf"] = dxf_bytes(sheet)
@@ -38,14 +37,13 @@ def drawing_of(
     name: str,
     scanner: Scanner,
     assembly: Assembly,
-    rounds: list[Round],
     mass_g: float,
     config_hash: str,
 ) -> Sheet:
     """The sheet of one part."""
-    spec = assembly.parts[name]
+    spec, solid = assembly.parts[name], assembly.made[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    part = part_of(assembly.made[name], rounds, lidar_axis, spec.sheet)
+    part = part_of(solid, rounds_of(solid), lidar_axis, spec.sheet)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),

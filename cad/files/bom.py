@@ -12,12 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 from cad.assembly.assembly import Assembly
-from cad.assembly.joints import Joint
 from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
 from cad.layout.belt.stack import BeltStack
 from cad.layout.drive import Drive
-from cad.layout.names import DECK
+from cad.layout.joints import Joint
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from design.scanner import Scanner
@@ -166,7 +165,7 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
             inserts[joint.screw.name] = inserts.get(joint.screw.name, 0) + joint.count
     for number, used in sorted(screws.items()):
         kind = "grub screw" if number.startswith("ISO 4026") else "cap screw"
-        where = ", ".join(f"{joint.count} {joint.part} to {joint.onto or DECK}" for joint in used)
+        where = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
         total = sum(joint.count for joint in used)
         yield BomItem("screw", kind, number, total, source=HOLES, note=f"{where}; price unknown")
     for name, count in sorted(nuts.items()):

@@ -6,10 +6,9 @@ import re
 from collections.abc import Iterator
 
 from cad.assembly.assembly import Assembly
-from cad.assembly.joints import CASE_EAR, DECK_MM, Joint
 from cad.assembly.steps import steps_of
-from cad.layout.joints import ALL_SCREWS, screws
-from cad.layout.names import DECK, LIDAR, LIDAR_BODY
+from cad.layout.joints import ALL_SCREWS, CASE_EAR, DECK_MM, Joint, screws
+from cad.layout.names import FIT_COUPON, LIDAR, LIDAR_BODY
 from design.scanner import Scanner
 
 NUTS = (
@@ -32,7 +31,7 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
         f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
         "Look at `exploded.glb` beside these steps; `bom.csv` lists what you need.",
         "",
-        "Print `print/fit_coupon.3mf` first: the clearances that fit on your printer belong in its catalogue file "
+        f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm).",
         "",
         f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
@@ -58,13 +57,10 @@ def screws_in_words(joint: Joint) -> str:
         "deck": f"through the foot into the deck, with {joint.count} nuts {joint.screw.name}",
         "grub": f"in {joint.part}, against {joint.onto}",
     }[joint.fixing]
-    left = ""
-    if joint.covered:
-        left = f" Leave the other {joint.covered} of the holes empty: no driver reaches them."
     held = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         held = f", through {joint.count} nuts {joint.screw.name} in its bore"
-    return f"{what} {where}{held}.{left}"
+    return f"{what} {where}{held}."
 
 
 def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:
@@ -74,9 +70,8 @@ def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterat
     for thing, step in steps_of(assembly):
         text, carrier = step.words, seat if thing == LIDAR else thing
         for i, joint in enumerate(joints):
-            onto = joint.onto or DECK
-            marks = [screws(onto, joint.part)]
-            marks += [screws(onto), ALL_SCREWS] if joint.part == carrier else []
+            marks = [screws(joint.onto, joint.part)]
+            marks += [screws(joint.onto), ALL_SCREWS] if joint.part == carrier else []
             place = next((mark for mark in marks if mark in text), None)
             if place is not None and i not in done:
                 text = text.replace(place, f"**{screws_in_words(joint)}** {place}")
@@ -84,5 +79,5 @@ def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterat
         yield step.title, " ".join(re.sub(r"\{.*?\}", "", text).split())
     for i, joint in enumerate(joints):
         if i not in done:
-            yield f"{joint.part} to {joint.onto or DECK}", f"**{screws_in_words(joint)}**"
+            yield f"{joint.part} to {joint.onto}", f"**{screws_in_words(joint)}**"
     yield "Look, then wire", LAST + (IN_A_LOOP if scanner.slip_ring is None else THROUGH_RING)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cad.assembly.joints import joints_of, without_traps
+from cad.checks.remarks import without_traps
 from cad.drawings.files import drawing_files
 from cad.files.bom import bom_text, items_of
 from cad.files.glb_scenes import scene_files
@@ -14,10 +14,10 @@ from cad.files.instructions import instructions_text
 from cad.files.part_files import PartsResult, write_files
 from cad.files.threemf import threemf_bytes
 from cad.findings import PartFinding
-from cad.geometry.holes import rounds_of
 from cad.geometry.mesh import Mesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.layout.all_joints import joints_of
 from cad.layout.layout import config_hash
 from cad.layout.names import FIT_COUPON
 from design.concurrency.second_process import Begin, in_turn
@@ -48,10 +48,9 @@ def export_scanner(
     """
     assembly, digest = made.assembly, config_hash(scanner)
     masses = {report.name: report.mass_g for report in made.parts}
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
+    joints = joints_of(assembly.layout)
     progress("drawing the parts")
-    drawn = begin(drawing_files, scanner, assembly, rounds, masses, digest)
+    drawn = begin(drawing_files, scanner, assembly, masses, digest)
     progress("writing print files")
     files, left_out = _prints(scanner, made.meshes, assembly.metal(), digest)
     progress("making the fit coupon")
@@ -65,7 +64,7 @@ def export_scanner(
     files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
     files |= drawn()
     write_files(folder, files)
-    findings = without_traps(scanner.printer, assembly, joints)
+    findings = without_traps(scanner.printer, joints)
     return Exports(tuple(sorted(files)), tuple(left_out), tuple(findings))
 
 

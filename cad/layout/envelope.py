@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad.layout.hub import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS
 from design.catalogue.products import Lidar
 from design.errors import BuildError
@@ -60,7 +61,7 @@ def lidar_pose(scanner: Scanner) -> Array:
     if R[2, 2] < -1e-9:
         tilt = math.degrees(math.acos(R[2, 2]))
         raise BuildError(
-            f"alignment_linkage: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
+            f"{ALIGNMENT_LINKAGE}: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
             "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
         )
     return R

@@ -1,10 +1,156 @@
-"""What holds what: marks for the words of the assembly."""
+"""Joints: what holds what, by which screw, where, and how long that is. Declared here, and read by everybody.
+
+Parts list, steps, drawings and findings read them; the parts cut their holes from the same numbers of the layout, and a
+test reads the joints back from the solids. What only one drive has is in `direct/joints.py` and `belt/joints.py`.
+Lengths are the shortest of the standards that hold. Rotation frame at gamma = 0, mm.
+"""
 
 from __future__ import annotations
 
-from design.catalogue.products import Lidar, Servo
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
-ALL_SCREWS = "{*}"  # of a step's part
+import numpy as np
+
+from cad.outlines import polygon
+from cad.screws import SCREWS, Screw, Thread
+from design.catalogue.products import Lidar, Servo
+from design.frames import Array
+
+# ISO 4762 and ISO 4026
+LENGTHS = {
+    "M2": (3, 4, 5, 6, 8, 10, 12, 16, 20),
+    "M2.5": (4, 5, 6, 8, 10, 12, 16, 20, 25),
+    "M3": (4, 5, 6, 8, 10, 12, 16, 20, 25, 30),
+    "M4": (5, 6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
+    "M5": (6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
+    "M6": (8, 10, 12, 16, 20, 25, 30, 35, 40),
+}
+HOLDS = 2.0  # diameters of thread that hold
+NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
+THREAD_FREE = 0.5  # that a screw may not bottom
+CASE_EAR = 2.0  # of a servo's case between a screw hole and its nut: assumed, no catalogue gives it
+DECK_MM = 5.0  # thickness of the robot's deck, assumed
+ALL_SCREWS = "{*}"  # mark for all screws of a step's part
+
+Fixing = Literal["thread", "trap", "nut", "deck", "grub"]
+
+
+@dataclass(frozen=True, slots=True)
+class ScrewAxis:
+    """One screw: where its head bears, or its hole begins, and the unit vector from there to what it holds on to."""
+
+    start: tuple[float, float, float]
+    along: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """Equal screws between two bodies.
+
+    Attributes:
+        part: that the screws go through, or sit in if they are grub screws.
+        onto: the body that they hold it to; a deck is that of the robot.
+        fixing: what holds the thread: the body itself, a nut in a trap of the body, a nut, a nut under the deck, or the
+            part (grub screws).
+        screw: the size.
+        axes: of each screw.
+        grip_mm: what the shank passes before it holds.
+        thread_mm: of thread, or of material before the nut.
+        thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
+        slotted: whether they may slide, in slots.
+    """
+
+    part: str
+    onto: str
+    fixing: Fixing
+    screw: Screw
+    axes: tuple[ScrewAxis, ...]
+    grip_mm: float
+    thread_mm: float
+    thread: Thread | None = None
+    slotted: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of screws."""
+        return len(self.axes)
+
+    @property
+    def length_mm(self) -> int:
+        """Of a screw's shank."""
+        return shank_mm(self.screw, self.grip_mm, self.fixing, self.thread_mm)
+
+    @property
+    def number(self) -> str:
+        """The standard's designation."""
+        return f"ISO {4026 if self.fixing == 'grub' else 4762} {self.screw.name} x {self.length_mm}"
+
+    @property
+    def inserts(self) -> bool:
+        """Whether each screw holds in a heat-set insert."""
+        return self.thread is not None and self.thread.insert
+
+    @property
+    def traps(self) -> bool:
+        """Whether each screw holds in a nut that a part carries."""
+        return self.thread is not None and self.thread.trap is not None
+
+    @property
+    def holder(self) -> str:
+        """The body that holds the thread."""
+        return self.part if self.fixing == "grub" else self.onto
+
+
+def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
+    """Shortest standard length that holds; in a shallow thread the longest that does not bottom.
+
+    Args:
+        screw: the size.
+        grip: what the shank passes before it holds.
+        fixing: what holds the thread.
+        depth: of the thread, or of the material before the nut.
+    """
+    known = LENGTHS[screw.name]
+    if fixing == "grub":
+        return next((n for n in known if n >= grip - 0.1), known[-1])
+    if fixing == "trap":  # the hole ends at the nut, and behind it there is room
+        return next((n for n in known if n >= grip + depth + screw.nut_height - 0.1), known[-1])
+    if fixing == "thread":
+        most = [n for n in known if n <= grip + depth - THREAD_FREE + 1e-6]
+        wanted = [n for n in most if n >= grip + HOLDS * screw.nominal]
+        return wanted[0] if wanted else max(most, default=known[0])
+    return next((n for n in known if n >= grip + depth + NUT * screw.nominal), known[-1])
+
+
+def held_in(thread: Thread) -> Fixing:
+    """How a screw holds in a printed part."""
+    return "thread" if thread.trap is None else "trap"
+
+
+def upright_axes(points: Iterable[Sequence[float]], z: float, up: float) -> tuple[ScrewAxis, ...]:
+    """Of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
+    return tuple(ScrewAxis((float(x), float(y), z), (0.0, 0.0, up)) for x, y in points)
+
+
+def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[ScrewAxis, ...]:
+    """Of screws towards the rotation axis that start at a radius."""
+    outwards = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
+    return tuple(ScrewAxis((radius * x, radius * y, z), (-x, -y, 0.0)) for x, y in outwards)
+
+
+def placed_axes(
+    axes: Iterable[ScrewAxis], R: Array, t: Sequence[float] | Array = (0.0, 0.0, 0.0)
+) -> tuple[ScrewAxis, ...]:
+    """The same in the rotation frame; R is the pose of their frame in it, t its origin."""
+    return tuple(ScrewAxis(_triple(R @ axis.start + np.asarray(t)), _triple(R @ axis.along)) for axis in axes)
+
+
+def round_wall_mm(inner_radius: float, outer: float, hole: float) -> float:
+    """Length of a radial hole of a diameter between the inside of a tube and a distance from its axis."""
+    return outer - math.sqrt(inner_radius**2 - (hole / 2) ** 2)
 
 
 def screws(onto: str, part: str = "") -> str:
@@ -20,3 +166,19 @@ def lidar_thread_mm(lidar: Lidar) -> float:
 def horn_thread_mm(servo: Servo) -> float:
     """Depth of the threads in a servo's horn."""
     return min(servo.horn_thread_depth_mm, servo.horn_thickness_mm)
+
+
+def horn_centres(servo: Servo) -> Array:
+    """Of the horn's holes, servo's frame, shape (n, 2)."""
+    return polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
+
+
+def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) -> Joint:
+    """Of what is screwed to a servo's horn, its heads at a height, in the frame of the servo's axis."""
+    axes = upright_axes(horn_centres(servo), heads, -1.0)
+    screw = SCREWS[servo.horn_screw]
+    return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))
+
+
+def _triple(v: Array) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])

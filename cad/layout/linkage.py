@@ -20,7 +20,7 @@ from cad.layout.envelope import (
     envelope_of,
 )
 from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
+from cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
 from design.errors import BuildError
 from design.frames import Array
 from design.scanner import Scanner
@@ -176,3 +176,18 @@ def _clamp_azimuths(normal: Array) -> tuple[float, ...]:
     towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else math.pi / 4
     middle = round((towards - math.pi / 2) / (math.pi / 4) - 1e-6) * (math.pi / 4) + math.pi / 2
     return middle - math.pi / 4, middle + math.pi / 4
+
+
+def clamp_trap_floor_mm(p: AlignmentLinkage, trap: Trap) -> float:
+    """Distance from the axis of the floor of a radial screw's nut trap."""
+    return (p.stack.shaft_diameter + p.fit) / 2 + trap.depth
+
+
+def clamp_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
+    """Distance from the axis at which a radial screw leaves the hub: at the bore or its flat, or at a nut."""
+    if p.clamp_thread.trap is not None:
+        return clamp_trap_floor_mm(p, p.clamp_thread.trap)
+    bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.clamp_thread.hole / 2
+    flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
+    on_flat = (flat - half * abs(math.cos(azimuth))) / out if out > 0 else bore
+    return min(math.sqrt(bore**2 - half**2), on_flat)

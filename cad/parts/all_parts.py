@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cad.layout.belt.stack import BeltStack
 from cad.layout.layout import Layout
 from cad.parts.alignment_linkage import linkage_spec
 from cad.parts.base_mount import mount_spec
@@ -13,31 +14,32 @@ from cad.parts.drive_plate import plate_spec
 from cad.parts.main_shaft import main_shaft_spec
 from cad.parts.part_spec import PartSpec
 from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
-from cad.parts.servo_shaft import shaft_spec
+from cad.parts.servo_shaft import servo_shaft_spec
 from cad.parts.shaft_ring import shaft_ring_spec
 from cad.parts.slip_ring_adapter import adapter_spec
 from cad.parts.sub_plate import sub_plate_spec
 
-ALL_PARTS = (
-    shaft_spec,
+OF_DIRECT = (servo_shaft_spec, adapter_spec, base_spec, bell_spec)
+OF_BELT = (
     main_shaft_spec,
     shaft_pulley_spec,
     shaft_ring_spec,
     tower_spec,
-    adapter_spec,
     holder_spec,
-    base_spec,
-    bell_spec,
     plate_spec,
     drive_pulley_spec,
-    linkage_spec,
-    sub_plate_spec,
-    mount_spec,
-    counterweight_spec,
 )
+OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec)
 
 
 def parts_of(layout: Layout) -> list[PartSpec]:
     """The parts that one scanner needs."""
-    specs = (spec_of(layout) for spec_of in ALL_PARTS)
+    scanner, stack = layout.scanner, layout.stack
+    specs: list[PartSpec | None] = [spec_of(layout) for spec_of in OF_ALL]
+    if isinstance(stack, BeltStack):
+        return _needed([*(spec_of(scanner, stack) for spec_of in OF_BELT), *specs])
+    return _needed([*(spec_of(scanner, stack) for spec_of in OF_DIRECT), *specs])
+
+
+def _needed(specs: list[PartSpec | None]) -> list[PartSpec]:
     return [spec for spec in specs if spec is not None]

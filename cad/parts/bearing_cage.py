@@ -34,18 +34,18 @@ from cad.layout.direct.cage import (
 from cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from cad.layout.fits import OnSheet, printed_seat
 from cad.layout.joints import ALL_SCREWS, screws
-from cad.layout.layout import Layout
 from cad.layout.names import BEARING_CAGE, CAGE_BASE, SERVO_CASE, SLIP_RING_ADAPTER
 from cad.parts.part_spec import PartSpec, Step, on_servo_front
 from cad.screws import Trap
 from cad.solids import building, checked
+from design.scanner import Scanner
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
 
 
-def bell_spec(layout: Layout) -> PartSpec | None:
+def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     """The bell of one scanner; None where no bearing carries its axis."""
-    p = _cage(layout)
+    p = cage_of(scanner, stack)
     if p is None:
         return None
     words = (
@@ -62,10 +62,10 @@ def bell_spec(layout: Layout) -> PartSpec | None:
     )
 
 
-def base_spec(layout: Layout) -> PartSpec | None:
+def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     """Its base as a part of its own; None where it is the plate of the adapter, or nothing."""
-    p = _cage(layout)
-    if p is None or layout.scanner.slip_ring is not None:
+    p = cage_of(scanner, stack)
+    if p is None or scanner.slip_ring is not None:
         return None
     return PartSpec(
         name=CAGE_BASE,
@@ -74,11 +74,6 @@ def base_spec(layout: Layout) -> PartSpec | None:
         step=Step("Base of the cage on the servo", f"Lower the base over the shaft. {screws(SERVO_CASE)}"),
         shaped_by=on_servo_front(SLIP_RING_ADAPTER),
     )
-
-
-def _cage(layout: Layout) -> BearingCage | None:
-    stack = layout.stack
-    return cage_of(layout.scanner, stack) if isinstance(stack, DirectStack) else None
 
 
 def bearing_cage(p: BearingCage) -> cq.Solid:

@@ -34,11 +34,11 @@ from cad.layout.belt.stack import (
 )
 from cad.layout.belt.tower import DISC_SCREW, UNDER_FOOT_NUT, UNDER_HEAD, BearingTower, disc_azimuths, tower_of
 from cad.layout.fits import OnSheet, printed_seat
-from cad.layout.layout import Layout
 from cad.layout.names import BEARING_TOWER, DRIVE_PLATE
 from cad.parts.part_spec import PartSpec, Step, shapes
 from cad.screws import Trap
 from cad.solids import building, checked
+from design.scanner import Scanner
 
 BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
 WINDOW = 10.0  # diameter
@@ -47,11 +47,8 @@ GROOVE = 1.0  # half width of the index groove
 MARKED = 6.0  # half of the edge that it is in
 
 
-def tower_spec(layout: Layout) -> PartSpec | None:
-    """The tower of one scanner; None where the servo stands on the axis."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def tower_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The tower of one scanner."""
     p = tower_of(scanner, stack)
     words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
     return PartSpec(

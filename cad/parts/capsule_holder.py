@@ -18,7 +18,6 @@ from cad import solids
 from cad.layout.belt.stack import DISC, BeltStack
 from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
 from cad.layout.joints import screws
-from cad.layout.layout import Layout
 from cad.layout.names import BEARING_TOWER, RING_STATOR, SLIP_RING_ADAPTER
 from cad.parts.part_spec import PartSpec, Step, shapes
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
@@ -39,11 +38,8 @@ class CapsuleHolder:
     thread: Thread  # of the radial screws
 
 
-def holder_spec(layout: Layout) -> PartSpec | None:
-    """The disc of one scanner; None where its ring is no capsule."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def holder_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The disc of one scanner."""
     words = (
         "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
         f"{screws(RING_STATOR)} Leave them so loose that the flange still gives. Push 10 mm of soft tube, "

@@ -16,19 +16,16 @@ from cad.layout.belt.plate import UNDER_HEAD, DrivePlate, plate_of
 from cad.layout.belt.stack import PLATE, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
-from cad.layout.layout import Layout
 from cad.layout.names import DRIVE_PLATE, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step, shapes
 from cad.solids import building, checked
+from design.scanner import Scanner
 
 FOOT_RADIUS = 3.0
 
 
-def plate_spec(layout: Layout) -> PartSpec | None:
-    """The plate of one scanner; None where the servo stands on the axis."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def plate_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The plate of one scanner."""
     words = (
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024) and put the plate on its front. "
         f"{screws(SERVO_CASE)}"

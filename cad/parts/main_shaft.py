@@ -14,21 +14,18 @@ import cadquery as cq
 from cad import solids
 from cad.layout.belt.stack import BeltStack
 from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
-from cad.layout.layout import Layout
 from cad.layout.names import MAIN_SHAFT
 from cad.parts.part_spec import TURNED_FROM, PartSpec, Step, shapes
 from cad.solids import building, checked
+from design.scanner import Scanner
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
 
 
-def main_shaft_spec(layout: Layout) -> PartSpec | None:
-    """The shaft of one scanner; None where the servo's horn carries another."""
-    stack = layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The shaft of one scanner."""
     seat = ToleratedDiameter(stack.seat_diameter, False, "+0.02/0", "f7 in the bearings, which slide on by hand")
     words = "Lower the shaft through both bearings until its collar lies on the upper one."
     return PartSpec(
@@ -39,7 +36,7 @@ def main_shaft_spec(layout: Layout) -> PartSpec | None:
         process="turned",
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
-        sheet=OnSheet((seat, turned_spigot(stack.shaft_diameter, layout.scanner.printer.fit_clearance_mm))),
+        sheet=OnSheet((seat, turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm))),
         shaped_by=shapes(MAIN_SHAFT, "bearing.bore_mm", "slip_ring.rotor"),
     )
 

@@ -17,23 +17,22 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
+from cad import solids
 from cad.layout.belt.loads import PRELOAD_N, press_newton
 from cad.layout.belt.plate import pulley_foot_radius
 from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, RIM, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet, no_wider
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
+from cad.layout.joints import horn_centres, screws
 from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
 from cad.parts.part_spec import HORN, PartSpec, Step, shapes
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from cad.solids import building, checked
+from design.catalogue.products import Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
-UNDER_HEAD = 4.0  # of the drive pulley, above the horn: at least
 GIVE_MM = 2.0  # of a strand, when the pre-load is felt
 OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
 
@@ -47,19 +46,14 @@ class Pulley:
     thread: Thread  # of the grub screws
     screw: Screw  # of the horn
     hole: float  # diameter
-    circle: float  # diameter
-    holes: int
-    first_hole_deg: float  # from +y of the servo
+    servo: Servo
     foot_radius: float  # of what lies on the horn
     boss_radius: float  # of the horn's
     boss_height: float
 
 
-def shaft_pulley_spec(layout: Layout) -> PartSpec | None:
-    """The pulley on the shaft of one scanner; None where there is no belt."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The pulley on the shaft of one scanner."""
     words = (
         "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and lay the belt "
         f"around it: {stack.belt.name} of {stack.belt_teeth} teeth ({stack.belt_teeth * stack.belt.pitch_mm:g} mm). "
@@ -77,11 +71,8 @@ def shaft_pulley_spec(layout: Layout) -> PartSpec | None:
     )
 
 
-def drive_pulley_spec(layout: Layout) -> PartSpec | None:
-    """The pulley on the horn of one scanner; None where there is no belt."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The pulley on the horn of one scanner."""
     push = press_newton(stack, PRELOAD_N, GIVE_MM)
     words = (
         f"The boss of the horn centres the pulley. {screws(SERVO_OUTPUT)} Hang the servo between the arms of the "
@@ -129,9 +120,7 @@ def pulley_of(scanner: Scanner, stack: BeltStack) -> Pulley:
         thread=thread_in_part(GRUB, printer, room_for_nut=False),
         screw=screw,
         hole=passing_hole(screw, printer),
-        circle=servo.horn_circle_mm,
-        holes=servo.horn_holes,
-        first_hole_deg=servo.horn_first_hole_deg,
+        servo=servo,
         foot_radius=pulley_foot_radius(servo),
         boss_radius=boss,
         boss_height=servo.horn_boss_height_mm,
@@ -169,17 +158,15 @@ def drive_pulley(p: Pulley) -> cq.Solid:
     with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth):
         foot = solids.upright(p.foot_radius, horn, stack.teeth_low + 0.5)
         body = checked(_toothed(stack, foot, None), DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth)
-    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle):
-        centres = outlines.polygon(p.circle / 2, p.holes, math.radians(90.0 + p.first_hole_deg))
-        seat = max(horn + UNDER_HEAD, stack.teeth_low)  # lower, and a pocket would leave the foot a thin wall
+    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.servo.horn_circle_mm):
         cuts = []
-        for x, y in centres.tolist():
+        for x, y in horn_centres(p.servo).tolist():
             cuts.append(solids.upright(p.hole / 2, horn - 1.0, stack.teeth_top + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, seat, stack.teeth_top + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.head_room, stack.pulley_seat, stack.teeth_top + 1.0, x, y))
         if p.boss_radius > 0:
             cuts.append(solids.upright(p.boss_radius + p.fit / 4, horn - 1.0, horn + p.boss_height + 0.5))
         cut = body.cut(*cuts).clean()
-        made = checked(cut, DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.circle)
+        made = checked(cut, DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.servo.horn_circle_mm)
     return made.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 
 

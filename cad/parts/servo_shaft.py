@@ -9,7 +9,6 @@ not depend on the scan plane: one shaft serves every linkage.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,12 +17,12 @@ import cadquery as cq
 from cad import outlines, solids
 from cad.layout.direct.stack import WAIST, DirectStack
 from cad.layout.fits import OnSheet, turned_spigot
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
+from cad.layout.joints import horn_centres, screws
 from cad.layout.names import SERVO_HORN, SERVO_SHAFT, SLIP_RING_ADAPTER
 from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step, shapes
 from cad.screws import SCREWS, passing_hole
 from cad.solids import building, checked
+from design.catalogue.products import Servo
 from design.scanner import Scanner
 
 SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
@@ -34,19 +33,14 @@ class ServoShaft:
     """Lengths in mm."""
 
     stack: DirectStack
+    servo: Servo
     boss_radius: float  # of the pocket
     boss_depth: float
     hole: float  # diameter
-    circle: float  # diameter
-    holes: int
-    first_hole_deg: float  # from +y
 
 
-def shaft_spec(layout: Layout) -> PartSpec | None:
-    """The shaft of one scanner; None where a belt turns another."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, DirectStack):
-        return None
+def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
+    """The shaft of one scanner."""
     turned = shaft_is_turned(stack)
     fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),) if turned else ()
     words = (
@@ -78,12 +72,10 @@ def shaft_of(scanner: Scanner, stack: DirectStack) -> ServoShaft:
     servo = scanner.servo
     return ServoShaft(
         stack=stack,
+        servo=servo,
         boss_radius=servo.horn_boss_diameter_mm / 2 + 0.2,
         boss_depth=servo.horn_boss_height_mm + 0.5,
         hole=passing_hole(SCREWS[servo.horn_screw], scanner.printer),
-        circle=servo.horn_circle_mm,
-        holes=servo.horn_holes,
-        first_hole_deg=servo.horn_first_hole_deg,
     )
 
 
@@ -101,21 +93,21 @@ def servo_shaft(p: ServoShaft) -> cq.Solid:
             body = body.fuse(solids.upright(stack.collar_radius, horn, horn + stack.collar_height))
         body = body.fuse(solids.upright(radius, horn, stack.spigot_top))
         body = checked(body, SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm")
-    with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.circle):
+    with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.servo.horn_circle_mm):
         low = (-2 * radius, stack.flat, stack.hub_bottom)
         cuts = [solids.box(low, (2 * radius, 2 * radius, stack.spigot_top + 1.0)), *_holes(p), _index_groove(p)]
         if p.boss_radius > 0.2:
             cuts.append(solids.upright(p.boss_radius, horn - 1.0, horn + p.boss_depth))
         if stack.bearing is not None:
             cuts.append(_waist(stack))
-        return checked(body.cut(*cuts).clean(), SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.circle)
+        return checked(
+            body.cut(*cuts).clean(), SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.servo.horn_circle_mm
+        )
 
 
 def _holes(p: ServoShaft) -> list[cq.Solid]:
     low, high = p.stack.horn - 1.0, p.stack.horn + p.stack.flange_thickness + 1.0
-    first = math.radians(90.0 + p.first_hole_deg)
-    centres = outlines.polygon(p.circle / 2, p.holes, first)
-    return [solids.upright(p.hole / 2, low, high, float(x), float(y)) for x, y in centres]
+    return [solids.upright(p.hole / 2, low, high, float(x), float(y)) for x, y in horn_centres(p.servo)]
 
 
 def _waist(stack: DirectStack) -> cq.Solid:

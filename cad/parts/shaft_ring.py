@@ -16,7 +16,6 @@ from cad import solids
 from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, BeltStack
 from cad.layout.hub import BEARING_STEP
 from cad.layout.joints import screws
-from cad.layout.layout import Layout
 from cad.layout.names import MAIN_SHAFT, SHAFT_RING
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Thread, thread_in_part
@@ -33,11 +32,8 @@ class ShaftRing:
     thread: Thread
 
 
-def shaft_ring_spec(layout: Layout) -> PartSpec | None:
-    """The ring of one scanner; None where there is no tower."""
-    scanner, stack = layout.scanner, layout.stack
-    if not isinstance(stack, BeltStack):
-        return None
+def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
+    """The ring of one scanner."""
     words = (
         "From below push the ring up the shaft, its step against the lower bearing, so that the shaft has no play "
         f"along the axis and still turns freely. {screws(MAIN_SHAFT)} A driver reaches them through the round window "

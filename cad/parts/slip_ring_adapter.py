@@ -20,11 +20,11 @@ from cad.layout.direct.adapter import SlipRingAdapter, adapter_of
 from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD
 from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import screws
-from cad.layout.layout import Layout
 from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
 from cad.parts.bearing_cage import cage_base
 from cad.parts.part_spec import PartSpec, Step, on_servo_front, shapes
 from cad.solids import building, checked
+from design.scanner import Scanner
 
 PLATE = 6.0
 PLAY = 0.25  # between arm and stator, on the radius
@@ -33,10 +33,9 @@ ARM_HALF_WIDTH = 10.0
 UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
 
 
-def adapter_spec(layout: Layout) -> PartSpec | None:
-    """The adapter of one scanner; None without a ring, or where the ring is a capsule."""
-    scanner, stack = layout.scanner, layout.stack
-    if scanner.slip_ring is None or not isinstance(stack, DirectStack):
+def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
+    """The adapter of one scanner; None without a ring."""
+    if scanner.slip_ring is None:
         return None
     how = (
         "Slide the fork round the flange of the shaft." if stack.bearing is None else "Lower the plate over the shaft."

@@ -17,6 +17,7 @@ from cad.layout.belt.stack import (
 )
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
 from cad.layout.hub import HUB_WALL
+from cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
 from design.catalogue.products import Bearing, Belt, Servo, SlipRing
 from design.errors import BuildError
 from design.scanner import Scanner
@@ -70,7 +71,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
     if not stock:
         raise BuildError(
-            f"drive_pulley: centre distance >= {least:.1f} mm: the longest {belt.name} of the catalogue has "
+            f"{DRIVE_PULLEY}: centre distance >= {least:.1f} mm: the longest {belt.name} of the catalogue has "
             f"{max(belt.teeth)} teeth and reaches {centre_of(max(belt.teeth), teeth, belt.pitch_mm):.1f}; add a longer "
             "one to its teeth"
         )
@@ -91,9 +92,9 @@ def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
     if fitting is None:
         most = max((bearing.bore_mm for bearing in scanner.bearings), default=0.0)
         raise BuildError(
-            f"bearing_tower: slip_ring {ring.name}: rotor.diameter_mm = {least - 2 * (TUBE_WALL + SHAFT_WALL):g}: its "
-            f"shaft needs bearings with bore_mm >= {least:g}, the largest of the catalogue has {most:g}; add one, or "
-            "take a smaller capsule"
+            f"{BEARING_TOWER}: slip_ring {ring.name}: rotor.diameter_mm = {least - 2 * (TUBE_WALL + SHAFT_WALL):g}: "
+            f"its shaft needs bearings with bore_mm >= {least:g}, the largest of the catalogue has {most:g}; add one, "
+            "or take a smaller capsule"
         )
     return fitting
 
@@ -101,7 +102,7 @@ def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
 def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
     if not scanner.belts:
         raise BuildError(
-            f"drive_pulley: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
+            f"{DRIVE_PULLEY}: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
             "catalogue has none; add a product of kind = 'belt'"
         )
     return scanner.belts[0]
@@ -113,7 +114,7 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
     if stack.chamber_radius > corner:
         most = 2 * (corner - RING_ROOM)
         raise BuildError(
-            f"bearing_tower: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
+            f"{BEARING_TOWER}: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
             f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
         )
 

@@ -45,6 +45,7 @@ RIM_ABOVE_BELT = 0.5
 BELT_ROOM = 0.5  # on each side of the belt
 PULLEY_GAP = 2.0  # between plate and pulleys
 PLATE = 5.0  # of the servo
+UNDER_HORN_HEAD = 4.0  # of the drive pulley: at least
 SEAT_GAP = 0.2  # the feet carry, not the plate
 INNER_RING = 1.45  # how far a shoulder may touch a bearing's inner ring, on the radius
 SEAT_WALL = 5.0  # of the tower
@@ -212,6 +213,11 @@ class BeltStack(Hub):
     def horn(self) -> float:
         """Height of the servo's horn face."""
         return self.tower_top - SEAT_GAP - self.servo.case_max_mm[2]
+
+    @property
+    def pulley_seat(self) -> float:
+        """Height of the faces that the heads of the horn's screws lie on: lower, and the foot's wall would be thin."""
+        return max(self.horn + UNDER_HORN_HEAD, self.teeth_low)
 
     @property
     def plate_x(self) -> float:

@@ -9,6 +9,7 @@ from cad.layout.direct.loads import bearing_for
 from cad.layout.direct.stack import DirectStack
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from cad.layout.hub import HUB_WALL
+from cad.layout.names import SERVO_SHAFT
 from cad.screws import SCREWS
 from design.catalogue.products import Servo
 from design.errors import BuildError
@@ -89,7 +90,7 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     room = circle - screw.head_diameter / 2
     if collar > room:
         raise BuildError(
-            f"servo_shaft: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
+            f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
             f"{servo.horn_circle_mm:g} mm leave {room:g} mm; take a ring with a smaller bore"
         )
     thickness = 4.0

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cad.assembly.joints import LENGTHS, _length, joints_of
 from cad.assembly.make import make_parts
 from cad.files.bom import bom_text, items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
+from cad.layout.all_joints import joints_of
+from cad.layout.joints import LENGTHS, shank_mm
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue
@@ -99,7 +100,7 @@ def test_the_shaft_comes_before_what_goes_over_it(steps):
     st.floats(1.5, 12),
 )
 def test_a_screw_never_bottoms_and_holds_where_it_can(name, grip, fixing, depth):
-    length = _length(SCREWS[name], grip, fixing, depth)
+    length = shank_mm(SCREWS[name], grip, fixing, depth)
     assert length in LENGTHS[name]
     if fixing == "thread":
         assert length <= grip + depth - 0.5 or length == min(LENGTHS[name])
@@ -121,8 +122,7 @@ def upright(made):
 def test_what_a_scanner_does_not_have_is_not_listed(upright):
     scanner = replace(upright, slip_ring=None, lidar=upright.lidar.model_copy(update={"price_usd": None}))
     assembly = make_parts(scanner)
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
+    joints = joints_of(assembly.layout)
     masses = dict.fromkeys(assembly.made, 1.0)
     items = items_of(scanner, assembly, joints, masses, "0123456789ab")
     assert "slip ring" not in {item.part for item in items}
@@ -133,28 +133,15 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     text = instructions_text(scanner, assembly, joints, "0123456789ab")
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
-    assert (seat.part, seat.count, seat.covered) == ("sub_plate", 4, 0)
-
-
-def test_a_recess_is_no_hole_for_a_screw(made):
-    """The boss of a horn lies in a blind pocket that has the size of a hole for M6."""
-    angles = made.scanner.angles.model_copy(
-        update={"angles_deg": Angles(alpha_rot=0, beta_rot=40, alpha_laser=-20, beta_laser=-70), "servo": "AX-12A"}
-    )
-    products = load_catalogue().products
-    scanner = replace(made.scanner, angles=angles, servo=products["AX-12A"], lidar=products["URG-04LX"])
-    assembly = make_parts(scanner)
-    joints = joints_of(scanner, assembly, {n: rounds_of(s) for n, s in (assembly.made | assembly.bought).items()})
-    assert "bearing_cage" in assembly.made
-    assert not [joint for joint in joints if joint.part == "servo_shaft" and joint.onto != "servo_horn"]
+    assert (seat.part, seat.count) == ("sub_plate", 4)
 
 
 def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
     printer = load_catalogue().products["fdm-0.4-insert"]
     scanner = replace(made.scanner, printer=printer)
     assembly = make_parts(scanner)
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
+    rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
+    joints = joints_of(assembly.layout)
     held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}
     cage = held.pop(("bearing_cage", "slip_ring_adapter"))
     grub = held.pop(("alignment_linkage", "servo_shaft"))
@@ -162,13 +149,8 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
     for part, count in (("slip_ring_adapter", 4), ("alignment_linkage", 2)):
         seats = [hole for hole in rounds[part] if hole.hole and hole.diameter == 4.0]
         assert len(seats) == count and min(hole.length for hole in seats) > INSERT_LENGTH
-    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.scanner, *_solids(made))}
+    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.result.assembly.layout)}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 6)]
     assert "Melt the inserts in" in instructions_text(scanner, assembly, joints, "0123456789ab")
-
-
-def _solids(made):
-    assembly = made.result.assembly
-    return assembly, {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}

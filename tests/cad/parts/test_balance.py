@@ -10,11 +10,10 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cad.assembly.joints import joints_of
 from cad.assembly.make import make_parts
 from cad.assembly.shadow import shadow_of, triangles_of
 from cad.files.instructions import instructions_text
-from cad.geometry.holes import rounds_of
+from cad.layout.all_joints import joints_of
 from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
 from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
 from cad.layout.layout import drive_of, layout_of
@@ -107,8 +106,7 @@ def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made
 
 def test_screws_from_below_and_a_step_that_says_so(made):
     scanner, assembly = made
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
+    joints = joints_of(assembly.layout)
     (joint,) = [joint for joint in joints if joint.onto == "counterweight"]
     assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
     bar = assembly.layout.counterweight

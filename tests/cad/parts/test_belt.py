@@ -11,8 +11,8 @@ import shapely
 import trimesh
 from cadquery import Vector
 
-from cad.assembly.joints import joints_of, without_traps
 from cad.assembly.make import make_parts
+from cad.checks.remarks import without_traps
 from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
 from cad.drawings.write import Words, drawn
@@ -21,6 +21,7 @@ from cad.files.instructions import instructions_text
 from cad.files.urdf import urdf_text
 from cad.geometry.holes import rounds_of
 from cad.geometry.mesh import mesh_of
+from cad.layout.all_joints import joints_of
 from cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, press_newton
 from cad.layout.belt.sizing import QUARTERS, belt_stack
 from cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
@@ -311,8 +312,7 @@ def test_the_belt_holds_as_two_springs(made):
 
 def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assembly, scanner = made.assembly, made.scanner
-    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    joints = joints_of(scanner, assembly, rounds)
+    joints = joints_of(assembly.layout)
     found = {(joint.part, joint.onto): (joint.screw.name, joint.count, joint.fixing) for joint in joints}
     assert found == {
         ("shaft_pulley", "main_shaft"): ("M3", 2, "grub"),
@@ -326,7 +326,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         ("alignment_linkage", "counterweight"): ("M4", 2, "thread"),
         ("alignment_linkage", "main_shaft"): ("M3", 2, "grub"),
         ("base_mount", "bearing_tower"): ("M3", 4, "thread"),
-        ("base_mount", ""): ("M4", 4, "deck"),
+        ("base_mount", "deck"): ("M4", 4, "deck"),
     }
     text = instructions_text(scanner, assembly, joints, "0" * 12)
     titles = re.findall(r"^## \d+\. (.*)$", text, re.M)
@@ -343,8 +343,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
-    solid = made.assembly.made["main_shaft"]
-    sheet = drawing_of("main_shaft", made.scanner, made.assembly, rounds_of(solid), 80.0, "0" * 12)
+    sheet = drawing_of("main_shaft", made.scanner, made.assembly, 80.0, "0" * 12)
     said = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
     assert [text for text in said if text.startswith("Ø") and ":" not in text] == [
@@ -362,8 +361,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     """Of the pulleys: teeth and bore; of the tower: the seats. What is off the axis is measured from the horn's."""
     said = {}
     for name in ("drive_pulley", "bearing_tower"):
-        solid, rest = made.assembly.made[name], (1.0, "0" * 12)
-        sheet = drawing_of(name, made.scanner, made.assembly, rounds_of(solid), *rest)
+        sheet = drawing_of(name, made.scanner, made.assembly, 1.0, "0" * 12)
         said[name] = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
     assert any(
@@ -502,12 +500,12 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
         assert shared(nut(5.5, 2.4, at - [0, 0, 0.5], turn)) > 3.0
         assert shared(nut(5.5, 2.4, at - out, turn)) > 0.5  # it stands over its hole
         assert shared(upright(1.5, at[2], at[2] + 2.4 + 5.0, *at[:2])) < 1e-3  # room for the end of any screw
-    joints = {(joint.part, joint.onto): joint for joint in joints_of(scanner, assembly, rounds) if joint.traps}
+    joints = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.traps}
     lengths = {key: (joint.fixing, joint.number, joint.count) for key, joint in joints.items()}
     assert lengths[("drive_plate", "bearing_tower")] == ("trap", "ISO 4762 M4 x 16", 4)
     assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
-    assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, assembly, list(joints.values()))}
-    sheet = drawing_of("bearing_tower", scanner, assembly, rounds["bearing_tower"], 1.0, "0" * 12)
+    assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, list(joints.values()))}
+    sheet = drawing_of("bearing_tower", scanner, assembly, 1.0, "0" * 12)
     said = {item.text for item in drawn(sheet) if isinstance(item, Words)}
     assert {
         "Hexagons under the arms for nuts M4: 7.2 across flats.",

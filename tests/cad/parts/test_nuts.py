@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 
 from cad import outlines, solids
-from cad.assembly.joints import joints_of, without_traps
 from cad.assembly.make import make_parts
+from cad.checks.remarks import without_traps
 from cad.files.bom import items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
 from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.layout.all_joints import joints_of
 from cad.layout.direct.cage import cage_of, has_room
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
-from cad.screws import SCREWS, trap_of
+from cad.screws import SCREWS, thread_in_part, trap_of
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue
 
@@ -31,7 +32,7 @@ def nutted(made):
     scanner = replace(made.scanner, printer=PRINTER)
     assembly = make_parts(scanner)
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    return scanner, assembly, rounds, joints_of(scanner, assembly, rounds)
+    return scanner, assembly, rounds, joints_of(assembly.layout)
 
 
 def _nut(start, along, turn_deg, length=HEIGHT):
@@ -95,9 +96,10 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 6
     text = instructions_text(scanner, assembly, joints, "0123456789ab")
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their traps" in text
-    assert without_traps(PRINTER, assembly, joints) == []
-    plain = [replace(cage, fixing="thread", traps=False), replace(grub, traps=False)]
-    assert [finding.subject for finding in without_traps(PRINTER, assembly, plain)] == [cage.onto, grub.part]
+    assert without_traps(PRINTER, joints) == []
+    core = thread_in_part(M3, PRINTER, room_for_nut=False)
+    plain = [replace(cage, fixing="thread", thread=core), replace(grub, thread=core)]
+    assert [finding.subject for finding in without_traps(PRINTER, plain)] == [cage.onto, grub.part]
     stack = cage_of(scanner, assembly.layout.stack).stack
     assert has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 15.0, 1.2)
     assert not has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 7.0, 1.2)  # the ring comes down to the nut

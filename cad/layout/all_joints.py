@@ -1,0 +1,109 @@
+"""All joints of one scanner: those of its drive, and those that every scanner has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from cad.layout import names
+from cad.layout.balance.counterweight import SCREW as BAR_SCREW
+from cad.layout.balance.counterweight import Counterweight
+from cad.layout.belt.joints import belt_joints
+from cad.layout.belt.stack import FOOT, BeltStack
+from cad.layout.belt.tower import UNDER_FOOT_NUT, tower_of
+from cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD
+from cad.layout.direct.joints import direct_joints
+from cad.layout.envelope import EAR_SCREW, PLATE_THICKNESS, SUB_PLATE_THICKNESS
+from cad.layout.joints import (
+    CASE_EAR,
+    DECK_MM,
+    Joint,
+    held_in,
+    inward_axes,
+    lidar_thread_mm,
+    placed_axes,
+    upright_axes,
+)
+from cad.layout.layout import Layout
+from cad.layout.linkage import CLAMP_SCREW, SPOT_FACE, clamp_floor_mm
+
+
+def joints_of(layout: Layout) -> list[Joint]:
+    """All joints, in the order of the parts; those with slots last.
+
+    Raises:
+        BuildError: the case of the servo has no holes where they are needed.
+    """
+    scanner, stack = layout.scanner, layout.stack
+    drive = belt_joints(scanner, stack) if isinstance(stack, BeltStack) else direct_joints(scanner, stack)
+    joints = [*drive, _clamp(layout), *_of_lidar(layout), *_on_deck(layout)]
+    if isinstance(layout.counterweight, Counterweight):
+        joints.append(_bar(layout.counterweight))
+    return sorted(joints, key=lambda joint: joint.slotted)
+
+
+def _clamp(layout: Layout) -> Joint:
+    """The hub on the shaft."""
+    p, outer = layout.linkage, layout.stack.hub_radius - SPOT_FACE
+    axes = inward_axes(p.clamp_azimuths, outer, layout.stack.clamp)
+    wall = outer - min(clamp_floor_mm(p, azimuth) for azimuth in p.clamp_azimuths)
+    part, shaft = names.ALIGNMENT_LINKAGE, layout.drive.shaft
+    return Joint(part, shaft, "grub", CLAMP_SCREW, axes, grip_mm=wall, thread_mm=0.0, thread=p.clamp_thread)
+
+
+def _of_lidar(layout: Layout) -> Iterator[Joint]:
+    """The lidar on the linkage, or on a sub-plate and that on the linkage."""
+    p, R = layout.linkage, layout.stack.R()
+    part, grip = names.ALIGNMENT_LINKAGE, PLATE_THICKNESS
+    if p.ears is not None:
+        part, grip = names.SUB_PLATE, SUB_PLATE_THICKNESS
+    deep = lidar_thread_mm(layout.scanner.lidar)
+    axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), R)
+    yield Joint(part, names.LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep)
+    if p.ears is not None:
+        thread = p.ear_thread
+        deep = PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth)
+        axes = placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), R)
+        onto, how = names.ALIGNMENT_LINKAGE, held_in(thread)
+        yield Joint(part, onto, how, EAR_SCREW, axes, grip_mm=grip, thread_mm=deep, thread=thread)
+
+
+def _on_deck(layout: Layout) -> Iterator[Joint]:
+    """What the mount holds, and the mount on the deck; or the servo on the deck."""
+    mounted, deck, stack = layout.drive.mounted, layout.deck, layout.stack
+    if deck.flat:
+        axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
+        yield Joint(names.DECK, mounted.onto, "nut", mounted.screw, axes, grip_mm=DECK_MM, thread_mm=CASE_EAR)
+        return
+    thread = tower_of(layout.scanner, stack).foot if isinstance(stack, BeltStack) else None
+    deep = CASE_EAR
+    if thread is not None:
+        deep = FOOT - 1.0 if thread.trap is None else UNDER_FOOT_NUT
+    yield Joint(
+        names.BASE_MOUNT,
+        mounted.onto,
+        "nut" if thread is None else held_in(thread),
+        mounted.screw,
+        upright_axes(mounted.holes, mounted.ears - UNDER_MOUNT_HEAD, 1.0),
+        grip_mm=UNDER_MOUNT_HEAD,
+        thread_mm=deep,
+        thread=thread,
+    )
+    axes = placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), deck.rotation(), deck.centre)
+    yield Joint(names.BASE_MOUNT, names.DECK, "deck", deck.screw, axes, grip_mm=FOOT_THICKNESS, thread_mm=DECK_MM)
+
+
+def _bar(bar: Counterweight) -> Joint:
+    """The counterweight on the ear of the hub, from below."""
+    ear = bar.ear
+    x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
+    return Joint(
+        names.ALIGNMENT_LINKAGE,
+        names.COUNTERWEIGHT,
+        "thread",
+        BAR_SCREW,
+        upright_axes(((at * x, at * y) for at in bar.screws), ear.low, 1.0),
+        grip_mm=ear.high - ear.low,
+        thread_mm=bar.section[1],
+        slotted=True,
+    )

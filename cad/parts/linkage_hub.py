@@ -1,0 +1,131 @@
+"""The hub of the alignment linkage: clamp of the shaft, journal of the bearing, way of the wires, ear of the bar.
+
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cadquery as cq
+import numpy as np
+
+from cad import outlines, solids
+from cad.layout.direct.loads import JOURNAL_WALL
+from cad.layout.linkage import CLAMP_DRIVER, SPOT_FACE, AlignmentLinkage, Ear, clamp_trap_floor_mm
+
+INNER_RING = 1.2  # how far the hub's face may touch the bearing's inner ring, on the radius
+WIRES_HALF_WIDTH = 5.0
+WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
+EAR_CORNER = 0.3  # of its half width
+TRAP_WALL = 1.2  # between wires and a nut
+
+
+def hub(p: AlignmentLinkage) -> cq.Shape:
+    """The hub, and below its shoulder the journal of the bearing with a step that only the inner ring touches."""
+    stack = p.stack
+    hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
+    if p.ear is not None:
+        hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
+    if stack.bearing is None:
+        return hub
+    step = solids.upright(stack.bearing.bore_mm / 2 + INNER_RING, stack.bearing_top, stack.shoulder + 1.0)
+    return hub.fuse(step, solids.upright(_journal_radius(p), stack.hub_bottom, stack.shoulder + 1.0))
+
+
+def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
+    """What is cut from it: radial screws, way of the wires, index groove, bore, slots of the ear."""
+    return [*_clamps(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p)]
+
+
+def _ear(ear: Ear, start: float) -> cq.Shape:
+    corner = EAR_CORNER * ear.half_width
+    middle = np.array([(ear.end + start) / 2, 0.0])
+    outline = outlines.octagon(ear.end - middle[0], ear.half_width, corner) + middle
+    return solids.prism(outline, ear.low, ear.high).moved(solids.about_axis(ear.azimuth))
+
+
+def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
+    """Slots with round ends, along the radius."""
+    if p.ear is None:
+        return []
+    ear, radius, cuts = p.ear, p.ear.slot_width / 2, []
+    low, high = ear.low - 1.0, ear.high + 1.0
+    for first, last in ear.slots:
+        ends = [solids.upright(radius, low, high, r, 0.0) for r in (first, last)]
+        cuts.append(
+            solids.box((first, -radius, low), (last, radius, high)).fuse(*ends).moved(solids.about_axis(ear.azimuth))
+        )
+    return cuts
+
+
+def _journal_radius(p: AlignmentLinkage) -> float:
+    """A light press in the bearing: half of the sliding fit."""
+    bearing = p.stack.bearing
+    return 0.0 if bearing is None else bearing.bore_mm / 2 - p.fit / 4
+
+
+def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Channel between the two radial screws: along the journal, inside the bearing, then out over the cage."""
+    stack = p.stack
+    if stack.bearing is None or stack.ring_length == 0:
+        return []
+    inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
+    if p.clamp_thread.trap is not None:  # clear of the corners of the traps on either side
+        beside = clamp_trap_floor_mm(p, p.clamp_thread.trap) + p.clamp_thread.trap.across / 2
+        inner = max(inner, beside * math.sqrt(0.5) + TRAP_WALL)
+    low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
+    channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
+    return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
+
+
+def _free_side(p: AlignmentLinkage) -> float:
+    """Azimuth between the two radial screws."""
+    return sum(p.clamp_azimuths) / 2
+
+
+def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
+    stack = p.stack
+    cuts = []
+    for azimuth in p.clamp_azimuths:
+        out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        centre = np.array([0.0, 0.0, stack.clamp])
+        cuts.append(solids.cylinder(p.clamp_thread.hole / 2, centre, out, 80.0))
+        cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - SPOT_FACE) * out, out, 80.0))
+        if (
+            p.clamp_thread.trap is not None
+        ):  # from within the bore, where the shaft holds the nut in and the screw pushes it out
+            frame = np.stack([[-out[1], out[0], 0.0], [0.0, 0.0, 1.0], out], axis=1)
+            outline = outlines.polygon(p.clamp_thread.trap.corner, 6, math.pi / 2)
+            pocket = solids.prism(outline, 0.0, clamp_trap_floor_mm(p, p.clamp_thread.trap))
+            cuts.append(pocket.moved(solids.location(frame, centre)))
+    return cuts
+
+
+def _bore(p: AlignmentLinkage) -> cq.Shape:
+    """Room of the spigot: a cylinder with a flat at +y."""
+    stack = p.stack
+    radius = (stack.shaft_diameter + p.fit) / 2
+    round_bore = solids.upright(radius, stack.hub_bottom - 1.0, stack.spigot_top)
+    low = (-2 * radius, -2 * radius, stack.hub_bottom - 2.0)
+    return round_bore.intersect(solids.box(low, (2 * radius, stack.flat + p.fit / 2, stack.spigot_top + 1.0)))
+
+
+def _index_groove(p: AlignmentLinkage) -> cq.Solid:
+    """At the hub's lower end, or above the wires where they leave at +y; there an ear carries it outwards."""
+    stack, ear, y = p.stack, p.ear, p.stack.hub_radius
+    low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
+    if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:
+        low, high = -stack.h - 5.0, -stack.h + 1.0
+        if ear is not None and _reach_along_y(ear) > y:
+            y, low, high = _reach_along_y(ear), ear.low - 1.0, ear.high + 1.0
+    return solids.prism(outlines.diamond(1.0, y), low, high)
+
+
+def _reach_along_y(ear: Ear) -> float:
+    """Where +y leaves an ear; 0 where it is on another side."""
+    along, across = math.cos(ear.azimuth - math.pi / 2), abs(math.sin(ear.azimuth - math.pi / 2))
+    if along <= 0:
+        return 0.0
+    corner = (ear.end + (1 - EAR_CORNER) * ear.half_width) / (along + across)
+    return min(ear.end / along, ear.half_width / max(across, 1e-9), corner)

@@ -1,0 +1,207 @@
+"""The declared joints are those of the solids: each is read back from the holes of the parts, which know no joints.
+
+A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance and both its ends are
+open, or if its diameter is one that a screw holds on to (the core of a thread, the seat of an insert, the way into a
+trapped nut). What lies behind it on the same axis decides: a thread (the screw's own diameter, or such a hole in a
+part), a hole to pass through to a nut, or the spigot that a grub screw clamps; nothing means the robot's deck. Screws
+in slots, which are no round holes, cannot be read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from cad.assembly.make import make_parts
+from cad.geometry.holes import Piercing, rounds_of
+from cad.layout.all_joints import joints_of
+from cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
+from cad.screws import SCREWS, holding_holes, trap_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+COAXIAL = 0.05
+NEAR = 6.0  # between the hole of a part and what its screw holds: feet stand off, ears are recessed
+DRIVER = 60.0  # free length behind the head
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What a screw holds on to: body, how, depth of its thread, on which side of the hole the head is (0: none)."""
+
+    onto: str
+    fixing: str
+    depth: float
+    head: int
+
+
+def read_joints(scanner, assembly):
+    """By part and what it is held to: fixing, screw, trap, and of each hole its axis, length, depth behind and head."""
+    printer, found = scanner.printer, {}
+    rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
+    for part, solid in assembly.made.items():
+        piercing = Piercing(solid)
+        for hole in rounds[part]:
+            screw, core = screw_for(hole, printer)
+            behind = None if screw is None else what_is_behind(assembly, part, hole, screw, core, rounds, printer)
+            if behind is not None:
+                assert behind.head == 0 or is_reachable(hole, behind.head, piercing), (part, behind)
+                in_trap = behind.fixing == "trap" or (core and is_trap(hole, screw, printer))
+                key = part, behind.onto
+                kind, holes = found.setdefault(key, ((behind.fixing, screw.name, in_trap), []))
+                assert kind == (behind.fixing, screw.name, in_trap), key
+                holes.append((hole, behind))
+    return found
+
+
+def what_is_behind(assembly, part, hole, screw, core, rounds, printer):
+    """None where the hole is no joint of its own."""
+    partner = partner_of(part, hole, screw, rounds, printer)
+    if core:  # a blind one, or one before another part's hole, is the thread of that part's screw
+        if partner is not None or not hole.through or not ends_in_bore(hole, rounds[part]):
+            return None
+        shaft = next(name for name in assembly.made if name != part and name in assembly.turning_parts())
+        return Behind(shaft, "grub", 0.0, 0)
+    if partner is None:
+        return None if assembly.parts[part].turns else Behind("deck", "deck", DECK_MM, 0)
+    return partner
+
+
+def screw_for(hole, printer):
+    """The screw that goes through a hole, and whether it holds on to the hole itself."""
+    if not hole.hole:
+        return None, False
+    for screw in SCREWS.values():
+        passes = abs(hole.diameter - screw.nominal - printer.screw_clearance_mm) < 0.01
+        if passes and hole.through:  # a blind one is a recess, such as that for the boss of a horn
+            return screw, False
+        if any(abs(hole.diameter - size) < 0.01 for size in holding_holes(screw, printer)):
+            return screw, True
+    return None, False
+
+
+def is_trap(hole, screw, printer):
+    """Whether a hole leads a screw into a nut that the part carries."""
+    trap = trap_of(screw, printer)
+    return trap is not None and abs(hole.diameter - trap.hole) < 0.01
+
+
+def partner_of(part, hole, screw, rounds, printer):
+    """The body with a hole in line: a thread before a plain hole, which may be a pocket for heads; the nearer first."""
+    direction, low, high = (np.array(v) for v in (hole.direction, hole.low, hole.high))
+    best = None
+    for name, others in rounds.items():
+        for other in others if name != part else ():
+            start = np.array(other.low)
+            if not other.hole or abs(abs(float(direction @ other.direction)) - 1) > 1e-5:
+                continue
+            aside = start - low
+            if float(np.linalg.norm(aside - (aside @ direction) * direction)) > COAXIAL:
+                continue
+            ends = sorted((float(start @ direction), float(np.array(other.high) @ direction)))
+            gaps = (float(low @ direction) - ends[1], ends[0] - float(high @ direction))
+            gap = max(gaps)
+            if gap > NEAR or abs(gap) > other.length + 0.1:
+                continue
+            sizes = (screw.nominal, *holding_holes(screw, printer))
+            threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
+            fixing = "trap" if is_trap(other, screw, printer) else "thread" if threaded else "nut"
+            depth = CASE_EAR if fixing == "nut" and name == "servo_case" else other.length
+            order = (not threaded, round(abs(gap), 3))
+            if best is None or order < best[0]:
+                best = order, Behind(name, fixing, depth, 1 if gaps[0] > gaps[1] else -1)
+    return None if best is None else best[1]
+
+
+def ends_in_bore(hole, own):
+    """Whether a radial hole opens into a wider one of the same part, whose axis it points to."""
+    direction = np.array(hole.direction)
+    for other in own:
+        if other.hole and other.diameter > 1.5 * hole.diameter and abs(float(direction @ other.direction)) < 1e-5:
+            between = np.array(hole.low) - np.array(other.low)
+            axis = np.cross(direction, other.direction)
+            height = float(np.array(hole.low) @ other.direction)
+            ends = (float(np.array(other.low) @ other.direction), float(np.array(other.high) @ other.direction))
+            if abs(float(between @ axis)) < COAXIAL and min(ends) < height < max(ends):
+                return True
+    return False
+
+
+def is_reachable(hole, head, piercing):
+    """Whether a straight driver finds the head: nothing of the part itself on the axis behind it."""
+    direction = head * np.array(hole.direction)
+    start = np.array(hole.high if head > 0 else hole.low)
+    return not piercing.between(start - 0.05 * direction, start + DRIVER * direction)
+
+
+def scanner_for(axis, mount, ring="UH1256-02-0610-06S", lidar="UTM-30LX", servo="MX-64R", printer="fdm-0.4"):
+    angles = AngleSet(
+        task="joints",
+        angles_deg=Angles(alpha_rot=axis[0], beta_rot=axis[1], alpha_laser=mount[0], beta_laser=mount[1]),
+        sensor=lidar,
+        servo=servo,
+        slip_ring=ring,
+    )
+    return scanner_of(angles, printer, load_catalogue())
+
+
+SETTINGS = {
+    "tilted, with a bearing": scanner_for((0, 55), (80, -75)),
+    "tilted, nuts": scanner_for((0, 35), (-20, -70), printer="fdm-0.4-nut"),
+    "hanging, inserts": scanner_for((180, 20), (30, -45), printer="fdm-0.4-insert"),
+    "upright on the deck": scanner_for((0, 0), (60, -30)),
+    "upright, a sub-plate": scanner_for((0, 0), (25.5, -21.4), lidar="URG-04LX"),
+    "a sub-plate in nuts": scanner_for((40, 0), (21, -21), printer="fdm-0.4-nut"),
+    "small, without a ring": scanner_for((0, 40), (-20, -70), ring=None, lidar="URG-04LX", servo="AX-12A"),
+    "a belt": scanner_for((0, 90), (0, -90), ring="SRC022A-6"),
+    "a belt, nuts": scanner_for((60, 20), (10, 60), ring="SRC022A-6", printer="fdm-0.4-nut"),
+}
+
+
+@pytest.mark.parametrize("scanner", SETTINGS.values(), ids=SETTINGS)
+def test_the_declared_joints_are_those_that_the_solids_have(scanner):
+    assembly = make_parts(scanner)
+    read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
+    assert {key for key, joint in declared.items() if not joint.slotted and key[0] != "deck"} == read.keys()
+    for key, ((fixing, screw, trap), holes) in read.items():
+        joint = declared[key]
+        assert (joint.fixing, joint.screw.name, joint.count, joint.traps) == (fixing, screw, len(holes), trap), key
+        grip = round(max(hole.length for hole, _ in holes), 3)  # of a tilted part the kernel knows it to a nanometre
+        depth = min(behind.depth for _, behind in holes)
+        assert joint.length_mm == shank_mm(joint.screw, grip, fixing, depth), (key, grip, depth)
+        assert joint.grip_mm == pytest.approx(grip, abs=0.02), key
+        for axis in joint.axes:
+            (hole,) = [hole for hole, _ in holes if _is_on(axis, hole)]
+            ends = [float((np.array(end) - axis.start) @ axis.along) for end in (hole.low, hole.high)]
+            assert min(ends) == pytest.approx(0.0, abs=0.02), (key, ends)  # it starts where the head bears
+            assert max(ends) == pytest.approx(hole.length, abs=0.02), (key, ends)
+
+
+def _is_on(axis, hole):
+    aside = np.array(hole.low) - axis.start
+    off = np.linalg.norm(aside - (aside @ np.array(axis.along)) * np.array(axis.along))
+    return off < 0.01 and abs(abs(np.array(axis.along) @ hole.direction) - 1) < 1e-6
+
+
+def test_screws_in_slots_stand_in_the_middle_of_them():
+    scanner = SETTINGS["a belt"]
+    assembly = make_parts(scanner)
+    slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slotted}
+    assert slotted.keys() == {("drive_plate", "bearing_tower"), ("alignment_linkage", "counterweight")}
+    for (_, onto), joint in slotted.items():
+        threads = [hole for hole in rounds_of(assembly.made[onto]) if abs(hole.diameter - joint.screw.core) < 0.01]
+        assert joint.count == len([axis for axis in joint.axes for hole in threads if _is_on(axis, hole)])
+
+
+def test_a_screw_that_moves_is_noticed():
+    """The reading sees a hole that is not where the joint says: the servo's shaft of another scanner."""
+    scanner = SETTINGS["upright on the deck"]
+    assembly = make_parts(scanner)
+    turned = scanner.servo.model_copy(update={"horn_first_hole_deg": 10.0})
+    moved = replace(assembly.layout, scanner=replace(scanner, servo=turned))
+    joint = next(joint for joint in joints_of(moved) if joint.onto == "servo_horn")
+    _, holes = read_joints(scanner, assembly)["servo_shaft", "servo_horn"]
+    assert not any(_is_on(axis, hole) for axis in joint.axes for hole, _ in holes)
