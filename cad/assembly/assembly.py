@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import cadquery as cq
 
 from cad.assembly.bought import BodySpec
-from cad.geometry.mesh import Mesh, mesh_of
+from cad.geometry.mesh import TriMesh, mesh_of
 from cad.layout.layout import Layout
 from cad.parts.part_spec import Colour, PartSpec
 
@@ -30,7 +30,7 @@ class Assembly:
     bodies: dict[str, BodySpec]
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
-    _meshes: dict[str, Mesh] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def spec(self, name: str) -> PartSpec | BodySpec:
         """What is known of a part or a body."""
@@ -56,17 +56,17 @@ class Assembly:
         """Names of the made parts between hub and lidar."""
         return [name for name in self.made if self.parts[name].seat is not None]
 
-    def mesh(self, name: str) -> Mesh:
+    def mesh(self, name: str) -> TriMesh:
         """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
         if name not in self._meshes:
             self._meshes[name] = mesh_of(self.made[name] if name in self.made else self.bought[name])
         return self._meshes[name]
 
-    def meshes(self) -> dict[str, Mesh]:
+    def meshes(self) -> dict[str, TriMesh]:
         """Of all parts by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
 
-    def outlines(self) -> dict[str, Mesh]:
+    def outlines(self) -> dict[str, TriMesh]:
         """Of all parts by name, as they look from outside while they turn."""
         return self.meshes() | {
             name: self._swept(name, part.sweep)
@@ -74,7 +74,7 @@ class Assembly:
             if name in self.made and part.sweep is not None
         }
 
-    def _swept(self, name: str, sweep: Callable[[], cq.Solid]) -> Mesh:
+    def _swept(self, name: str, sweep: Callable[[], cq.Solid]) -> TriMesh:
         key = f"sweep of {name}"
         if key not in self._meshes:
             self._meshes[key] = mesh_of(sweep())

@@ -10,7 +10,7 @@ import cadquery as cq
 import manifold3d
 import numpy as np
 
-from cad.geometry.mesh import Mesh, mesh_of
+from cad.geometry.mesh import TriMesh, mesh_of
 from cad.layout.linkage import AlignmentLinkage
 from cad.parts.alignment_linkage import shapes_of
 
@@ -18,7 +18,7 @@ CHORD_ERROR = 0.2  # mm: not seen on a screen, a third of the triangles of the f
 CHORD_ANGLE = 0.3  # rad
 
 
-def draft_linkage(p: AlignmentLinkage) -> Mesh:
+def draft_linkage(p: AlignmentLinkage) -> TriMesh:
     """The linkage, rotation frame.
 
     Raises:
@@ -29,10 +29,10 @@ def draft_linkage(p: AlignmentLinkage) -> Mesh:
     body = (_solid(shapes.plate) + _solid(shapes.neck)) - room - _together(shapes.beside)
     held = max(body.decompose(), key=lambda piece: float(piece.volume()))  # the piece that holds the plate
     mesh = ((held + _solid(shapes.hub)) - room - _together(shapes.holes)).to_mesh64()
-    return Mesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
+    return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
 
 
-def coarse_mesh(shape: cq.Shape) -> Mesh:
+def coarse_mesh(shape: cq.Shape) -> TriMesh:
     """A shape for the eye, rotation frame."""
     return mesh_of(shape, CHORD_ERROR, CHORD_ANGLE)
 

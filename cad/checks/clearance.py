@@ -17,7 +17,7 @@ import shapely
 
 from cad.assembly.assembly import Assembly
 from cad.checks.check import Check, at_least, at_most
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from design.frames import Array
 
 CHORD = 0.01  # error of an image's edges
@@ -34,7 +34,7 @@ def clearance_checks(assembly: Assembly) -> list[Check]:
     return [turning_check(assembly.outlines(), turning, meet), together_check(assembly.meshes(), turning)]
 
 
-def distance_over_a_turn(one: Mesh, other: Mesh) -> float:
+def distance_over_a_turn(one: TriMesh, other: TriMesh) -> float:
     """Least distance of a turning and a standing body at any axis angle; 0 where they meet."""
     if _holds(one, other) or _holds(other, one):
         return 0.0
@@ -42,7 +42,7 @@ def distance_over_a_turn(one: Mesh, other: Mesh) -> float:
 
 
 def turning_check(
-    meshes: Mapping[str, Mesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
+    meshes: Mapping[str, TriMesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
 ) -> Check:
     """Room between turning and standing bodies over a whole turn.
 
@@ -64,7 +64,7 @@ def turning_check(
     return at_least("clearance", nearest, CLEARANCE, "mm", where, "least distance over a whole turn")
 
 
-def together_check(meshes: Mapping[str, Mesh], turning: Container[str]) -> Check:
+def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Check:
     """No room shared by bodies that move together; arguments as for `turning_check`."""
     most, where = 0.0, "parts that move together"
     bodies = {name: _manifold(mesh) for name, mesh in meshes.items()}
@@ -90,7 +90,7 @@ def _distance(one: Array, other: Array) -> float:
     return float(distances.min(initial=FAR))
 
 
-def _image(mesh: Mesh) -> Array:
+def _image(mesh: TriMesh) -> Array:
     """Shapes in the half plane that cover the surface at every axis angle, each once."""
     corners = mesh.vertices[mesh.faces]
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
@@ -151,7 +151,7 @@ def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
     return tuple(np.repeat(values[:, None], levels, axis=1) for values in (near, far, corners[:, 0, 2]))
 
 
-def _holds(outer: Mesh, inner: Mesh) -> bool:
+def _holds(outer: TriMesh, inner: TriMesh) -> bool:
     """Whether a corner of `inner` lies in `outer`: crossings of one ray, counted."""
     point = inner.vertices[0]
     low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
@@ -169,12 +169,12 @@ def _holds(outer: Mesh, inner: Mesh) -> bool:
     return bool(crossed.sum() % 2)
 
 
-def _apart(one: Mesh, other: Mesh) -> bool:
+def _apart(one: TriMesh, other: TriMesh) -> bool:
     gap = np.maximum(
         one.vertices.min(axis=0) - other.vertices.max(axis=0), other.vertices.min(axis=0) - one.vertices.max(axis=0)
     )
     return bool(gap.max() > 0)
 
 
-def _manifold(mesh: Mesh) -> manifold3d.Manifold:
+def _manifold(mesh: TriMesh) -> manifold3d.Manifold:
     return manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))

@@ -18,7 +18,7 @@ from cad.assembly.assembly import Assembly
 from cad.assembly.masses import rotor_of
 from cad.checks.check import Check, Severity, tidy
 from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.cage import cage_of, stiffness_n_per_m
 from cad.layout.layout import Layout
@@ -44,7 +44,7 @@ class BeamError:
 
 
 def deflection_checks(
-    scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, Mesh]
+    scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]
 ) -> list[Check]:
     """The constant part, which a calibration finds, and the part that changes over a turn.
 
@@ -73,7 +73,7 @@ def deflection_checks(
     return [found, _check("deflection_turning", turning, _at_least(doubts[1], turning), limit, what)]
 
 
-def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, Mesh]) -> Sag:
+def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]) -> Sag:
     """Of everything between horn and lidar; arguments as for `deflection_checks`."""
     layout, printer = assembly.layout, scanner.printer
     stack, linkage = layout.stack, layout.linkage

@@ -12,7 +12,7 @@ import manifold3d
 import numpy as np
 
 from cad.checks.check import Check, spot, tidy
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.geometry.print_pose import PrintPose, on_bed
 
 LAYER = 0.4  # what starts in the air and is gone after one layer of this is a burr
@@ -28,7 +28,7 @@ class Island:
     area_mm2: float
 
 
-def islands_check(name: str, mesh: Mesh, pose: PrintPose) -> Check:
+def islands_check(name: str, mesh: TriMesh, pose: PrintPose) -> Check:
     """How many islands a part has; more than none asks for a look at the slicer's support."""
     found = islands_of(on_bed(mesh, pose))
     if not found:
@@ -42,7 +42,7 @@ def islands_check(name: str, mesh: Mesh, pose: PrintPose) -> Check:
     return Check("islands", "warning", tidy(len(found)), 0.0, "", name, message)
 
 
-def islands_of(mesh: Mesh) -> list[Island]:
+def islands_of(mesh: TriMesh) -> list[Island]:
     """Islands of a closed mesh that lies on the plane z = 0, from below."""
     body = manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
     found = []

@@ -17,7 +17,7 @@ import numpy as np
 from cad.checks.check import Check, at_least, at_most, note, spot, tidy
 from cad.checks.islands import islands_check
 from cad.geometry.holes import Round, rounds_of
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.geometry.print_pose import PrintPose, print_pose
 from design.catalogue.products import Printer
 from design.frames import Array
@@ -31,7 +31,7 @@ BESIDE = 2.0  # from a thin spot to a hole that is named with it
 SMALLEST_HOLE = 1.5  # diameter; smaller ones close
 
 
-def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, Mesh]) -> list[Check]:
+def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, TriMesh]) -> list[Check]:
     """Bed, support, walls and holes of every printed part, as it lies on the bed."""
     checks = []
     for name, solid in printed.items():
@@ -64,7 +64,7 @@ class ThinWalls:
     at: Array
 
 
-def thin_walls(mesh: Mesh, least_mm: float) -> ThinWalls:
+def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:
     """Measure the walls of a part; of places of one thickness, the one nearest to their middle is told."""
     points, normals, area = _surface(mesh)
     solid = ray_caster.scene_of(mesh.vertices[mesh.faces] / 1000)
@@ -82,7 +82,7 @@ def thin_walls(mesh: Mesh, least_mm: float) -> ThinWalls:
     return ThinWalls(area * int(thin.sum()) / POINTS, area, thinnest, middles[int(np.argmin(away))])
 
 
-def _walls(name: str, mesh: Mesh, printer: Printer, holes: list[Round]) -> Check:
+def _walls(name: str, mesh: TriMesh, printer: Printer, holes: list[Round]) -> Check:
     walls = thin_walls(mesh, printer.min_wall_mm)
     what = f"walls thinner than {printer.min_wall_mm:g} mm"
     check = at_most("wall", walls.area_mm2, THIN_SHARE * walls.surface_mm2, "mm2", name, what)
@@ -108,7 +108,7 @@ def _bed(name: str, pose: PrintPose, printer: Printer) -> Check:
     return at_most("bed", tidy(pose.size_mm[worst]), printer.bed_mm[worst], "mm", name, f"{size} mm on {printer.name}")
 
 
-def _surface(mesh: Mesh) -> tuple[Array, Array, float]:
+def _surface(mesh: TriMesh) -> tuple[Array, Array, float]:
     """Points spread over the surface by area, their normals, and the whole area: the same ones every time."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)

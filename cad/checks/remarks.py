@@ -11,7 +11,7 @@ from cad.layout.belt.stack import BeltStack
 from cad.layout.deck import Deck
 from cad.layout.direct.cage import share_weight
 from cad.layout.direct.stack import DirectStack
-from cad.layout.drive import Drive
+from cad.layout.drive import DriveLayout
 from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from cad.layout.names import BASE_MOUNT, SERVO_SHAFT
@@ -49,7 +49,7 @@ def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial
     return tuple(found)
 
 
-def products_of(scanner: Scanner, drive: Drive) -> list[Product]:
+def products_of(scanner: Scanner, drive: DriveLayout) -> list[Product]:
     """Every product that shapes parts, each once."""
     found: list[Product | None] = [scanner.lidar, scanner.servo, scanner.slip_ring, *drive.products, scanner.printer]
     return list({product.name: product for product in found if product is not None}.values())

@@ -15,7 +15,7 @@ from cad.assembly.assembly import Assembly
 from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
 from cad.layout.belt.stack import BeltStack
-from cad.layout.drive import Drive
+from cad.layout.drive import DriveLayout
 from cad.layout.joints import Joint
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
@@ -119,14 +119,14 @@ def bom_text(items: list[BomItem]) -> str:
     return text.getvalue()
 
 
-def _products(scanner: Scanner, drive: Drive) -> Iterator[BomItem]:
+def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
         if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
             number = _order_number(product, drive)
             yield _bought(product, max(1, drive.products.count(product)), number)
 
 
-def _order_number(product: Product, drive: Drive) -> str:
+def _order_number(product: Product, drive: DriveLayout) -> str:
     """What to ask a shop for: a belt comes in lengths."""
     stack = drive.stack
     if isinstance(stack, BeltStack) and product == stack.belt:
@@ -175,7 +175,7 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
         yield BomItem("insert", "heat-set insert", name, count, source=HOLES, note=note)
 
 
-def _wiring(scanner: Scanner, drive: Drive) -> Iterator[BomItem]:
+def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     yield BomItem("wiring", "power supply, 12 V", quantity=1, source=PAPER, note="price unknown")
     for product in (scanner.lidar, scanner.servo):
         needs = WIRING.get(product.name)

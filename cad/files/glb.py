@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from design.frames import Array
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
@@ -41,7 +41,7 @@ class Node:
     name: str
     parent: str
     T_parent_node: Array
-    mesh: Mesh | None = None
+    mesh: TriMesh | None = None
     colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
     metal: bool = False
 
@@ -119,7 +119,7 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _primitive(buffer: _Buffer, mesh: Mesh, material: int) -> dict[str, Any]:
+def _primitive(buffer: _Buffer, mesh: TriMesh, material: int) -> dict[str, Any]:
     vertices, normals, corners = shaded(mesh)
     points = (vertices / 1000).astype("<f4")
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
@@ -130,7 +130,7 @@ def _primitive(buffer: _Buffer, mesh: Mesh, material: int) -> dict[str, Any]:
     return {"attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material}
 
 
-def shaded(mesh: Mesh) -> tuple[Array, Array, NDArray[np.int64]]:
+def shaded(mesh: TriMesh) -> tuple[Array, Array, NDArray[np.int64]]:
     """Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
 
     A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of

@@ -15,7 +15,7 @@ import numpy as np
 
 from cad.assembly.assembly import Assembly
 from cad.files.glb import Node, glb_bytes
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.layout.balance.counterweight import Counterweight
 from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR
 from design.frames import Array
@@ -29,7 +29,7 @@ def product_of(body: str, assembly: Assembly) -> str:
     return body if body in assembly.made else assembly.bodies[body].product
 
 
-def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], config_hash: str) -> dict[str, bytes]:
+def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
     """Both files.
 
     Args:
@@ -50,7 +50,7 @@ def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, Mesh], c
         frame = spec.frame
         mesh = meshes[name] if name in meshes else assembly.mesh(name)
         if frame == "laser":
-            mesh = Mesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
+            mesh = TriMesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
         nodes.append(Node(name, frame, np.eye(4), mesh, spec.colour, name in assembly.metal()))
     motion = scanner.angles.motion
     spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None

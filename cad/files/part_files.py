@@ -20,7 +20,7 @@ from design.scanner import Scanner
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
-    from cad.geometry.mesh import Mesh
+    from cad.geometry.mesh import TriMesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class PartsResult:
     """
 
     assembly: Assembly
-    meshes: dict[str, Mesh]
+    meshes: dict[str, TriMesh]
     t_world_rot_mm: tuple[float, float, float]
     parts: tuple[PartReport, ...]
     findings: tuple[PartFinding, ...]
@@ -90,7 +90,7 @@ def build_parts(
     digest = config_hash(scanner)
     files: dict[str, bytes] = {}
     reports = []
-    meshes_of_parts: dict[str, Mesh] = {}
+    meshes_of_parts: dict[str, TriMesh] = {}
     progress("engraving the labels")
     labels = labelled_parts(scanner, assembly, digest)
     for name, solid in (assembly.made | labels.parts).items():
@@ -127,7 +127,7 @@ def write_files(folder: Path, files: dict[str, bytes]) -> None:
         path.write_bytes(content)
 
 
-def _report(name: str, volume: float, density: float, mesh: Mesh) -> PartReport:
+def _report(name: str, volume: float, density: float, mesh: TriMesh) -> PartReport:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
     return PartReport(name, round(volume, 3), round(volume * density / 1000, 3), box, len(mesh.faces))

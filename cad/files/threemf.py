@@ -10,7 +10,7 @@ import io
 import zipfile
 from xml.sax.saxutils import escape, quoteattr
 
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 
 FIRST_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -27,7 +27,7 @@ RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def threemf_bytes(mesh: Mesh, part: str, description: str) -> bytes:
+def threemf_bytes(mesh: TriMesh, part: str, description: str) -> bytes:
     """The file of one part; `mesh` is in the frame of the bed, `description` says what it was made from."""
     model = [
         '<?xml version="1.0" encoding="UTF-8"?>',

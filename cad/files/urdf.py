@@ -15,12 +15,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from cad.geometry.inertia import Inertial
-from cad.layout.drive import Block, Drive, Rod
+from cad.layout.drive import Cuboid, DriveLayout, Rod
 from design.frames import Array
 from design.scanner import Scanner
 
 
-def urdf_text(scanner: Scanner, drive: Drive, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
+def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
     """The text of `scanner.urdf`.
 
     Args:
@@ -90,7 +90,7 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _standing_shape(shape: Block | Rod) -> tuple[str, str]:
+def _standing_shape(shape: Cuboid | Rod) -> tuple[str, str]:
     if isinstance(shape, Rod):
         return _origin((0.0, 0.0, (shape.low + shape.high) / 2000)), _cylinder(shape.radius, shape.high - shape.low)
     low, high = np.array(shape.low), np.array(shape.high)

@@ -14,7 +14,7 @@ from cad.files.instructions import instructions_text
 from cad.files.part_files import PartsResult, write_files
 from cad.files.threemf import threemf_bytes
 from cad.findings import PartFinding
-from cad.geometry.mesh import Mesh, checked_mesh
+from cad.geometry.mesh import TriMesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.labels.fit_coupon import coupon_of, fit_coupon
 from cad.layout.all_joints import joints_of
@@ -69,7 +69,7 @@ def export_scanner(
 
 
 def _prints(
-    scanner: Scanner, meshes: dict[str, Mesh], metal: frozenset[str], digest: str
+    scanner: Scanner, meshes: dict[str, TriMesh], metal: frozenset[str], digest: str
 ) -> tuple[dict[str, bytes], list[LeftOut]]:
     """`print/<part>.3mf` of every printed part."""
     files: dict[str, bytes] = {}
@@ -82,7 +82,7 @@ def _prints(
     return files, left_out
 
 
-def _print_file(scanner: Scanner, part: str, mesh: Mesh, digest: str) -> dict[str, bytes]:
+def _print_file(scanner: Scanner, part: str, mesh: TriMesh, digest: str) -> dict[str, bytes]:
     """One part as it lies on the bed."""
     pose = print_pose(mesh, scanner.printer.bed_mm)
     about = f"{scanner.angles.task}, config={digest}, {scanner.printer.name}, as it lies on the bed"

@@ -25,7 +25,7 @@ DECIMALS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Mesh:
+class TriMesh:
     """Triangles, counter-clockwise from outside."""
 
     vertices: Array  # (n, 3), mm
@@ -44,7 +44,7 @@ class Mesh:
         return bool(len(np.unique(forth)) == len(forth) and np.array_equal(forth, back))
 
 
-def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> Mesh:
+def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> TriMesh:
     """Tessellate a solid canonically, within a chord error [mm] and angle [rad]."""
     points, triangles = _tessellated(solid, chord_error, chord_angle)
     raw = np.round(points, DECIMALS) + 0.0  # no -0.0
@@ -54,7 +54,7 @@ def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: floa
     faces = faces[(a != b) & (b != c) & (c != a)]
     first = np.argmin(faces, axis=1)
     faces = np.stack([faces[np.arange(len(faces)), (first + k) % 3] for k in range(3)], axis=1)
-    return Mesh(vertices, faces[np.lexsort(faces.T[::-1])])
+    return TriMesh(vertices, faces[np.lexsort(faces.T[::-1])])
 
 
 def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tuple[Array, NDArray[np.int64]]:
@@ -76,7 +76,7 @@ def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tup
     return np.array(points), np.concatenate(triangles)
 
 
-def checked_mesh(solid: cq.Solid, part: str) -> Mesh:
+def checked_mesh(solid: cq.Solid, part: str) -> TriMesh:
     """The mesh of a part, closed and of the right volume.
 
     Raises:
@@ -85,7 +85,7 @@ def checked_mesh(solid: cq.Solid, part: str) -> Mesh:
     return checked(mesh_of(solid), solid, part)
 
 
-def checked(mesh: Mesh, solid: cq.Solid, part: str) -> Mesh:
+def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
     """The same mesh, found closed and of the volume of its solid.
 
     Raises:
@@ -99,7 +99,7 @@ def checked(mesh: Mesh, solid: cq.Solid, part: str) -> Mesh:
     return mesh
 
 
-def stl_bytes(mesh: Mesh, part: str, config_hash: str) -> bytes:
+def stl_bytes(mesh: TriMesh, part: str, config_hash: str) -> bytes:
     """Binary STL; the 80 bytes of its header name the part, the configuration and the unit."""
     header = f"{part} config={config_hash} unit=mm".encode("ascii")
     corners = mesh.vertices[mesh.faces]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from design.frames import Array, rigid
 
 OVERHANG_RAD = math.radians(45.0)
@@ -44,7 +44,7 @@ class PrintPose:
     fits: bool
 
 
-def print_pose(mesh: Mesh, bed_mm: tuple[float, float, float]) -> PrintPose:
+def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
     """The pose in which a part is printed, by the rule at the top of this module."""
     faces = _Faces.of(mesh)
     poses = [_pose(mesh, faces, down, bed_mm) for down in _flats(mesh, faces)]
@@ -56,11 +56,11 @@ def print_pose(mesh: Mesh, bed_mm: tuple[float, float, float]) -> PrintPose:
     return min(poses, key=cost)
 
 
-def on_bed(mesh: Mesh, pose: PrintPose) -> Mesh:
+def on_bed(mesh: TriMesh, pose: PrintPose) -> TriMesh:
     """The mesh in the frame of the bed, rounded as every mesh is; nothing is below the bed."""
     vertices = np.round(mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3], 5)
     vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
-    return Mesh(vertices + 0.0, mesh.faces)
+    return TriMesh(vertices + 0.0, mesh.faces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class _Faces:
     middles: Array
 
     @staticmethod
-    def of(mesh: Mesh) -> _Faces:
+    def of(mesh: TriMesh) -> _Faces:
         a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         doubled = np.linalg.norm(cross, axis=1)
@@ -80,7 +80,7 @@ class _Faces:
         return _Faces(normals, doubled / 2, (a + b + c) / 3)
 
 
-def _flats(mesh: Mesh, faces: _Faces) -> Array:
+def _flats(mesh: TriMesh, faces: _Faces) -> Array:
     """Outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
 
     A part without one, such as a ball, gets the largest facets of its hull.
@@ -113,7 +113,7 @@ def _directions(faces: _Faces) -> list[Array]:
     return list(sums[kept] / np.linalg.norm(sums[kept], axis=1, keepdims=True))
 
 
-def _pose(mesh: Mesh, faces: _Faces, down: Array, bed: tuple[float, float, float]) -> PrintPose:
+def _pose(mesh: TriMesh, faces: _Faces, down: Array, bed: tuple[float, float, float]) -> PrintPose:
     up = -down
     R = _along_bed(mesh.vertices, _upright(up))
     placed = mesh.vertices @ R.T

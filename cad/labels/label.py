@@ -24,7 +24,7 @@ from cad import solids
 from cad.assembly.assembly import Assembly
 from cad.findings import PartFinding
 from cad.geometry.holes import Piercing
-from cad.geometry.mesh import Mesh, checked_mesh
+from cad.geometry.mesh import TriMesh, checked_mesh
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at, flats_of
 from cad.labels.glyphs import letters, text_width
@@ -62,7 +62,7 @@ class Labelled:
     """
 
     parts: dict[str, cq.Solid] = field(default_factory=dict)
-    meshes: dict[str, Mesh] = field(default_factory=dict)
+    meshes: dict[str, TriMesh] = field(default_factory=dict)
     findings: list[PartFinding] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
 
@@ -244,7 +244,7 @@ def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
     return None
 
 
-def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, Mesh]:
+def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
     """The part with lettering, and its mesh.
 
     Raises:

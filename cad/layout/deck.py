@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.drive import Drive, Mounted
+from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.envelope import rotor_radius
 from cad.layout.hub import Hub
 from cad.layout.names import BASE_MOUNT
@@ -58,7 +58,7 @@ class Deck:
         return np.stack([along, np.cross(normal, along), normal], axis=1)
 
 
-def deck_of(scanner: Scanner, drive: Drive) -> Deck:
+def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     """Lay the deck so that rotor, ring, case and mount stay clear of it, rounded up to whole millimetres."""
     mounted, pattern = drive.mounted, scanner.deck or USUAL
     screw = SCREWS[pattern.screw]

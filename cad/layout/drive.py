@@ -19,7 +19,7 @@ Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Cuboid:
     """A box along the axes between two corners."""
 
     low: Point
@@ -34,10 +34,10 @@ class Rod:
     low: float
     high: float
 
-    def block(self) -> Block:
+    def cuboid(self) -> Cuboid:
         """The box around it."""
         r = self.radius
-        return Block((-r, -r, self.low), (r, r, self.high))
+        return Cuboid((-r, -r, self.low), (r, r, self.high))
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Mass:
     """What a bought product weighs, as a homogeneous box; `turning` is the share of it that turns."""
 
     mass_g: float
-    box: Block
+    box: Cuboid
     turning: float = 0.0
 
 
@@ -75,7 +75,7 @@ class Mounted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class DriveLayout:
     """One layout of one scanner.
 
     Attributes:
@@ -96,7 +96,7 @@ class Drive:
     products: tuple[Bearing | Belt, ...]
     mounted: Mounted
     masses: tuple[Mass, ...]
-    shapes: tuple[Block | Rod, ...]
+    shapes: tuple[Cuboid | Rod, ...]
     built: tuple[str, ...]
     stacked: tuple[str, ...]
     left_out: tuple[LeftOut, ...]

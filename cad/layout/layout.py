@@ -11,7 +11,7 @@ from cad.layout.balance.counterweight import Counterweight, counterweight_of
 from cad.layout.belt.drive import belt_drive
 from cad.layout.deck import Deck, deck_of
 from cad.layout.direct.drive import direct_drive
-from cad.layout.drive import Drive, Stack
+from cad.layout.drive import DriveLayout, Stack
 from cad.layout.linkage import AlignmentLinkage, linkage_of
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -22,7 +22,7 @@ class Layout:
     """One scanner before it has parts; `counterweight` is the bar, or why there is none."""
 
     scanner: Scanner
-    drive: Drive
+    drive: DriveLayout
     deck: Deck
     linkage: AlignmentLinkage
     counterweight: Counterweight | LeftOut
@@ -47,7 +47,7 @@ def layout_of(scanner: Scanner) -> Layout:
     return Layout(scanner, drive, deck, linkage, bar)
 
 
-def drive_of(scanner: Scanner) -> Drive:
+def drive_of(scanner: Scanner) -> DriveLayout:
     """The drive of one scanner: a belt where the ring is a capsule, else the servo on the axis.
 
     Raises:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.layout.hub import Hub
 from cad.layout.loads import STANDARD_GRAVITY
 from cad.statics import elastic
@@ -46,7 +46,7 @@ class Sag:
 
 
 def linkage_sag(
-    stack: Hub, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
+    stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
     """Of the printed parts alone.
 
@@ -87,7 +87,13 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
 
 
 def _on_grid(
-    edge: float, stack: Hub, meshes: Sequence[Mesh], seat: Array, lidar: Inertial, modulus: float, density: float
+    edge: float,
+    stack: Hub,
+    meshes: Sequence[TriMesh],
+    seat: Array,
+    lidar: Inertial,
+    modulus: float,
+    density: float,
 ) -> tuple[Array, Array]:
     """Rotation [rad] and shift [m] of one grid, rotation frame."""
     R = stack.R()

@@ -1,4 +1,4 @@
-"""The servo beside the axis, for capsule rings, as a `Drive`: belt, hollow shaft, tower."""
+"""The servo beside the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from cad.layout import names
 from cad.layout.belt.sizing import belt_stack
 from cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
-from cad.layout.drive import Block, Drive, Mass, Mounted, Rod
+from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
 from design.frames import Array
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -46,7 +46,7 @@ SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the c
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
-def belt_drive(scanner: Scanner) -> Drive:
+def belt_drive(scanner: Scanner) -> DriveLayout:
     """The drive of a scanner with a capsule ring.
 
     Raises:
@@ -55,11 +55,11 @@ def belt_drive(scanner: Scanner) -> Drive:
     stack, ring = belt_stack(scanner), scanner.slip_ring
     assert ring is not None
     corners = case_corners(stack)
-    case = _block(corners.min(axis=0), corners.max(axis=0))
+    case = _cuboid(corners.min(axis=0), corners.max(axis=0))
     capsule = Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top)
     outer, half = stack.carrier.outer_mm / 2, stack.carrier.width_mm / 2
     bearings = [Rod(outer, middle - half, middle + half) for middle in (stack.upper_middle, stack.lower_middle)]
-    return Drive(
+    return DriveLayout(
         stack=stack,
         shaft=names.MAIN_SHAFT,
         products=(stack.carrier, stack.carrier, stack.belt),
@@ -67,8 +67,8 @@ def belt_drive(scanner: Scanner) -> Drive:
         masses=(
             Mass(stack.servo.mass_g, case),
             Mass(stack.belt.mass_g, _around_belt(stack)),
-            Mass(ring.mass_g, capsule.block(), turning=0.5),
-            *(Mass(stack.carrier.mass_g, bearing.block(), turning=0.5) for bearing in bearings),
+            Mass(ring.mass_g, capsule.cuboid(), turning=0.5),
+            *(Mass(stack.carrier.mass_g, bearing.cuboid(), turning=0.5) for bearing in bearings),
         ),
         shapes=(case, capsule),
         built=BUILT,
@@ -93,14 +93,14 @@ def _mounted(stack: BeltStack) -> Mounted:
     )
 
 
-def _around_belt(stack: BeltStack) -> Block:
+def _around_belt(stack: BeltStack) -> Cuboid:
     corner = stack.turn() @ [stack.centre + stack.belt_radius, stack.belt_radius, 0.0]
     start = stack.turn() @ [-stack.belt_radius, -stack.belt_radius, 0.0]
     width = np.array([0.0, 0.0, stack.belt.width_mm / 2])
     middle = np.array([0.0, 0.0, stack.belt_middle])
-    return _block(np.minimum(corner, start) + middle - width, np.maximum(corner, start) + middle + width)
+    return _cuboid(np.minimum(corner, start) + middle - width, np.maximum(corner, start) + middle + width)
 
 
-def _block(low: Array, high: Array) -> Block:
+def _cuboid(low: Array, high: Array) -> Cuboid:
     (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
-    return Block((x0, y0, z0), (x1, y1, z1))
+    return Cuboid((x0, y0, z0), (x1, y1, z1))

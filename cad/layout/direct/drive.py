@@ -1,4 +1,4 @@
-"""The servo on the axis, as a `Drive`: horn, shaft through the ring, hub."""
+"""The servo on the axis, as a `DriveLayout`: horn, shaft through the ring, hub."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from cad.layout import names
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.direct.stack import DirectStack
-from cad.layout.drive import Block, Drive, Mass, Mounted, Rod
+from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
 from cad.screws import SCREWS
 from design.catalogue.products import Servo
 from design.left_out import LeftOut
@@ -44,7 +44,7 @@ ADAPTER_ARMS = 8.0  # beyond the ring
 CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
 
 
-def direct_drive(scanner: Scanner) -> Drive:
+def direct_drive(scanner: Scanner) -> DriveLayout:
     """The drive of a scanner whose ring lets the shaft through, or that has none.
 
     Raises:
@@ -52,17 +52,17 @@ def direct_drive(scanner: Scanner) -> Drive:
     """
     stack, ring = direct_stack(scanner), scanner.slip_ring
     (x0, y0, z0), (x1, y1, z1) = scanner.servo.case_min_mm, scanner.servo.case_max_mm
-    case = Block((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1))
-    masses = [Mass(scanner.servo.mass_g, Block(case.low, (x1, y1, stack.horn)))]  # with its horn
+    case = Cuboid((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1))
+    masses = [Mass(scanner.servo.mass_g, Cuboid(case.low, (x1, y1, stack.horn)))]  # with its horn
     rods: list[Rod] = []
     if ring is not None:
         rods.append(Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
-        masses.append(Mass(ring.mass_g, rods[0].block(), turning=0.5))
+        masses.append(Mass(ring.mass_g, rods[0].cuboid(), turning=0.5))
     if stack.bearing is not None:
         top = stack.bearing_top
         bearing = Rod(stack.bearing.outer_mm / 2, top - stack.bearing.width_mm, top)
-        masses.append(Mass(stack.bearing.mass_g, bearing.block(), turning=0.5))
-    return Drive(
+        masses.append(Mass(stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
+    return DriveLayout(
         stack=stack,
         shaft=names.SERVO_SHAFT,
         products=() if stack.bearing is None else (stack.bearing,),

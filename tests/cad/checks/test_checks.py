@@ -17,7 +17,7 @@ from cad.checks.islands import islands_check, islands_of
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks, thin_walls
 from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import Mesh, mesh_of
+from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import print_pose
 from cad.layout.direct.sizing import direct_stack
 from cad.solids import box, location, upright
@@ -39,7 +39,7 @@ def scanner_for(alpha_rot, beta_rot, alpha, beta, lidar="UTM-30LX", servo="MX-64
 
 def turned(mesh, angle):
     c, s = np.cos(angle), np.sin(angle)
-    return Mesh(mesh.vertices @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), mesh.faces)
+    return TriMesh(mesh.vertices @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), mesh.faces)
 
 
 def test_the_distance_over_a_turn_of_bodies_known_by_arithmetic():
@@ -76,8 +76,8 @@ def test_no_position_is_nearer_than_the_distance_over_a_turn(points, turn):
     one, other = np.split(points, 2)
     one = one + np.array([60, 0, 0])
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    least = distance_over_a_turn(Mesh(one, faces), Mesh(other, faces))
-    spun = turned(Mesh(one, faces), turn).vertices
+    least = distance_over_a_turn(TriMesh(one, faces), TriMesh(other, faces))
+    spun = turned(TriMesh(one, faces), turn).vertices
     samples = [w @ body for body in (spun, other) for w in [np.random.default_rng(3).dirichlet(np.ones(4), 300)]]
     gap = np.linalg.norm(samples[0][:, None] - samples[1][None], axis=2).min()
     assert gap >= least - 0.02

@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from cad.files.glb import shaded
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 
 SIZE = {5123: ("<u2", 2), 5125: ("<u4", 4), 5126: ("<f4", 4)}
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
@@ -76,7 +76,7 @@ def test_every_reference_and_every_bound_is_true(scene):
 
 
 def canonical(body):
-    return Mesh(np.asarray(body.vertices, float), np.asarray(body.faces))
+    return TriMesh(np.asarray(body.vertices, float), np.asarray(body.faces))
 
 
 def test_a_ball_is_shaded_round_and_a_box_sharp():

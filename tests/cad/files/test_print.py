@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
 from cad.files.threemf import threemf_bytes
-from cad.geometry.mesh import Mesh
+from cad.geometry.mesh import TriMesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.labels.glyphs import GLYPHS, text_width
 
@@ -28,7 +28,7 @@ TABLE = trimesh.boolean.union(
 
 
 def mesh(shape):
-    return Mesh(np.asarray(shape.vertices, dtype=float), np.asarray(shape.faces, dtype=np.int64))
+    return TriMesh(np.asarray(shape.vertices, dtype=float), np.asarray(shape.faces, dtype=np.int64))
 
 
 def turned(shape, quaternion, shift=(0, 0, 0)):

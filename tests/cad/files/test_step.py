@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from cad.files.step import canonical_step
-from cad.geometry.mesh import Mesh, mesh_of, stl_bytes
+from cad.geometry.mesh import TriMesh, mesh_of, stl_bytes
 from cad.solids import box, upright
 
 BUILD = """
@@ -101,6 +101,6 @@ def test_stl_says_what_it_is_and_reads_back(tmp_path):
 def test_an_open_mesh_is_seen():
     mesh = mesh_of(box((0, 0, 0), (1, 1, 1)))
     assert mesh.is_closed()
-    assert not Mesh(mesh.vertices, mesh.faces[1:]).is_closed()
+    assert not TriMesh(mesh.vertices, mesh.faces[1:]).is_closed()
     flipped = np.concatenate([mesh.faces[1:], mesh.faces[:1, ::-1]])
-    assert not Mesh(mesh.vertices, flipped).is_closed()
+    assert not TriMesh(mesh.vertices, flipped).is_closed()
