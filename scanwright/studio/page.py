@@ -271,6 +271,7 @@ class Studio:
                 optimum = optimum_of(painted(canvas.base, canvas.dabs), told)
                 if canvas == self._canvas:
                     self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
+                    self.kept.rejudge(self.judge)  # with the period that was found
                     self.move(Setting.within_bounds(optimum.search.best[0].angles_deg))
                     self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}")
             except TaskError as error:

@@ -6,10 +6,10 @@ from math import cos, pi
 import cadquery as cq
 import pytest
 
+from cad.geometry import mesh_trials as meshes
 from design.accuracy.trials import Trial, best_trials
 from firmware_io.twins.dynamics import plant_of
 from scanwright.trials import axis as axis
-from scanwright.trials import mesh as meshes
 from scanwright.trials import solver as solvers
 
 
