@@ -6,7 +6,8 @@ is widened by 1e-9 of its size, so that no ray slips through between two that sh
 edge on is not hit.
 
 The two agree on the triangle of every ray that passes all edges by more than 1e-6 of the size of the scene. Measured on
-two shared cores: 17,000 rays a second among 1,000 triangles and 9,000 among 30,000, where embree casts 1,000,000.
+two shared cores: 190,000 rays a second in the furnished room of 84 triangles, 35,000 among 4,000 and 22,000 among
+30,000, where embree casts a million and more.
 """
 
 from __future__ import annotations
@@ -77,8 +78,8 @@ def by_boxes(triangles: Array) -> Nearest:
             length = (leave - enter)[going] / steps
             begin, end = enter[going] + step * length, enter[going] + (step + 1) * length
             ends = origins[going] + np.stack([begin, end])[:, :, None] * directions[going]
-            candidate, count = tree.intersection_v(ends.min(axis=0) - slack, ends.max(axis=0) + slack)
-            row = np.repeat(np.arange(len(going)), count.astype(int))
+            candidate, count = _meeting(tree, ends.min(axis=0) - slack, ends.max(axis=0) + slack)
+            row = np.repeat(np.arange(len(going)), count)
             distance = _distances(triangles[candidate], origins[going[row]], directions[going[row]])
             hit = np.flatnonzero(distance <= end[row] + slack)
             # the nearest of each ray, of equally near ones the first; reversed, it is written last and stays
@@ -95,6 +96,16 @@ def by_boxes(triangles: Array) -> Nearest:
         return triangle, range_m
 
     return nearest
+
+
+def _meeting(tree: Any, low: Array, high: Array) -> tuple[Array, Array]:
+    """Triangles whose box meets each box, one after the other, and how many each box meets."""
+    if int(np.__version__.split(".")[0]) > 1:
+        triangle, count = tree.intersection_v(low, high)
+        return triangle, count.astype(int)
+    # rtree 1.4.1 cannot make room for its answer with NumPy 1; one at a time takes four times as long
+    found = [list(tree.intersection(box)) for box in np.concatenate([low, high], axis=1).tolist()]
+    return np.array([i for each in found for i in each], int), np.array([len(each) for each in found], int)
 
 
 def _distances(triangles: Array, origins: Array, directions: Array) -> Array:

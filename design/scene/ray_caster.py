@@ -3,7 +3,7 @@
 Embree (extra `scene`) finds the triangle in single precision; the range is then taken from that triangle's plane in
 double precision, so that it is as exact as the mesh. Only a beam within float32 of an edge (some 1e-6 m in a room) may
 be given to the neighbour of the triangle that it truly hits. Where embree is not installed, an R-tree finds the
-triangle (`nearest`): the same ranges and incidences but for such beams, 50 to 100 times as slowly.
+triangle (`nearest`): the same ranges and incidences but for such beams, 10 to 50 times as slowly.
 
 trimesh, embree and rtree are imported where they are used: most commands never cast a ray.
 """
