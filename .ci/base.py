@@ -1,7 +1,7 @@
 """What a robot does with the base install alone, no extra: run in an environment that holds nothing else.
 
-Every module loads or lacks a package of a named extra; twins are scanned to a cloud, that is assembled again and
-registered; what needs an extra is refused in one line.
+Every module loads or lacks a package of a named extra; no file is missing beside them; twins are scanned to a cloud,
+that is assembled again and registered; what needs an extra is refused in one line.
 """
 
 import importlib
@@ -43,6 +43,16 @@ def load_every_module() -> None:
     assert "cadquery" not in sys.modules
 
 
+def find_every_file() -> None:
+    """What is no code is installed beside it: products, tasks, templates, scripts of the pages, type marks."""
+    checkout = Path(__file__).parents[1]
+    for room in (*EXTRAS, "cad"):
+        installed = Path(str(importlib.import_module(room).__file__)).parent
+        files = [path.relative_to(checkout / room) for path in (checkout / room).rglob("*") if path.is_file()]
+        absent = [file for file in files if "__pycache__" not in file.parts and not (installed / file).exists()]
+        assert not absent, f"{room}: not in the wheel: {absent}"
+
+
 def run(*words: str | Path) -> str:
     """What a command of the installed program prints."""
     told = subprocess.run([COMMAND, *words], text=True, capture_output=True)
@@ -75,6 +85,7 @@ def refuse_what_needs_an_extra() -> None:
 
 if __name__ == "__main__":
     load_every_module()
+    find_every_file()
     with tempfile.TemporaryDirectory() as temporary:
         scan_the_twins(Path(temporary))
     run("evaluate", "rolling", "--angles=0,90,0,-90")
