@@ -32,22 +32,32 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     created = [folder for folder in (target.parent, *target.parent.parents) if not folder.exists()]
     work, moving = (target.with_name(f".{target.name}.{what}") for what in ("building", "moving"))
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+        with _told_of(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(target):
-            shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
-            work.mkdir()
             try:
+                with _told_of(target):
+                    shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
+                    work.mkdir()
                 yield work
-                _refuse_what_is_in_the_way(work, target)
-                _move(work, target, moving)
+                with _told_of(target):
+                    _refuse_what_is_in_the_way(work, target)
+                    _move(work, target, moving)
             finally:
                 shutil.rmtree(work, ignore_errors=True)
-    except OSError as error:
-        raise BuildError(f"{target}: cannot write the build folder: {error.strerror or error}") from error
     finally:
         for folder in created:
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
+
+
+@contextmanager
+def _told_of(target: Path) -> Iterator[None]:
+    """Our own dealings with the disk: what the system refuses is told of the folder."""
+    try:
+        yield
+    except OSError as error:
+        raise BuildError(f"{target}: cannot write the build folder: {error.strerror or error}") from error
 
 
 @contextmanager
@@ -78,7 +88,9 @@ def _alone(target: Path) -> Iterator[None]:
         BuildError: another process holds it.
     """
     path = target.with_name(f".{target.name}.lock")
-    with path.open("a+", encoding="utf-8") as lock:
+    with _told_of(target):
+        lock = path.open("a+", encoding="utf-8")
+    with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

@@ -271,6 +271,12 @@ def test_what_is_in_the_way_is_told_before_anything_moves(tmp_path):
     assert _files(target) == ["a.txt", "manifest.json", "parts"]
 
 
+def test_an_error_of_the_work_is_not_told_of_the_folder(tmp_path):
+    with pytest.raises(FileNotFoundError), fresh_folder(tmp_path / "task"):
+        (tmp_path / "no such file").read_text()
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BuildError, match="cannot write the build folder"), fresh_folder(tmp_path / "file" / "task"):
