@@ -34,7 +34,7 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     The linkage, which takes the kernel longer than all others together, is a draft of the same shapes.
 
     Raises:
-        BuildError: the kernel is missing, or a part cannot be made.
+        BuildError: a part cannot be made.
     """
     from cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from cad.assembly.make import make_parts
