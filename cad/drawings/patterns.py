@@ -51,11 +51,11 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def patterns_of(rounds: list[Round], axis_bore: bool = False) -> list[Pattern]:
-    """Holes grouped by diameter, direction and height; those about the rotation axis only with `axis_bore`."""
+def patterns_of(rounds: list[Round]) -> list[Pattern]:
+    """Holes grouped by diameter, direction and height; those about the rotation axis left out."""
     groups: dict[tuple[float, ...], list[Round]] = {}
     for hole in rounds:
-        if hole.hole and on_axis(hole) == axis_bore:
+        if hole.hole and not on_axis(hole):
             direction = np.array(hole.direction)
             height = round(float(np.array(hole.low) @ direction), 1) + 0.0
             key = (hole.diameter, *np.round(direction, 3).tolist(), height, hole.through)

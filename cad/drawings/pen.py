@@ -137,7 +137,8 @@ class Pen:
         return replace(self, space=block)
 
     def _model(self, point: Point) -> Point:
-        return (point[0] + self.origin[0]) / self.scale, (point[1] + self.origin[1]) / self.scale
+        x, y = ((c + start) / self.scale for c, start in zip(point, self.origin, strict=True))
+        return round(x, 6), round(y, 6)
 
 
 def width_of(words: str, height: float = TEXT) -> float:

@@ -32,15 +32,6 @@ Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """A straight piece."""
-
-    start: tuple[float, float]
-    end: tuple[float, float]
-    hidden: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Arc:
     """A piece of a circle, counter-clockwise; angles in rad, a whole turn for a circle."""
 
@@ -53,13 +44,13 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Any other curve, as points close together."""
+    """A straight piece, by its two ends, or any other curve, by points close together."""
 
     points: tuple[tuple[float, float], ...]
     hidden: bool
 
 
-Curve = Line | Arc | Chain
+Curve = Arc | Chain
 
 
 def project(solid: cq.Solid, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
@@ -114,18 +105,14 @@ def _drawn_once(pieces: list[tuple[Array, bool]]) -> list[Curve]:
             continue
         if _is_straight(points):
             lines.append((points[[0, -1]], hidden))
-            continue
-        circle = _circle(points)
-        if circle is not None:
+        elif (circle := _circle(points)) is not None:
             arcs.append((*circle, hidden))
         else:
-            corners = [(round(float(x), 3) + 0.0, round(float(y), 3) + 0.0) for x, y in points]
+            corners = [_point(point) for point in points]
             chains.append(Chain(tuple(min(corners, corners[::-1])), hidden))
-    straight = sorted(_lines(lines), key=lambda line: (line.hidden, line.start, line.end))
-    round_ones = sorted(_arcs(arcs), key=lambda arc: (arc.hidden, arc.centre, arc.radius, arc.start, arc.end))
-    kept = {chain.points: chain for chain in sorted(chains, key=lambda chain: not chain.hidden)}  # visible ones win
-    rest = sorted(kept.values(), key=lambda chain: (chain.hidden, chain.points))
-    return [*straight, *round_ones, *rest]
+    once = {chain.points: chain for chain in sorted(chains, key=lambda chain: not chain.hidden)}  # visible ones win
+    straight_first = sorted((*_lines(lines), *once.values()), key=lambda c: (len(c.points), c.hidden, c.points))
+    return [*straight_first, *sorted(_arcs(arcs), key=lambda arc: (arc.hidden, arc.centre, arc.radius, arc.start))]
 
 
 def _is_straight(points: Array) -> bool:
@@ -152,7 +139,7 @@ def _circle(points: Array) -> tuple[Array, float, Span] | None:
     return centre, radius, (low, high)
 
 
-def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Line]:
+def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
     """Lines that lie on one another become one, the visible part first."""
     order = sorted(pieces, key=lambda piece: -round(float(np.linalg.norm(piece[0][1] - piece[0][0])), 3))
     starts, alongs = np.zeros((len(order), 2)), np.zeros((len(order), 2))
@@ -172,12 +159,12 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Line]:
             groups.append(([], []))
         low, high = sorted(float((end - starts[i]) @ alongs[i]) for end in ends)
         groups[i][hidden].append((low, high))
-    for i, (seen, hidden_spans) in enumerate(groups):
+    for start, along, (seen, behind) in zip(starts, alongs, groups, strict=False):
         seen = _union(seen)
-        for is_hidden, spans in ((False, seen), (True, _minus(_union(hidden_spans), seen))):
+        for hidden, spans in ((False, seen), (True, _minus(_union(behind), seen))):
             for low, high in spans:
                 if high - low > SHORTEST:
-                    yield Line(_point(starts[i] + low * alongs[i]), _point(starts[i] + high * alongs[i]), is_hidden)
+                    yield Chain((_point(start + low * along), _point(start + high * along)), hidden)
 
 
 def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
@@ -190,12 +177,12 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
             groups.append((centre, radius, ([], [])))
         turns = math.floor(low / (2 * math.pi)) * 2 * math.pi
         groups[i][2][hidden].extend(_within_turn(low - turns, high - turns))
-    for centre, radius, (seen, hidden_spans) in groups:
+    for centre, radius, (seen, behind) in groups:
         seen = _union(seen)
-        for is_hidden, merged in ((False, seen), (True, _minus(_union(hidden_spans), seen))):
-            for low, high in _closed(merged):
+        for hidden, spans in ((False, seen), (True, _minus(_union(behind), seen))):
+            for low, high in _closed(spans):
                 if (high - low) * radius > SHORTEST:
-                    yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, is_hidden)
+                    yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, hidden)
 
 
 def _alike(shift: Array, growth: float) -> bool:

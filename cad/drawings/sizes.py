@@ -12,7 +12,7 @@ from cad.drawings.dimensions import Callout, angle_between, callouts_right, cent
 from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
 from cad.drawings.patterns import Pattern, number
 from cad.drawings.pen import Layer, Pen, Point
-from cad.drawings.project import Arc, Line
+from cad.drawings.project import Arc
 from cad.drawings.slots import slot_words
 from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
@@ -87,8 +87,7 @@ def _outline(pen: Pen, view: View) -> None:
         if isinstance(curve, Arc):
             pen.arc(layer, pen.paper(curve.centre), curve.radius * pen.scale, curve.start, curve.end)
         else:
-            points = (curve.start, curve.end) if isinstance(curve, Line) else curve.points
-            pen.stroke(layer, [pen.paper(point) for point in points])
+            pen.stroke(layer, [pen.paper(point) for point in curve.points])
 
 
 def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, float, float]) -> None:

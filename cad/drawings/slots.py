@@ -87,14 +87,11 @@ def _ends(solid: cq.Solid) -> list[_End]:
         low, high = surface.FirstUParameter(), surface.LastUParameter()
         if not hollow or abs(high - low - math.pi) > HALF_TURN:
             continue
-        v = (surface.FirstVParameter() + surface.LastVParameter()) / 2
-        on_arc = surface.Value((low + high) / 2, v)
         line = cylinder.Axis()
-        axis = np.array([line.Direction().X(), line.Direction().Y(), line.Direction().Z()])
-        point = np.array([line.Location().X(), line.Location().Y(), line.Location().Z()])
-        arc = np.array([on_arc.X(), on_arc.Y(), on_arc.Z()])
-        centre = point + float((arc - point) @ axis) * axis
+        axis, point = (np.array(cq.Vector(of).toTuple()) for of in (line.Direction(), line.Location()))
+        outwards = np.array(face.Center().toTuple()) - point
+        centre = point + float(outwards @ axis) * axis
+        outwards -= float(outwards @ axis) * axis
         depth = surface.LastVParameter() - surface.FirstVParameter()
-        outwards = (arc - centre) / cylinder.Radius()
-        found.append(_End(2 * cylinder.Radius(), axis, centre, outwards, depth))
+        found.append(_End(2 * cylinder.Radius(), axis, centre, outwards / np.linalg.norm(outwards), depth))
     return found
