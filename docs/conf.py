@@ -1,0 +1,78 @@
+"""How the pages are made: `uv run sphinx-build -n -W --keep-going docs docs/_build`.
+
+The docstrings of this project write names, formulas and files alike in single backquotes. Such a word becomes a link
+where it names something of ours. Where it claims to (it begins with one of our packages, or is the path of a file or
+page) and there is no such thing, the build fails.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("scanwright", "design", "cad", "firmware_io")
+OURS = re.compile(rf"({'|'.join(PACKAGES)})(\.[A-Za-z_]\w*)+")
+IN_THE_PROJECT = re.compile(rf"(({'|'.join(PACKAGES)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
+
+project = "Scanwright"
+author = "the Scanwright authors"
+copyright = f"2026, {author}"  # noqa: A001  the name that Sphinx reads
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.apidoc"]
+exclude_patterns = ["_build", "reference/*/modules.rst"]
+html_theme = "furo"
+html_title = "Scanwright"
+html_show_sphinx = False
+default_role = "py:obj"
+
+myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath", "fieldlist"]
+
+add_module_names = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+apidoc_modules = [
+    {
+        "path": f"../{package}",
+        "destination": f"reference/{package}",
+        "max_depth": 1,
+        "automodule_options": {"members", "undoc-members"},
+    }
+    for package in PACKAGES
+]
+
+
+def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
+    """Leave words that name nothing of ours as they are; None lets Sphinx complain about those that claim to."""
+    target = str(node.get("reftarget", ""))
+    if node.get("refdomain") != "py":
+        return None
+    if IN_THE_PROJECT.fullmatch(target):
+        path = target.removesuffix("/")
+        return contnode if any(ROOT.glob(path)) or any(ROOT.glob(f"docs/{path}")) else None
+    return None if OURS.fullmatch(target) else contnode
+
+
+def drawn_as_typed(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
+    """Formulas, tables and sketches stand indented behind a blank line: show them as they are."""
+    for k in range(len(lines) - 1, 1, -1):
+        before = next((line for line in reversed(lines[: k - 1]) if line.strip()), "")
+        if lines[k].strip() and not lines[k - 1].strip() and _indent(lines[k]) >= _indent(before) + 4:
+            lines[k:k] = [" " * _indent(before) + "::", ""]
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
+    app.connect("missing-reference", points_nowhere)
