@@ -27,7 +27,7 @@ html_show_sphinx = False
 default_role = "py:obj"
 
 myst_heading_anchors = 3
-myst_enable_extensions = ["dollarmath", "fieldlist"]
+myst_enable_extensions = ["deflist"]
 
 add_module_names = False
 autodoc_member_order = "bysource"
@@ -47,6 +47,23 @@ apidoc_modules = [
     }
     for package in PACKAGES
 ]
+
+
+def describe_commands(app: Any) -> None:
+    """Write the page of all commands from the commands themselves."""
+    from typer.main import get_command
+
+    from scanwright.cli.app import app as commands
+
+    page = ["# Commands", "", "`scanwright COMMAND --help` says the same.", ""]
+    for name, command in sorted(get_command(commands).commands.items()):  # type: ignore[attr-defined]
+        page += [f"## {name}", "", str(command.help).replace("\b", ""), ""]
+        for parameter in command.params:
+            written = ", ".join(parameter.opts) if parameter.param_type_name == "option" else parameter.metavar
+            page += [f"`{written}`", f": {parameter.help or 'value'}", ""]
+    folder = Path(app.srcdir) / "reference/cli"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "commands.md").write_text("\n".join(page))
 
 
 def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
@@ -74,5 +91,6 @@ def _indent(line: str) -> int:
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    app.connect("builder-inited", describe_commands)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
     app.connect("missing-reference", points_nowhere)

@@ -35,8 +35,8 @@ def main() -> None:
         axes.set_title(title, fontsize=10.5)
         axes.axis("off")
     words = (
-        "thin arrows: the world, x ahead (red), y left (green), z up (blue); thick black arrow: the axis that the servo "
-        "turns; orange: the beams, with their middle"
+        "thin arrows: the world, x ahead (red), y left (green), z up (blue); thick black arrow: the axis that the "
+        "servo turns; orange: the beams, with their middle"
     )
     figure.text(0.5, 0.03, words, ha="center", fontsize=10)
     figure.subplots_adjust(0.005, 0.08, 0.995, 0.86, 0.02, 0)

@@ -5,6 +5,7 @@ Needs OpenGL without a screen (Debian: libegl1).
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ class Canvas:
 
     def line(self, points: Array, colour: Rgb, radius: float) -> None:
         """Add a line through points, shape (n, 3), as thick as a tube of that radius."""
-        for start, end in zip(points[:-1], points[1:], strict=True):
+        for start, end in pairwise(points):
             self.mesh(trimesh.creation.cylinder(radius, segment=[start, end], sections=16), colour, light=0.6)
 
     def arrow(self, start: Array, end: Array, colour: Rgb, radius: float) -> None:

@@ -21,7 +21,7 @@ import trimesh
 import scanwright as sw
 from benchmarks.scanwright.canvas import Canvas
 from design.angles import AngleSet
-from design.frames import Array, Rz, apply, rigid
+from design.frames import Array, Rz, rigid
 from design.scene.ray_caster import scene_of
 from firmware_io.recording.arrays import RecordingArrays
 from firmware_io.twins.simulated import simulated_recording
@@ -113,9 +113,9 @@ def cloud(angles: AngleSet, bodies: list[trimesh.Trimesh]) -> Array:
 def points_of(arrays: RecordingArrays, angles: AngleSet) -> Array:
     """Where the beams of a recording end, in the world's frame [m], shape (n, 3)."""
     seen = np.isfinite(arrays.range_m)
-    r, b, joint = arrays.range_m[seen], arrays.bearing_rad[seen], arrays.joint_rad[seen]
-    in_rot = apply(angles.T_rot_laser(), np.stack([r * np.cos(b), r * np.sin(b), np.zeros_like(b)], axis=1))
-    points = apply(angles.T_world_rot(0.0), np.einsum("nij,nj->ni", Rz(joint), in_rot))
+    r, b = arrays.range_m[seen], arrays.bearing_rad[seen]
+    in_laser = np.stack([r * np.cos(b), r * np.sin(b), np.zeros_like(b), np.ones_like(b)], axis=1)
+    points = np.einsum("nij,nj->ni", angles.T_world_laser(arrays.joint_rad[seen]), in_laser)[:, :3]
     return points[np.isfinite(points).all(axis=1)]
 
 
