@@ -47,5 +47,13 @@ def test_commands_exist(page):
         assert (ROOT / folder).exists(), folder
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_paths_of_the_project_exist(page):
+    for path in re.findall(
+        r"`((?:design|cad|firmware_io|scanwright|benchmarks|examples|docs|tests)/[\w./-]*)`", page.read_text()
+    ):
+        assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
 def test_pictures_are_small():
     assert all(picture.stat().st_size <= 500_000 for picture in (ROOT / "docs/pictures").iterdir())
