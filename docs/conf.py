@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("scanwright", "design", "cad", "firmware_io")
 OURS = re.compile(rf"({'|'.join(PACKAGES)})(\.[A-Za-z_]\w*)+")
 IN_THE_PROJECT = re.compile(rf"(({'|'.join(PACKAGES)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
+WRITTEN_BY_A_BUILD = {"assembly.md"}
 
 project = "Scanwright"
 author = "the Scanwright authors"
 copyright = f"2026, {author}"  # noqa: A001  the name that Sphinx reads
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.apidoc"]
+suppress_warnings = ["ref.python"]  # a word that several classes have, such as shape, is no reference
 exclude_patterns = ["_build", "reference/*/modules.rst"]
 html_theme = "furo"
 html_title = "Scanwright"
@@ -71,10 +74,18 @@ def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
     target = str(node.get("reftarget", ""))
     if node.get("refdomain") != "py":
         return None
-    if IN_THE_PROJECT.fullmatch(target):
-        path = target.removesuffix("/")
-        return contnode if any(ROOT.glob(path)) or any(ROOT.glob(f"docs/{path}")) else None
-    return None if OURS.fullmatch(target) else contnode
+    if IN_THE_PROJECT.fullmatch(target) and target not in WRITTEN_BY_A_BUILD:
+        return contnode if (ROOT / target).exists() or (ROOT / "docs" / target).exists() else None
+    return None if OURS.fullmatch(target) and not _is_something(target) else contnode
+
+
+def _is_something(name: str) -> bool:
+    """Whether a name that has no page of its own, such as a constant, can be imported."""
+    try:
+        resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True
 
 
 def drawn_as_typed(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:

@@ -3,6 +3,9 @@
 Needs OpenGL without a screen (Debian: libegl1).
 """
 
+# The bridge of VTK to NumPy has no types.
+# mypy: disable-error-code="no-untyped-call"
+
 from __future__ import annotations
 
 from itertools import pairwise
