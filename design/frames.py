@@ -43,7 +43,7 @@ def R_rot_laser(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike 
 
 
 def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Array:
-    """Rotation by |v| about v (Rodrigues), shape (3, 3)."""
+    """Rotation about v by its length (Rodrigues), shape (3, 3)."""
     v = np.asarray(rotvec_rad, dtype=float)
     angle = float(np.linalg.norm(v))
     K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

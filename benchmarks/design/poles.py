@@ -22,7 +22,7 @@ from design.evaluation.poles import Pole, PoleChances, pole_chances
 from design.objective.problem import Problem, problem_of
 from design.task.task import Task, load_task
 
-PICTURE = Path(__file__).parents[1] / "pictures/poles.png"
+PICTURE = Path(__file__).parents[2] / "docs/pictures/poles.png"
 PERIOD_S = 2.0
 HEIGHT_M, RANGE_M = 1.0, 5.0
 WIDTHS_MM = (5, 10, 20, 40, 60, 80, 100, 150, 200, 300, 400)

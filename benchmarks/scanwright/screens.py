@@ -19,7 +19,7 @@ from PIL import Image
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-HERE = Path(__file__).parents[1] / "pictures"
+HERE = Path(__file__).parents[2] / "docs/pictures"
 CHROMIUM = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # as root, no graphics card
 WIDE, PHONE = (1400, 900), (390, 844)
 GAP, COLOURS = 24, 256

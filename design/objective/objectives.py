@@ -1,9 +1,10 @@
-"""What the search minimises. Each objective is one function below, with its formula; README says when to use which.
+"""What the search minimises. Each objective is one function below, with its formula.
 
 An objective is a few moments of the density, joined: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a
 weight and over the start phase of the turn, or the highest g(d) anywhere in it. Every g is convex and every join rises
 with every moment whose g bends, so J of the mean counts is a lower bound of J: what the search orders its work by.
 Weights that differ from region to region (`required`) are split by their levels: exact, one moment a level.
+When to take which: `docs/definitions.md`.
 """
 
 from __future__ import annotations

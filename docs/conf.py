@@ -1,0 +1,107 @@
+"""How the pages are made: `uv run sphinx-build -n -W --keep-going docs docs/_build`.
+
+The docstrings of this project write names, formulas and files alike in single backquotes. Such a word becomes a link
+where it names something of ours. Where it claims to (it begins with one of our packages, or is the path of a file or
+page) and there is no such thing, the build fails.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("scanwright", "design", "cad", "firmware_io")
+OURS = re.compile(rf"({'|'.join(PACKAGES)})(\.[A-Za-z_]\w*)+")
+IN_THE_PROJECT = re.compile(rf"(({'|'.join(PACKAGES)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
+WRITTEN_BY_A_BUILD = {"assembly.md"}
+
+project = "Scanwright"
+author = "the Scanwright authors"
+copyright = f"2026, {author}"  # noqa: A001  the name that Sphinx reads
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.apidoc"]
+suppress_warnings = ["ref.python"]  # a word that several classes have, such as shape, is no reference
+exclude_patterns = ["_build", "reference/*/modules.rst"]
+html_theme = "furo"
+html_title = "Scanwright"
+html_show_sphinx = False
+default_role = "py:obj"
+
+myst_heading_anchors = 3
+myst_enable_extensions = ["deflist"]
+
+add_module_names = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+apidoc_modules = [
+    {
+        "path": f"../{package}",
+        "destination": f"reference/{package}",
+        "max_depth": 1,
+        "automodule_options": {"members", "undoc-members"},
+    }
+    for package in PACKAGES
+]
+
+
+def describe_commands(app: Any) -> None:
+    """Write the page of all commands from the commands themselves."""
+    from typer.main import get_command
+
+    from scanwright.cli.app import app as commands
+
+    page = ["# Commands", "", "`scanwright COMMAND --help` says the same.", ""]
+    for name, command in sorted(get_command(commands).commands.items()):  # type: ignore[attr-defined]
+        page += [f"## {name}", "", str(command.help).replace("\b", ""), ""]
+        for parameter in command.params:
+            written = ", ".join(parameter.opts) if parameter.param_type_name == "option" else parameter.metavar
+            page += [f"`{written}`", f": {parameter.help or 'value'}", ""]
+    folder = Path(app.srcdir) / "reference/cli"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "commands.md").write_text("\n".join(page))
+
+
+def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
+    """Leave words that name nothing of ours as they are; None lets Sphinx complain about those that claim to."""
+    target = str(node.get("reftarget", ""))
+    if node.get("refdomain") != "py":
+        return None
+    if IN_THE_PROJECT.fullmatch(target) and target not in WRITTEN_BY_A_BUILD:
+        return contnode if (ROOT / target).exists() or (ROOT / "docs" / target).exists() else None
+    return None if OURS.fullmatch(target) and not _is_something(target) else contnode
+
+
+def _is_something(name: str) -> bool:
+    """Whether a name that has no page of its own, such as a constant, can be imported."""
+    try:
+        resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def drawn_as_typed(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
+    """Formulas, tables and sketches stand indented behind a blank line: show them as they are."""
+    for k in range(len(lines) - 1, 1, -1):
+        before = next((line for line in reversed(lines[: k - 1]) if line.strip()), "")
+        if lines[k].strip() and not lines[k - 1].strip() and _indent(lines[k]) >= _indent(before) + 4:
+            lines[k:k] = [" " * _indent(before) + "::", ""]
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    app.connect("builder-inited", describe_commands)
+    app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
+    app.connect("missing-reference", points_nowhere)
