@@ -2,8 +2,8 @@
 (() => {
   const element = (id) => document.getElementById(id);
   const canvas = element("canvas");
-  const gl = three.started(canvas);
-  const uniform = gl && three.program(gl, `#version 300 es
+  const gl = webgl.started(canvas);
+  const uniform = gl && webgl.program(gl, `#version 300 es
     layout(location = 0) in vec3 position;
     layout(location = 1) in float stopped;
     uniform mat4 model, view, projection;
@@ -37,35 +37,35 @@
   // ---- what is drawn ----
 
   const bodies = scene.bodies.map((body) => {
-    const faces = three.bytes(body.faces);
+    const faces = webgl.bytes(body.faces);
     const indices = body.wide ? new Uint32Array(faces.buffer) : new Uint16Array(faces.buffer);
     return {
       ...body,
-      array: three.shape(gl, new Float32Array(three.bytes(body.vertices).buffer), indices),
+      array: webgl.shape(gl, new Float32Array(webgl.bytes(body.vertices).buffer), indices),
       count: indices.length,
       type: body.wide ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT,
     };
   });
-  const axisLine = three.shape(gl, new Float32Array([0, 0, -scene.reach, 0, 0, scene.reach]));
+  const axisLine = webgl.shape(gl, new Float32Array([0, 0, -scene.reach, 0, 0, scene.reach]));
 
   // one triangle a beam, half a step to either side of it
   const fan = scene.fan && (() => {
-    const bearings = new Float32Array(three.bytes(scene.fan.bearings).buffer);
+    const bearings = new Float32Array(webgl.bytes(scene.fan.bearings).buffer);
     const half = bearings.length > 1 ? (bearings[1] - bearings[0]) / 2 : 0.002;
     const edge = (angle) => [scene.reach * Math.cos(angle), scene.reach * Math.sin(angle), 0];
     const corners = [...bearings].flatMap((bearing) => [0, 0, 0, ...edge(bearing - half), ...edge(bearing + half)]);
-    const array = three.shape(gl, new Float32Array(corners));
+    const array = webgl.shape(gl, new Float32Array(corners));
     const stopped = new Uint8Array(3 * bearings.length);
-    const buffer = three.filled(gl, gl.ARRAY_BUFFER, stopped, gl.DYNAMIC_DRAW);
+    const buffer = webgl.filled(gl, gl.ARRAY_BUFFER, stopped, gl.DYNAMIC_DRAW);
     gl.enableVertexAttribArray(1);
     gl.vertexAttribPointer(1, 1, gl.UNSIGNED_BYTE, false, 0, 0);
-    const hidden = Object.entries(scene.fan.hidden).map(([beam, bits]) => [Number(beam), three.bytes(bits)]);
+    const hidden = Object.entries(scene.fan.hidden).map(([beam, bits]) => [Number(beam), webgl.bytes(bits)]);
     return { array, buffer, stopped, hidden, beams: bearings.length, count: 3 * bearings.length };
   })();
 
   // ---- what the person chose ----
 
-  const camera = { yaw: 40 * three.DEG, pitch: 22 * three.DEG, zoom: 1 };
+  const camera = { yaw: 40 * webgl.DEG, pitch: 22 * webgl.DEG, zoom: 1 };
   const axis = element("axis");
   const apart = element("apart");
   const fanShown = element("fan");
@@ -94,20 +94,20 @@
     gl.depthMask(false);
   };
   const draw = () => {
-    const aspect = three.cleared(gl);
+    const aspect = webgl.cleared(gl);
     const degrees = Number(axis.value);
     const share = apart ? Number(apart.value) : 0;
-    const centre = three.between(scene.fit.centre, scene.fit_apart.centre, share);
+    const centre = webgl.between(scene.fit.centre, scene.fit_apart.centre, share);
     const radius = scene.fit.radius + share * (scene.fit_apart.radius - scene.fit.radius);
-    const distance = three.distanceTo(1.05 * radius) / camera.zoom;
-    const turn = three.product(three.product(scene.axis, three.aboutZ(degrees * three.DEG)), scene.axis_inverse);
-    gl.uniformMatrix4fv(uniform.projection, false, three.perspective(aspect, distance / 50, distance + 10 * radius));
-    gl.uniformMatrix4fv(uniform.view, false, three.orbit({ ...camera, distance }, centre));
+    const distance = webgl.distanceTo(1.05 * radius) / camera.zoom;
+    const turn = webgl.product(webgl.product(scene.axis, webgl.aboutZ(degrees * webgl.DEG)), scene.axis_inverse);
+    gl.uniformMatrix4fv(uniform.projection, false, webgl.perspective(aspect, distance / 50, distance + 10 * radius));
+    gl.uniformMatrix4fv(uniform.view, false, webgl.orbit({ ...camera, distance }, centre));
     gl.uniform1i(uniform.lit, 1);
     gl.vertexAttrib1f(1, 0);
     const drawBody = (body, colour) => {
-      const place = three.between(body.matrix, body.apart, share);
-      gl.uniformMatrix4fv(uniform.model, false, body.turns ? three.product(turn, place) : place);
+      const place = webgl.between(body.matrix, body.apart, share);
+      gl.uniformMatrix4fv(uniform.model, false, body.turns ? webgl.product(turn, place) : place);
       gl.uniform4f(uniform.colour, ...colour);
       gl.bindVertexArray(body.array);
       gl.drawElements(gl.TRIANGLES, body.count, body.type, 0);
@@ -124,7 +124,7 @@
     if (fan && fanShown.checked && share === 0 && (!picked || picked.has("lidar_body"))) {
       gl.bindVertexArray(fan.array);
       markStopped(degrees);
-      gl.uniformMatrix4fv(uniform.model, false, three.product(turn, scene.laser));
+      gl.uniformMatrix4fv(uniform.model, false, webgl.product(turn, scene.laser));
       gl.uniform4f(uniform.colour, 0.95, 0.7, 0.1, 0.4);
       gl.uniform4f(uniform.stopped_colour, 0, 0, 0, 0.85);
       gl.drawArrays(gl.TRIANGLES, 0, fan.count);
@@ -152,7 +152,7 @@
     draw();
     if (spinning) redraw();
   };
-  const redraw = three.onceAFrame(frame);
+  const redraw = webgl.onceAFrame(frame);
   const spin = (on) => {
     spinning = on;
     last = 0;
@@ -168,7 +168,7 @@
     redraw();
   };
 
-  const { zoomBy } = three.moved(canvas, camera, redraw);
+  const { zoomBy } = webgl.moved(canvas, camera, redraw);
   element("nearer").addEventListener("click", () => zoomBy(1.2));
   element("farther").addEventListener("click", () => zoomBy(1 / 1.2));
   element("spin").addEventListener("click", () => spin(!spinning));

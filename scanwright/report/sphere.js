@@ -2,8 +2,8 @@
 (() => {
   const element = (id) => document.getElementById(id);
   const canvas = element("sphere-canvas");
-  const gl = three.started(canvas);
-  const uniform = gl && three.program(gl, `#version 300 es
+  const gl = webgl.started(canvas);
+  const uniform = gl && webgl.program(gl, `#version 300 es
     layout(location = 0) in vec3 position;
     uniform mat4 view, projection;
     out vec3 direction;
@@ -48,12 +48,12 @@
         if (i < ROWS && j < 2 * ROWS) indices.push(at, at + 2 * ROWS + 1, at + 1, at + 1, at + 2 * ROWS + 1, at + 2 * ROWS + 2);
       }
     }
-    return { array: three.shape(gl, new Float32Array(vertices), new Uint16Array(indices)), count: indices.length };
+    return { array: webgl.shape(gl, new Float32Array(vertices), new Uint16Array(indices)), count: indices.length };
   })();
   const along = (reach) => scene.axis.map((value) => value * reach);
-  const axisLine = three.shape(gl, new Float32Array([...along(-AXIS_REACH), ...along(AXIS_REACH)]));
+  const axisLine = webgl.shape(gl, new Float32Array([...along(-AXIS_REACH), ...along(AXIS_REACH)]));
 
-  const [yaw, pitch] = scene.look_deg.map((degrees) => degrees * three.DEG);
+  const [yaw, pitch] = scene.look_deg.map((degrees) => degrees * webgl.DEG);
   const camera = { yaw, pitch, zoom: 1 };
   const marks = [...document.querySelectorAll("#sphere-place [data-direction]")].map((mark) => ({
     mark,
@@ -72,12 +72,12 @@
       mark.style.top = `${(50 * (1 - cy / w)).toFixed(2)}%`;
     }
   };
-  const redraw = three.onceAFrame(() => {
-    const aspect = three.cleared(gl);
+  const redraw = webgl.onceAFrame(() => {
+    const aspect = webgl.cleared(gl);
     if (!ready) return;
-    const distance = three.distanceTo(1.25) / camera.zoom;
-    const projection = three.perspective(aspect, distance / 50, distance + 3);
-    const view = three.orbit({ ...camera, distance }, [0, 0, 0]);
+    const distance = webgl.distanceTo(1.25) / camera.zoom;
+    const projection = webgl.perspective(aspect, distance / 50, distance + 3);
+    const view = webgl.orbit({ ...camera, distance }, [0, 0, 0]);
     gl.uniformMatrix4fv(uniform.projection, false, projection);
     gl.uniformMatrix4fv(uniform.view, false, view);
     gl.uniform1i(uniform.lines, 0);
@@ -86,7 +86,7 @@
     gl.uniform1i(uniform.lines, 1);
     gl.bindVertexArray(axisLine);
     gl.drawArrays(gl.LINES, 0, 2);
-    place(three.product(projection, view));
+    place(webgl.product(projection, view));
   });
 
   const texture = gl.createTexture();
@@ -105,7 +105,7 @@
     ready = true;
     redraw();
   };
-  const { zoomBy } = three.moved(canvas, camera, redraw);
+  const { zoomBy } = webgl.moved(canvas, camera, redraw);
   element("sphere-nearer").addEventListener("click", () => zoomBy(1.2));
   element("sphere-farther").addEventListener("click", () => zoomBy(1 / 1.2));
   const chooser = element("sphere-choice");

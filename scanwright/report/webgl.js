@@ -1,5 +1,5 @@
 // What both 3D pictures of the page are made with: matrices (column by column), WebGL 2 and a camera that goes around.
-const three = (() => {
+const webgl = (() => {
   const DEG = Math.PI / 180;
   const FIELD_OF_VIEW = 30 * DEG;
 
