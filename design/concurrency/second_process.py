@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -34,7 +35,7 @@ def second_process() -> Iterator[Begin]:
 
     Functions, arguments and results are pickled: functions of modules only.
     """
-    if _cores() < 2 or multiprocessing.current_process().daemon:
+    if cores() < 2 or multiprocessing.current_process().daemon:
         yield in_turn
         return
     pool = spawn_pool()
@@ -72,9 +73,9 @@ def in_turn(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable
 
 
 def spawn_pool() -> ProcessPoolExecutor:
-    """One process that stays, for calls of functions of modules; it is deaf to Ctrl-C, which ends its owner."""
+    """One process that stays, for calls of functions of modules; it is deaf to Ctrl-C, and ends with its owner."""
     # spawned and not forked: a fork of a process with threads may lock up
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _deaf)
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _attend)
 
 
 def kill(pool: ProcessPoolExecutor) -> None:
@@ -84,13 +85,21 @@ def kill(pool: ProcessPoolExecutor) -> None:
     pool.shutdown(cancel_futures=True)
 
 
-def _cores() -> int:
+def cores() -> int:
     """That this process may use."""
     if hasattr(os, "sched_getaffinity"):  # Linux
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def _deaf() -> None:
-    """Ctrl-C reaches both: the first process ends this one."""
+def _attend() -> None:
+    """Ctrl-C reaches both, and the owner ends this one; one that was killed tells nobody, so this one watches it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    owner = multiprocessing.parent_process()
+    assert owner is not None
+
+    def watch() -> None:
+        owner.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

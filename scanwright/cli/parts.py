@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cad.kernel import require_kernel
 from design.errors import require
 from scanwright.cli.console import AsJson, BuildFolder, TaskFile, complain, group, say, say_in_place, show, show_json
-
-if TYPE_CHECKING:
-    from design.task.task import LoadedTask
 
 app = group()
 
@@ -81,42 +77,15 @@ def study(
     plan: Annotated[bool, typer.Option("--plan", help="Say what it would cost, and stop.")] = False,
 ) -> None:
     """Cross tasks with products, judge every candidate with its parts, and build the winners of the trade-off."""
-    require("cluster", "study needs Dask", "dask", "distributed", "pyarrow")
-    require_kernel("study")
-    from scanwright.study.crossing import Crossing
-    from scanwright.study.study import load_study
-
-    crossing = Crossing(load_study(study))
-    folder = out or Path("out") / crossing.loaded.study.name
-    kept = results or folder / "results"
     if plan:
-        from scanwright.study.plan import plan_of
+        from scanwright.study.plan import plan_study
 
-        for line in plan_of(crossing, kept, say_in_place).lines():
-            print(line)
+        show(plan_study(study, out, results, say_in_place))
         return
-    from scanwright.study.answer.write import write_answer
-    from scanwright.study.candidate_parts import judge
-    from scanwright.study.runner.cluster import cluster
-    from scanwright.study.runner.store import open_store
-    from scanwright.study.session import Session
+    from scanwright.study.run import run_study
 
-    session = Session(crossing, open_store(kept), judge)
     try:
-        with cluster(scheduler, processes) as client:
-            session.run(client, say_in_place)
-        for line in write_answer(session, folder):
-            print(line)
-        for combination, loaded in session.winners():
-            _build_winner(loaded, folder / combination.name)
+        show(run_study(study, out, results, scheduler, processes, say_in_place))
     except KeyboardInterrupt:
         complain("stopped; the same command goes on where it was")
         raise typer.Exit(130) from None
-    print(f"wrote study.csv, study.parquet and front.png to {folder}")
-
-
-def _build_winner(loaded: LoadedTask, target: Path) -> None:
-    from scanwright.pipeline.build import build_task
-
-    made = build_task(loaded, target, say)
-    print(f"built {target}" if made.made else f"{target}: nothing has changed, no work to do")

@@ -18,7 +18,7 @@ from design.motion import LONGEST_S
 from design.record import Record
 from design.task.named_record import named_record, names_in
 from design.task.task import AngleRanges, Limits, LoadedTask, load_task
-from scanwright.study.answer.columns import COLUMNS
+from scanwright.study.front import COLUMNS
 
 SHIPPED = Path(__file__).parent / "shipped"
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"

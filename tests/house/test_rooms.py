@@ -31,6 +31,7 @@ HEAVY = {
     "numba",
     "numpy",
     "pydantic",
+    "pyarrow",
     "pye57",
     "pypcd4",
     "reportlab",

@@ -1,7 +1,7 @@
 """What a study costs and what it survives, measured on one machine.
 
     uv run python -m benchmarks.scanwright.study costs DIR    unit costs of real work: scanwright/study/costs.csv
-    uv run python -m benchmarks.scanwright.study kills [--each 20] [--what worker scheduler client] [--seed 1]
+    uv run python -m benchmarks.scanwright.study kills [--each 20] [--what worker client] [--dask]
     uv run python -m benchmarks.scanwright.study efficiency [--units 40] [--seconds 1.0]
     uv run python -m benchmarks.scanwright.study memory [--units 100000]
 
@@ -33,9 +33,8 @@ def main() -> None:
     costs.add_argument("folder", type=Path)
     costs.add_argument("--every", type=int, default=1, help="of the candidates: 1 for all, 4 for each fourth")
     killing = commands.add_parser("kills")
-    killing.add_argument(
-        "--what", nargs="+", choices=("worker", "scheduler", "client"), default=["worker", "scheduler", "client"]
-    )
+    killing.add_argument("--what", nargs="+", choices=("worker", "scheduler", "client"), default=["worker", "client"])
+    killing.add_argument("--dask", action="store_true", help="over a scheduler with two workers, which may be killed")
     killing.add_argument("--each", type=int, default=20)
     killing.add_argument("--units", type=int, default=40)
     killing.add_argument("--seconds", type=float, default=0.2)
@@ -53,7 +52,7 @@ def main() -> None:
     if given.command == "costs":
         measure_costs(given.folder, given.every)
     elif given.command == "kills":
-        sys.exit(0 if kills(given.what, given.each, given.units, given.seconds, given.seed) else 1)
+        sys.exit(0 if kills(given.what, given.each, given.units, given.seconds, given.seed, 2 * given.dask) else 1)
     elif given.command == "efficiency":
         efficiency(given.units, given.seconds)
     elif given.command == "memory":

@@ -7,17 +7,16 @@ import resource
 import time
 from pathlib import Path
 
-from scanwright.study.candidate import digest, search_of, search_record
+from scanwright.study.bench import judge_candidate
+from scanwright.study.candidate import record_digest, search_candidate, search_record
 from scanwright.study.crossing import Crossing
 from scanwright.study.plan import COSTS
-from scanwright.study.runner.store import Result
+from scanwright.study.results import Result
 from scanwright.study.study import load_study
 
 
 def measure_costs(folder: Path, every: int) -> None:
     """Do searches and candidates of the shipped study in one process, and write the table that `--plan` reads."""
-    from scanwright.study.candidate_parts import judge
-
     crossing = Crossing(load_study(Path("fleet")))
     found: dict[str, Result] = {}
     seconds: dict[str, list[float]] = {"search": [], "candidate": []}
@@ -25,15 +24,15 @@ def measure_costs(folder: Path, every: int) -> None:
     possible = [loaded for combination in crossing if (loaded := combination.loaded) is not None]
     for loaded in possible[::every]:
         record = search_record(loaded)
-        key = digest(record)
+        key = record_digest(record)
         if key not in found:
             start = time.process_time()  # of all threads: core-seconds, whoever else is on the machine
-            found[key] = search_of(record)
+            found[key] = search_candidate(record)
             seconds["search"].append(time.process_time() - start)
             memory_mb["search"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         if found[key]["status"] == "found":
             start = time.process_time()
-            judge(loaded, found[key])
+            judge_candidate(loaded, found[key])
             seconds["candidate"].append(time.process_time() - start)
             memory_mb["candidate"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print({name: round(times[-1], 1) for name, times in seconds.items() if times}, loaded.task.name, flush=True)

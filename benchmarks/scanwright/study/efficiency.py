@@ -11,9 +11,9 @@ from pathlib import Path
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study, spin
 from scanwright.study.crossing import Crossing
-from scanwright.study.runner.cluster import cluster
-from scanwright.study.runner.store import open_store
-from scanwright.study.session import Session
+from scanwright.study.results import open_results
+from scanwright.study.run import StudyRun
+from scanwright.study.workers import crew_of
 
 
 def efficiency(units: int, seconds: float) -> None:
@@ -23,7 +23,7 @@ def efficiency(units: int, seconds: float) -> None:
         for workers in (1, 2):
             folder = Path(scratch) / str(workers)
             folder.mkdir()
-            took[workers] = _through_dask(folder, units, seconds, workers)
+            took[workers] = _of_a_study(folder, units, seconds, workers)
         bare = {processes: _bare(units, seconds, processes) for processes in (1, 2)}
     for what, times in (("workers", took), ("bare processes", bare)):
         share = times[1] / times[2] / 2
@@ -31,16 +31,15 @@ def efficiency(units: int, seconds: float) -> None:
     print(f"overhead of a unit with one worker: {1000 * (took[1] - bare[1]) / units:.1f} ms")
 
 
-def _through_dask(folder: Path, units: int, seconds: float, workers: int) -> float:
+def _of_a_study(folder: Path, units: int, seconds: float, workers: int) -> float:
     """Time of the candidates alone: the workers have been started, and have imported all they need."""
-    with cluster(None, workers) as client:
+    with crew_of(None, workers) as crew:
         for size, work in ((2 * workers, seconds), (units, seconds)):
-            results = open_store(folder / str(size))
-            session = Session(
-                Crossing(invented_study(size)), results, partial(invented_judge, seconds=work), invented_search
-            )
+            results = open_results(folder / str(size))
+            judge = partial(invented_judge, seconds=work)
+            run = StudyRun(Crossing(invented_study(size)), results, judge, invented_search)
             start = time.monotonic()
-            session.run(client, lambda _: None)
+            run.work(crew, lambda _: None)
         return time.monotonic() - start
 
 

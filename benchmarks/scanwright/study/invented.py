@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from design.task.task import Limits, LoadedTask, load_task
-from scanwright.study.answer.columns import tidy
-from scanwright.study.answer.write import write_answer
-from scanwright.study.candidate import digest
+from scanwright.study.candidate import record_digest
 from scanwright.study.crossing import Crossing
-from scanwright.study.runner.cluster import cluster
-from scanwright.study.runner.store import Result, open_store
-from scanwright.study.session import Session
+from scanwright.study.front import six_digits
+from scanwright.study.results import Result, open_results
+from scanwright.study.run import StudyRun
 from scanwright.study.study import LoadedStudy, Mounting, Study
+from scanwright.study.table import write_answer
+from scanwright.study.workers import crew_of
 
 LOOPS_PER_S = 28_000_000  # of the loop below, roughly: work of a fixed size, not of a fixed time
 
@@ -49,15 +49,15 @@ def invented_judge(loaded: LoadedTask, found: Result, seconds: float = 0.0, ledg
     spin(seconds)
     if ledger:
         with Path(ledger).open("a") as file:
-            file.write(f"{digest(loaded)}\n")
+            file.write(f"{record_digest(loaded)}\n")
     values: dict[str, Any] = {"J": found["bounds"]["J"] + _dice(loaded, 1), "period_s": loaded.task.motion.duration_s}
-    values = {name: tidy(value) for name, value in values.items()}
+    values = {name: six_digits(value) for name, value in values.items()}
     return {"status": "built", "angles_deg": [0.0] * 4, "J_error": 0.0, "values": values, "weakest": ""}
 
 
 def _dice(loaded: LoadedTask, throw: int) -> float:
     """A number between 0 and 0.1 that the record decides."""
-    return int(digest(loaded)[6 * throw : 6 * throw + 6], 16) / 2**24 / 10
+    return int(record_digest(loaded)[6 * throw : 6 * throw + 6], 16) / 2**24 / 10
 
 
 def invented_study(units: int, mountings: int = 1, front: tuple[str, ...] = ("J", "period_s")) -> LoadedStudy:
@@ -81,10 +81,11 @@ def run_invented(
 ) -> float:
     """Run an invented study into a folder; the time of its work."""
     judge = partial(invented_judge, seconds=seconds, ledger=str(folder / "ledger"))
-    session = Session(Crossing(invented_study(units)), open_store(folder / "results"), judge, invented_search)
-    with cluster(scheduler, processes) as client:
+    crossing = Crossing(invented_study(units))
+    run = StudyRun(crossing, open_results(folder / "results"), judge, invented_search)
+    with crew_of(scheduler, processes) as crew:
         start = time.monotonic()
-        session.run(client, lambda _: None)
+        run.work(crew, lambda _: None)
         took = time.monotonic() - start
-    write_answer(session, folder)
+    write_answer(crossing.loaded.study, run.rows(), folder)
     return took

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
 from design.task.task import LoadedTask
-from scanwright.study.answer.write import write_answer
 from scanwright.study.crossing import Crossing
-from scanwright.study.runner.cluster import cluster
-from scanwright.study.runner.store import Result, open_store
-from scanwright.study.session import Session
+from scanwright.study.results import Result, open_results
+from scanwright.study.run import StudyRun
+from scanwright.study.table import write_answer
+from scanwright.study.workers import crew_of
 
 MOUNTINGS = 100
 
@@ -24,7 +24,7 @@ def memory(units: int) -> None:
         folder = Path(scratch)
         # bounds of 0 that nothing reaches: no candidate is left out
         crossing = Crossing(invented_study(units, MOUNTINGS, ("period_s",)))
-        session = Session(crossing, open_store(folder / "results"), _nothing, _nothing_found)
+        run = StudyRun(crossing, open_results(folder / "results"), _nothing, _nothing_found)
         start = time.monotonic()
         told: list[tuple[float, float]] = []
 
@@ -33,11 +33,11 @@ def memory(units: int) -> None:
             if len(told) % 15 == 1:
                 print(f"  {told[-1][0]:6.0f} s {told[-1][1]:7.1f} MB  {line}", flush=True)
 
-        with cluster(None, 2) as client:
-            session.run(client, say)
+        with crew_of(None, 2) as crew:
+            run.work(crew, say)
         took = time.monotonic() - start
         before = _now_mb()
-        write_answer(session, folder)
+        write_answer(crossing.loaded.study, run.rows(), folder)
         quarter, end = told[len(told) // 4][1], told[-1][1]
         most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"{units:,} candidates in {took:.0f} s, {1e3 * took / units:.2f} ms each")

@@ -15,7 +15,7 @@ from design.errors import BuildError, TaskError
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_work_and_its_errors_are_the_same_with_one_core_and_two(cores, monkeypatch):
-    monkeypatch.setattr(beside, "_cores", lambda: cores)
+    monkeypatch.setattr(beside, "cores", lambda: cores)
     with second_process() as begin:
         where, joined, wrong = begin(os.getpid), begin("-".join, ["a", "b"]), begin(load_angles, Path("none.json"))
         assert (where() == os.getpid()) == (cores == 1)
@@ -32,7 +32,7 @@ def test_what_is_given_is_as_it_was_when_work_began():
 
 
 def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, tmp_path):
-    monkeypatch.setattr(beside, "_cores", lambda: 2)
+    monkeypatch.setattr(beside, "cores", lambda: 2)
     began, at_work = time.monotonic(), tmp_path / "at_work"
     with contextlib.suppress(KeyboardInterrupt), second_process() as begin:
         process = begin(os.getpid)()

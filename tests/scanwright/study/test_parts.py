@@ -5,28 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from scanwright.study import session as sessions
-from scanwright.study.answer.write import write_answer
-from scanwright.study.candidate_parts import judge
-from scanwright.study.crossing import Crossing
-from scanwright.study.runner.engine import Finished
-from scanwright.study.runner.store import open_store
-from scanwright.study.session import Session
-from scanwright.study.study import load_study
-
 TABLES = ("study.csv", "study.parquet")
 STUDY = 'name = "two"\ntasks = ["ahead.toml"]\nservos = ["AX-12A", "MX-64R"]\nfront = ["cost_usd", "J"]\nwinners = 0\n'
 
 
-def only_looked_up(_client, units, store, _limit_s, _ticked):
-    """The engine without a cluster, where all has been done."""
-    for unit in units:
-        known = store.get(unit.address)
-        assert known is not None
-        yield Finished(unit, known, "", None, 0.0)
-
-
-def test_two_candidates_from_the_command_to_the_table(tmp_path, cheapest_task, command, monkeypatch):
+def test_two_candidates_from_the_command_to_the_table(tmp_path, cheapest_task, command):
     (tmp_path / "ahead.toml").write_text(cheapest_task)
     (tmp_path / "two.toml").write_text(STUDY)
     out = tmp_path / "out"
@@ -40,13 +23,11 @@ def test_two_candidates_from_the_command_to_the_table(tmp_path, cheapest_task, c
     assert (dear["status"], dear["reason"]) == ("dominated", "not made: ahead-AX-12A beats its bound")
     assert (out / "front.png").stat().st_size > 10_000
     agrees_with_the_parts(cheap, tmp_path / "ahead.toml")
-    monkeypatch.setattr(sessions, "run", only_looked_up)
-    again = Session(Crossing(load_study(tmp_path / "two.toml")), open_store(out / "results"), judge)
-    again.run(None, lambda _: None)
-    write_answer(again, tmp_path / "again")
-    assert [(tmp_path / "again" / name).read_bytes() for name in TABLES] == [
-        (out / name).read_bytes() for name in TABLES
-    ]
+    again = tmp_path / "again"
+    code, printed, _ = command("study", tmp_path / "two.toml", "--out", again, "--results", out / "results")
+    assert code == 0
+    assert "this run: 0 searches, 0 candidates made, 1 looked up" in printed
+    assert [(again / name).read_bytes() for name in TABLES] == [(out / name).read_bytes() for name in TABLES]
 
 
 def agrees_with_the_parts(row, task):

@@ -1,7 +1,10 @@
 """Studies without a cluster: what is crossed, who beats whom, and that the answer does not depend on who was first."""
 
 import random
+import sys
+import time
 from collections import Counter
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,22 +14,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
-from design.accuracy.front import dominators
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
-from design.task.task import load_task
-from scanwright.study import session as sessions
-from scanwright.study.answer.columns import COLUMNS, costs
-from scanwright.study.answer.pareto import Front
-from scanwright.study.answer.tables import FIELDS, write_tables
-from scanwright.study.candidate import bounds_of, digest, search_record, winner_task
+from design.task.task import Limits, load_task
+from scanwright.study.candidate import addresses, bounds_of, record_digest, search_record, winner_task
 from scanwright.study.crossing import Crossing, _with_period
-from scanwright.study.runner.engine import Finished
-from scanwright.study.runner.identity import identity
-from scanwright.study.runner.store import open_store, shared_store
-from scanwright.study.runner.work import OtherVersionError, Unit, do
-from scanwright.study.session import Session, addresses
+from scanwright.study.front import COLUMNS, Front, costs
+from scanwright.study.results import open_results
+from scanwright.study.run import StudyRun
 from scanwright.study.study import load_study, shipped_studies
+from scanwright.study.table import FIELDS, write_answer, write_tables
+from scanwright.study.units import Crew
 
 rows = st.lists(st.tuples(*[st.integers(0, 4)] * 3), min_size=1, max_size=30)
 
@@ -44,7 +42,6 @@ def test_a_front_is_what_nothing_beats_in_whatever_order(points, dice):
     assert set(front.numbers.tolist()) == {i for i, lost in enumerate(beaten) if not lost}
     for i, lost in enumerate(beaten):
         assert (front.beater(costs[i]) is not None) == lost
-        assert dominators(costs, costs[i]).any() == lost
 
 
 def test_the_shipped_study_crosses_everything_and_refuses_with_a_reason():
@@ -57,8 +54,8 @@ def test_the_shipped_study_crosses_everything_and_refuses_with_a_reason():
     assert all(c.choice["servo"] == "AX-12A" and "no angle is read" in c.refused for c in refused)
     sweeping = [c for c in combinations if c.choice["task"] == "indoor_urg"]
     assert all(c.loaded.task.slip_ring is None for c in sweeping)
-    assert len({digest(c.loaded) for c in sweeping}) == 6  # the same with either ring: made once
-    assert len({digest(search_record(c.loaded)) for c in combinations if c.loaded}) == 9
+    assert len({record_digest(c.loaded) for c in sweeping}) == 6  # the same with either ring: made once
+    assert len({record_digest(search_record(c.loaded)) for c in combinations if c.loaded}) == 9
     assert combinations[17].name == crossing[17].name
 
 
@@ -123,30 +120,32 @@ def test_the_name_decides_nothing_and_a_servo_no_search():
     assert addresses(one)[1] != addresses(other)[1]
 
 
-def in_some_order(seed, at_once=6):
-    """A cluster of two that finishes what it holds in any order."""
-    dice = random.Random(seed)
+class InSomeOrder(Executor):
+    """Units that end in any order, one after the other in a thread."""
 
-    def run(_client, units, store, _limit_s, _ticked):
-        units, at_work, more = iter(units), [], True
-        while more or at_work:
-            while more and len(at_work) < at_once:
-                unit = next(units, None)
-                more = unit is not None
-                if more:
-                    at_work.append(unit)
-            if not at_work:
-                continue
-            unit = at_work.pop(dice.randrange(len(at_work)))
-            known = store.get(unit.address)
-            result = known or unit.function(*unit.arguments)
-            store.put(unit.address, result)
-            yield Finished(unit, result, "", None if known else 0.1, 1.0)
+    def __init__(self, seed):
+        self.dice, self.thread, self.at_work = random.Random(seed), ThreadPoolExecutor(1), []
 
-    return run
+    def submit(self, function, *arguments):
+        future = Future()
+        self.at_work.append((future, function, arguments))
+        self.thread.submit(self.end_one)
+        return future
+
+    def end_one(self):
+        time.sleep(0.002)  # for others to come
+        future, function, arguments = self.at_work.pop(self.dice.randrange(len(self.at_work)))
+        try:
+            future.set_result(function(*arguments))
+        except BaseException as error:
+            future.set_exception(error)
 
 
-def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path, monkeypatch):
+def crew(seed=0, at_once=6):
+    return Crew(InSomeOrder(seed), lambda: at_once)
+
+
+def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path):
     loaded = invented_study(120, mountings=3)
     crossing = Crossing(loaded)
     names = loaded.study.front
@@ -163,38 +162,48 @@ def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path, monkeypa
     assert min(Counter(expected)[status] for status in ("dominated", "built", "front")) >= 2
     tables, made = set(), set()
     for seed in range(4):
-        monkeypatch.setattr(sessions, "run", in_some_order(seed))
-        session = Session(crossing, open_store(tmp_path / str(seed)), invented_judge, invented_search)
-        session.run(None, lambda _: None)
-        assert [row["status"] for row in session.rows()] == expected
-        write_tables(tmp_path, session.rows())
+        run = StudyRun(crossing, open_results(tmp_path / str(seed)), invented_judge, invented_search)
+        run.work(crew(seed), lambda _: None)
+        assert [row["status"] for row in run.rows()] == expected
+        write_tables(tmp_path, run.rows())
         tables.add((tmp_path / "study.csv").read_bytes() + (tmp_path / "study.parquet").read_bytes())
-        made.add(session.counts.judged)
-        assert session.counts.judged + session.counts.beaten == len(crossing)
+        made.add(run.tally.judged)
+        assert run.tally.judged + run.tally.beaten == len(crossing)
     assert len(tables) == 1
     assert max(made) < len(crossing)
-    again = Session(crossing, session.store, invented_judge, invented_search)
-    again.run(None, lambda _: None)
-    assert (again.counts.judged, again.counts.searches) == (0, 0)
-    assert list(again.rows()) == list(session.rows())
+    again = StudyRun(crossing, run.results, invented_judge, invented_search)
+    again.work(crew(), lambda _: None)
+    assert (again.tally.judged, again.tally.searches) == (0, 0)
+    assert list(again.rows()) == list(run.rows())
 
 
-def test_a_candidate_whose_bound_is_beaten_is_never_made(tmp_path, monkeypatch):
-    """With one worker that has one unit at a time, nothing is at work when a bound is asked for."""
-    session = Session(Crossing(invented_study(60, mountings=3)), open_store(tmp_path), None, invented_search)
+def test_a_candidate_whose_bound_is_beaten_is_never_made(tmp_path):
+    """With one unit at a time, nothing is at work when a bound is asked for."""
+    run = StudyRun(Crossing(invented_study(60, mountings=3)), open_results(tmp_path), None, invented_search)
     wasted = []
 
     def judge(loaded, found):
-        bound = costs(bounds_of(loaded, found), session.crossing.loaded.study.front)
-        wasted.append(any((done <= bound).all() and (done < bound).any() for done in session.fronts[0].costs))
+        bound = costs(bounds_of(loaded, found), run.crossing.loaded.study.front)
+        wasted.append(any((done <= bound).all() and (done < bound).any() for done in run.fronts[0].costs))
         return invented_judge(loaded, found)
 
-    session.judge = judge
-    monkeypatch.setattr(sessions, "run", in_some_order(0, at_once=1))
-    session.run(None, lambda _: None)
+    run.judge = judge
+    run.work(crew(at_once=1), lambda _: None)
     assert not any(wasted)
-    assert 0 < session.counts.beaten == 60 - len(wasted)
-    assert session.counts.beaten == sum(row["status"] == "dominated" for row in session.rows())
+    assert 0 < run.tally.beaten == 60 - len(wasted)
+    assert run.tally.beaten == sum(row["status"] == "dominated" for row in run.rows())
+
+
+def test_a_record_that_comes_twice_is_made_once(tmp_path):
+    loaded = invented_study(6, mountings=3)
+    same = tuple(mounting.model_copy(update={"limits": Limits()}) for mounting in loaded.study.mounting)
+    loaded = replace(loaded, study=loaded.study.model_copy(update={"mounting": same}))
+    run = StudyRun(Crossing(loaded), open_results(tmp_path), invented_judge, invented_search)
+    run.work(crew(), lambda _: None)
+    assert (run.tally.searches, run.tally.judged, run.tally.looked_up) == (2, 2, 4)
+    by_name = {row["name"]: row for row in run.rows()}
+    assert {row["status"] for row in by_name.values()} == {"front"}
+    assert len({row["J"] for row in by_name.values()}) == 2
 
 
 def test_both_tables_hold_the_same(tmp_path):
@@ -213,21 +222,15 @@ def test_both_tables_hold_the_same(tmp_path):
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_worker_keeps_results_only_in_the_folder_of_its_client(tmp_path):
-    store = open_store(tmp_path / "results")
-    unit = Unit("ab" * 32, "unit", dict, ({"status": "built"},))
-    done = do(unit, str(store.folder), store.mark, identity(), 10.0)
-    assert done.kept and done.seconds is not None
-    assert store.get(unit.address) == {"status": "built"}
-    assert do(unit, str(store.folder), store.mark, identity(), 10.0).seconds is None  # looked up
-    assert shared_store(str(store.folder), "another mark") is None
-    assert not do(unit, str(tmp_path / "elsewhere"), store.mark, identity(), 10.0).kept
-    with pytest.raises(OtherVersionError):
-        do(unit, str(store.folder), store.mark, identity() | {"numpy": "0"}, 10.0)
-    cut_off = store.folder / "cd" / f"{'cd' * 32}.json"
-    cut_off.parent.mkdir()
-    cut_off.write_text('{"status": "bu')  # by a file system that lost its end
-    assert store.get("cd" * 32) is None
+def test_a_study_without_pyarrow_has_a_table_all_the_same(tmp_path, monkeypatch):
+    rows = [{"name": "a", "task": "t", "status": "refused", "reason": "why"}]
+    study = invented_study(2).study
+    write_answer(study, rows, tmp_path)
+    whole = (tmp_path / "study.csv").read_bytes()
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "refused 1: why" in write_answer(study, rows, tmp_path)
+    assert (tmp_path / "study.csv").read_bytes() == whole
+    assert not (tmp_path / "study.parquet").exists()  # not an older one either
 
 
 def test_a_winner_is_built_with_its_own_angles_and_period():

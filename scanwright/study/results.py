@@ -1,19 +1,23 @@
-"""The results folder: every result under the address of its record, so that none is ever computed twice.
+"""The results folder: one file for each result, under the digest of its record and of the program that made it.
 
-It may be shared: then workers read and write it themselves, and what they finish stays even if everybody else dies.
+So none is ever computed twice. It may be shared: then workers read and write it themselves, and what they finish stays
+even if everybody else dies.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
+import platform
 import secrets
-import tempfile
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from design.atomic_file import whole_file
 from design.errors import BuildError
+from scanwright.pipeline.manifest import code_digest, versions
 
 MARK = "results.json"
 
@@ -21,7 +25,7 @@ Result = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
+class Results:
     """A results folder, and the mark that tells whether a worker sees the same one."""
 
     folder: Path
@@ -31,7 +35,7 @@ class Store:
         """A result; None where there is none."""
         try:
             found: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
-        except (FileNotFoundError, json.JSONDecodeError):
+        except (FileNotFoundError, json.JSONDecodeError):  # a file system may have lost its end
             return None
         return found
 
@@ -43,15 +47,21 @@ class Store:
         """Keep a result: whole or not at all, whatever ends the program."""
         path = self._path(address)
         path.parent.mkdir(exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8") as file:
-            json.dump(result, file)
-        os.replace(file.name, path)  # noqa: PTH105  both names are strings
+        with whole_file(path, BuildError) as part:
+            part.write_text(json.dumps(result), encoding="utf-8")
+
+    def is_here(self) -> bool:
+        """Whether this process sees the folder of the client: another computer may have one of that name."""
+        try:
+            return bool(json.loads((self.folder / MARK).read_text())["mark"] == self.mark)
+        except (OSError, ValueError, KeyError):
+            return False
 
     def _path(self, address: str) -> Path:
         return self.folder / address[:2] / f"{address}.json"
 
 
-def open_store(folder: Path) -> Store:
+def open_results(folder: Path) -> Results:
     """The results folder, made if need be.
 
     Raises:
@@ -62,17 +72,20 @@ def open_store(folder: Path) -> Store:
         folder.mkdir(parents=True, exist_ok=True)
         if not path.exists():
             path.write_text(json.dumps({"schema": "scanwright/results/1", "mark": secrets.token_hex(16)}) + "\n")
-        return Store(folder.resolve(), json.loads(path.read_text())["mark"])
+        return Results(folder.resolve(), json.loads(path.read_text())["mark"])
     except OSError as error:
         raise BuildError(f"{folder}: cannot write the results folder: {error.strerror}") from error
     except (ValueError, KeyError) as error:
         raise BuildError(f"{path}: not the mark of a results folder: remove it, or take another folder") from error
 
 
-def shared_store(folder: str, mark: str) -> Store | None:
-    """The results folder as a worker sees it; None where it is not the client's."""
-    try:
-        store = Store(Path(folder), json.loads((Path(folder) / MARK).read_text())["mark"])
-    except (OSError, ValueError, KeyError):
-        return None
-    return store if store.mark == mark else None
+@cache
+def program() -> dict[str, str]:
+    """Versions of everything that a result comes from, and a digest of our own code: a checkout may be ahead of it."""
+    return {"python": platform.python_version(), **versions(), "code": code_digest()}
+
+
+def address(kind: str, digest: str) -> str:
+    """Where the result of a record is kept: a digest of the record and of the program, 64 hex digits."""
+    made_by = "\n".join(f"{name} {value}" for name, value in sorted(program().items()))
+    return hashlib.sha256(f"{kind}\n{digest}\n{made_by}".encode()).hexdigest()

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from scanwright.study.answer.columns import COLUMNS
+from scanwright.study.front import COLUMNS
 
 DPI = 110
 MOST = 20_000  # rows that a picture shows; more are a blot

@@ -1,19 +1,20 @@
-"""What a candidate is judged by: every column of a study's table that its Pareto front may name."""
+"""What candidates are judged by, and which of them nothing beats."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
+from design.accuracy.front import dominators
 from design.frames import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One number of a row. `better` tells which end wins; empty where it is not known, and then nothing is worse."""
+    """One number of a row. `better` tells which end wins."""
 
     name: str
     better: Literal["low", "high"]
@@ -38,8 +39,8 @@ COLUMNS = {
 }
 
 
-def tidy(value: float | None) -> float | None:
-    """Six digits: the last bits depend on the machine and are no measurement."""
+def six_digits(value: float | None) -> float | None:
+    """The last bits depend on the machine and are no measurement."""
     return None if value is None else float(f"{value:.6g}") + 0.0
 
 
@@ -52,3 +53,34 @@ def _cost(value: float | None, name: str) -> float:
     if value is None:
         return np.inf
     return value if COLUMNS[name].better == "low" else -value
+
+
+@dataclass(slots=True)
+class Front:
+    """Rows that nothing beats, of those shown so far; the same ones whatever the order they come in.
+
+    Attributes:
+        costs: lower is better, shape (rows, columns).
+        numbers: what each row is called, shape (rows,).
+    """
+
+    columns: int
+    costs: Array = field(init=False)
+    numbers: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.costs, self.numbers = np.empty((0, self.columns)), np.empty(0, np.intp)
+
+    def add(self, number: int, cost: Array) -> bool:
+        """Show a row; whether it is on the front. Equal rows stand side by side, the same row but once."""
+        if number in self.numbers or self.beater(cost) is not None:
+            return False
+        stays = ~dominators(-self.costs, -cost)
+        self.costs = np.vstack([self.costs[stays], cost])
+        self.numbers = np.append(self.numbers[stays], number)
+        return True
+
+    def beater(self, cost: Array) -> int | None:
+        """The lowest number of a row that beats a cost, or the bound of one; None where none does."""
+        beats = dominators(self.costs, cost)
+        return int(self.numbers[beats].min()) if beats.any() else None

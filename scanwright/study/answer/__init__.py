@@ -1,1 +1,0 @@
-"""What a study answers: columns, the trade-off, tables and pictures."""

@@ -1,0 +1,177 @@
+"""One candidate with its parts: its best setting that can be built, and all that decides about it.
+
+From its solids: what they hide, weigh, bear, bend and cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cad.assembly.shadow import PartsWorkshop, at_setting
+from cad.kernel import require_kernel
+from design.errors import BuildError, ScanwrightError, TaskError
+from design.evaluation.coverage import coverage
+from design.evaluation.gaps import gaps
+from design.frames import Array
+from design.objective.problem import Problem, problem_of
+from design.objective.score import Score
+from design.scanner import Scanner
+from design.search.families import Family
+from design.search.optimum import angle_set
+from design.search.shortest_period import shortest_period_s
+from design.search.with_parts import Refused, choose
+from design.shadow import Shadow
+from design.task.task import LoadedTask
+from scanwright.study.candidate import density_gain, price_usd, why, with_motion
+from scanwright.study.front import six_digits
+from scanwright.study.results import Result
+
+if TYPE_CHECKING:
+    from cad.assembly.assembly import Assembly
+    from cad.checks.check import Check
+
+LOADS = ("static_torque", "spin_up_torque", "tilt_moment", "axial_load", "bearing_load")
+BENDS = "deflection"  # of linkage and shaft, by finite elements
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltSetting:
+    """What the parts of a setting come to.
+
+    Attributes:
+        shadow: what they hide.
+        values: of those columns that they decide.
+        weakest: the load nearest to its rating.
+    """
+
+    shadow: Shadow
+    values: dict[str, float | None]
+    weakest: str
+
+
+@dataclass(frozen=True, slots=True)
+class PartsBench:
+    """A `Workshop` of one set of products: makes the parts of a setting once, and refuses it where a check fails."""
+
+    scanner: Scanner
+    _made: dict[tuple[float, ...], BuiltSetting | Refused] = field(default_factory=dict)
+
+    def bound(self, setting_rad: Array) -> Shadow | Refused:
+        """See `Workshop`."""
+        return PartsWorkshop(self.scanner).bound(setting_rad)
+
+    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+        """See `Workshop`; refused as well where clearance, loads, walls or beams fail."""
+        made = self.made(setting_rad)
+        return made if isinstance(made, Refused) else made.shadow
+
+    def made(self, setting_rad: Array) -> BuiltSetting | Refused:
+        """The parts of a setting, or why there can be none."""
+        key = tuple(round(math.degrees(angle), 2) for angle in setting_rad)
+        if key not in self._made:
+            self._made[key] = _made(at_setting(self.scanner, setting_rad))
+        return self._made[key]
+
+
+def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
+    """The best setting of a candidate that can be built, and everything that decides.
+
+    Args:
+        loaded: the candidate's task.
+        found: `search_candidate` of its search record.
+
+    Raises:
+        InstallError: the CAD kernel is not there.
+    """
+    require_kernel("study")
+    families = tuple(_family(entry) for entry in found["families"])
+    loaded = with_motion(loaded, found)
+    try:
+        problem = problem_of(loaded)
+        bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
+        chosen = choose(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
+    except ScanwrightError as error:
+        return {"status": "refused", "reason": why(error, loaded)}
+    setting, score = chosen.family.angles_rad, chosen.family.score
+    made = bench.made(setting)  # known by now
+    assert not isinstance(made, Refused)
+    seen = problem.with_beams(problem.bearings_rad[~made.shadow.beams], problem.lines, problem.sweep)
+    values = {
+        "J": score.J,
+        "density_gain": density_gain(problem, found["standard_J"], score.J),
+        "blind_fraction": coverage(seen, setting).blind_fraction,
+        "line_gap_deg": gaps(problem, setting).line_gap_deg,
+        "period_s": loaded.task.motion.duration_s,
+        "shortest_period_s": _shortest(problem, loaded, chosen.family),
+        "hidden_fraction": chosen.hidden,
+        **made.values,
+    }
+    return {
+        "status": "built",
+        "angles_deg": list(chosen.family.angles_deg),
+        "J_error": six_digits(score.J_error),
+        "values": {name: six_digits(value) for name, value in values.items()},
+        "weakest": made.weakest,
+        "settings_built": chosen.built,
+        "settings_refused": list(chosen.refused),
+        "families_open": chosen.open,
+    }
+
+
+def _family(entry: dict[str, Any]) -> Family:
+    grid = entry["grid_deg"]
+    return Family(
+        angles_deg=tuple(entry["angles_deg"]),
+        score=Score(**entry["score"]),
+        members=entry["members"],
+        word=entry["word"],
+        grid_deg=None if grid is None else tuple(grid),
+    )
+
+
+def _shortest(problem: Problem, loaded: LoadedTask, family: Family) -> float | None:
+    """See `COLUMNS`; None where not even the row's own period brings so many."""
+    least = int(np.ceil(loaded.task.limits.min_density or 1))
+    if loaded.task.motion.mode != "spin" or family.score.least < least:
+        return None
+    try:
+        return shortest_period_s(problem, family.angles_rad, loaded.lidar.scan_rate_hz, least)
+    except TaskError:
+        return None
+
+
+def _made(scanner: Scanner) -> BuiltSetting | Refused:
+    from cad.assembly.make import make_parts
+    from cad.checks.run import run_checks
+
+    try:
+        assembly = make_parts(scanner)
+        checks, shadow = run_checks(scanner, assembly, lambda _: None)
+    except BuildError as error:
+        return Refused(str(error))
+    failed = [check.message for check in checks if check.severity == "error"]
+    return Refused(failed[0]) if failed else _weighed(scanner, assembly, checks, shadow)
+
+
+def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: Shadow) -> BuiltSetting:
+    from cad.assembly.masses import link_bodies
+
+    margins = {
+        check.kind: check.limit / check.value
+        for check in checks
+        if check.kind in LOADS and check.limit is not None and check.value
+    }
+    weakest = min(margins, key=lambda kind: margins[kind], default="")
+    ring = () if scanner.slip_ring is None else (scanner.slip_ring,)
+    values = {
+        "mass_g": 1000 * sum(body.mass_kg for body in link_bodies(scanner, assembly).values()),
+        "load_margin": margins.get(weakest),
+        "deflection_deg": next((check.value for check in checks if check.kind == BENDS), None),
+        "cost_usd": price_usd([scanner.lidar, scanner.servo, *ring, *assembly.layout.drive.products]),
+    }
+    return BuiltSetting(shadow, values, weakest)

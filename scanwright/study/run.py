@@ -1,0 +1,290 @@
+"""A study from first to last: search, bound, judge what no bound rules out, and tell every candidate's fate.
+
+The answer does not depend on who finished first. A candidate is left out where its bound is beaten by a finished one;
+what beats it is itself on the final front, or beaten by one that is. So a candidate counts as `dominated` where the
+final front beats its bound, also if it happened to be made before that was known, and every other one has been made.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from cad.kernel import require_kernel
+from design.frames import Array
+from design.task.task import NAMES, LoadedTask
+from scanwright.pipeline.build import build_task
+from scanwright.study.bench import judge_candidate
+from scanwright.study.candidate import addresses, bounds_of, search_candidate, search_record, winner_task
+from scanwright.study.crossing import AXES, Combination, Crossing
+from scanwright.study.front import Front, costs
+from scanwright.study.results import Result, Results, open_results
+from scanwright.study.study import load_study
+from scanwright.study.table import Row, write_answer
+from scanwright.study.units import Crew, Finished, Unit, finished
+from scanwright.study.workers import crew_of
+
+Say = Callable[[str], None]
+
+
+def run_study(
+    study: Path,
+    out: Path | None,
+    results: Path | None,
+    scheduler: str | None,
+    processes: int | None,
+    say: Say,
+) -> Iterator[str]:
+    """Do what is not yet done of a study, write its tables, and build its winners; yields what it came to, in lines.
+
+    Args:
+        study: file, or name of a shipped study.
+        out: folder of tables and winners; out/STUDY if not told.
+        results: folder of results, shared with the workers or not; OUT/results if not told.
+        scheduler: address of a running Dask scheduler; None for processes of this computer.
+        processes: of this computer; one for each core if not told.
+        say: takes progress.
+
+    Raises:
+        InstallError: the CAD kernel, or Dask for a scheduler, is not there.
+        TaskError: the study is malformed, or the scheduler is not there.
+        BuildError: a folder cannot be written, or nobody can do the work any more.
+    """
+    require_kernel("study")
+    crossing = Crossing(load_study(study))
+    folder = out or Path("out") / crossing.loaded.study.name
+    run = StudyRun(crossing, open_results(results or folder / "results"))
+    with crew_of(scheduler, processes) as crew:
+        run.work(crew, say)
+    yield from write_answer(crossing.loaded.study, run.rows(), folder)
+    yield run.tally.line()
+    for combination, loaded in run.winners():
+        target = folder / combination.name
+        made = build_task(loaded, target, say).made
+        yield f"built {target}" if made else f"{target}: nothing has changed, no work to do"
+    if (folder / "study.parquet").exists():
+        yield f"wrote study.csv, study.parquet and front.png to {folder}"
+    else:
+        yield f"wrote study.csv and front.png to {folder}; study.parquet needs pip install 'scanwright[cluster]'"
+
+
+@dataclass(slots=True)
+class Tally:
+    """What was done in one run, and what it was worth."""
+
+    searches: int = 0
+    judged: int = 0
+    looked_up: int = 0
+    beaten: int = 0
+    seconds: float = 0.0
+    memory_mb: float = 0.0
+
+    def line(self) -> str:
+        """For a person."""
+        worked = f", {self.seconds:,.0f} s of work, {self.memory_mb:,.0f} MB the most of a worker"
+        return (
+            f"this run: {self.searches:,} searches, {self.judged:,} candidates made, {self.looked_up:,} looked up, "
+            f"{self.beaten:,} beaten before they were made{worked if self.seconds else ''}"
+        )
+
+
+@dataclass(slots=True)
+class StudyRun:
+    """A study at work.
+
+    Attributes:
+        crossing: its candidates.
+        results: so far.
+        judge: what makes a candidate.
+        search: what searches one.
+        tally: of this run.
+        fronts: of each task.
+    """
+
+    crossing: Crossing
+    results: Results
+    judge: Callable[[LoadedTask, Result], Result] = judge_candidate
+    search: Callable[[LoadedTask], Result] = search_candidate
+    tally: Tally = field(default_factory=Tally)
+    fronts: list[Front] = field(init=False)
+    _bounds: Array = field(init=False)
+    _failures: dict[str, str] = field(default_factory=dict)
+    _at_work: dict[str, list[int]] = field(default_factory=dict)  # address -> candidates that it stands for
+
+    def __post_init__(self) -> None:
+        columns = len(self.crossing.loaded.study.front)
+        self.fronts = [Front(columns) for _ in self.crossing.loaded.tasks]
+        self._bounds = np.full((len(self.crossing), columns), np.nan)
+
+    def work(self, crew: Crew, say: Say) -> None:
+        """Do what is not yet done."""
+        limit_s = self.crossing.loaded.study.time_limit_s
+        watch = _Watch("searches", len(self.crossing), say)
+        for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.tell):
+            self.tally.searches += self._end(ended, watch)
+        self._bound()
+        watch = _Watch("candidates", int((~np.isnan(self._bounds[:, 0])).sum()), say)
+        for ended in finished(crew, self._candidates(watch), self.results, limit_s, watch.tell):
+            numbers = self._at_work[ended.unit.address]
+            worked = self._end(ended, watch)
+            self.tally.judged += worked
+            if ended.done is not None:
+                self.tally.looked_up += len(numbers) - worked
+                for number in numbers:
+                    self._enter(number, ended.done.result)
+        watch.tell()
+
+    def rows(self) -> Iterator[Row]:
+        """The fate of every candidate, in the order of the study."""
+        for combination in self.crossing:
+            yield self._row(combination)
+
+    def winners(self) -> list[tuple[Combination, LoadedTask]]:
+        """What is to be built: of each task the first of its front, by its columns, as tasks of one setting."""
+        winners = []
+        for front in self.fronts:
+            order = np.lexsort((front.numbers, *front.costs.T[::-1]))
+            for number in map(int, front.numbers[order][: self.crossing.loaded.study.winners]):
+                combination = self.crossing[number]
+                assert combination.loaded is not None
+                found, built = (self.results.get(at) for at in addresses(combination.loaded))
+                assert found is not None and built is not None
+                winners.append((combination, winner_task(combination.loaded, found, built)))
+        return winners
+
+    def _searches(self, watch: _Watch) -> Iterator[Unit]:
+        for combination in self.crossing:
+            if combination.loaded is not None:
+                at, _ = addresses(combination.loaded)
+                if at not in self._failures and at not in self._at_work and not self.results.has(at):
+                    self._at_work[at] = [combination.number]
+                    yield Unit(at, self.search, (search_record(combination.loaded),))
+                    continue
+            watch.count()
+
+    def _candidates(self, watch: _Watch) -> Iterator[Unit]:
+        """Those first that are likely to beat others; those that what is finished beats are left out."""
+        todo = np.flatnonzero(~np.isnan(self._bounds[:, 0]))
+        for number in map(int, todo[np.argsort(_mean_rank(self._bounds[todo]), kind="stable")]):
+            combination = self.crossing[number]
+            assert combination.loaded is not None
+            search, at = addresses(combination.loaded)
+            if self.fronts[combination.group].beater(self._bounds[number]) is not None:
+                self.tally.beaten += 1
+            elif at in self._at_work:
+                self._at_work[at].append(number)
+            elif at not in self._failures:
+                self._at_work[at] = [number]
+                yield Unit(at, self.judge, (combination.loaded, self.results.get(search)))
+                continue
+            watch.count()
+
+    def _bound(self) -> None:
+        """What no candidate can be better than, NaN where there is nothing to make; enters what was made before."""
+        names = self.crossing.loaded.study.front
+        for combination in self.crossing:
+            if combination.loaded is None:
+                continue
+            search, at = addresses(combination.loaded)
+            found = self.results.get(search)
+            if found is not None and found["status"] == "found":
+                self._bounds[combination.number] = costs(bounds_of(combination.loaded, found), names)
+                self._enter(combination.number, self.results.get(at))
+
+    def _enter(self, number: int, result: Result | None) -> None:
+        if result is not None and result["status"] == "built":
+            self.fronts[self.crossing[number].group].add(number, self._cost(number, result))
+
+    def _cost(self, number: int, result: Result) -> Array:
+        """Of a finished candidate; never below its bound, not even within the error of its numbers."""
+        return np.maximum(costs(result["values"], self.crossing.loaded.study.front), self._bounds[number])
+
+    def _end(self, ended: Finished, watch: _Watch) -> bool:
+        """Count a unit that is over; whether a worker has done it in this run."""
+        del self._at_work[ended.unit.address]
+        seconds = None
+        if ended.done is None:
+            self._failures[ended.unit.address] = ended.failure
+        else:
+            seconds = ended.done.seconds
+            self.tally.seconds += seconds or 0.0
+            self.tally.memory_mb = max(self.tally.memory_mb, ended.done.memory_mb)
+        watch.count(timed=seconds is not None)
+        return seconds is not None
+
+    def _row(self, combination: Combination) -> Row:
+        row: Row = {"name": combination.name} | {axis: combination.choice[axis] for axis in AXES}
+        loaded = combination.loaded
+        if loaded is None:
+            return row | {"status": "refused", "reason": combination.refused}
+        row |= {"sensor": loaded.task.sensor, "servo": loaded.task.servo, "printer": loaded.task.printer}
+        row |= {"slip_ring": loaded.task.slip_ring or ""}
+        search, at = addresses(loaded)
+        found = self.results.get(search)
+        if found is None:
+            return row | {"status": "failed", "reason": self._failures.get(search, "not searched")}
+        if found["status"] != "found":
+            return row | {"status": "refused", "reason": found["reason"]}
+        front = self.fronts[combination.group]
+        beater = front.beater(self._bounds[combination.number])
+        if beater is not None:
+            return row | {"status": "dominated", "reason": f"not made: {self.crossing[beater].name} beats its bound"}
+        result = self.results.get(at)
+        if result is None:
+            return row | {"status": "failed", "reason": self._failures.get(at, "not made")}
+        if result["status"] != "built":
+            return row | {"status": "refused", "reason": result["reason"]}
+        row |= {f"{name}_deg": angle for name, angle in zip(NAMES, result["angles_deg"], strict=True)}
+        row |= {"J_error": result["J_error"], "weakest": result["weakest"]} | result["values"]
+        beater = front.beater(self._cost(combination.number, result))
+        if beater is None:
+            return row | {"status": "front", "reason": ""}
+        return row | {"status": "built", "reason": f"{self.crossing[beater].name} is as good or better in every way"}
+
+
+def _mean_rank(bounds: Array) -> Array:
+    """Mean over the columns of the share of candidates that are better there, shape (candidates,)."""
+    shares = np.zeros(len(bounds))
+    for column in bounds.T:
+        _, ranks = np.unique(column, return_inverse=True)
+        shares += ranks / max(1, len(column) - 1) / bounds.shape[1]
+    return shares
+
+
+@dataclass(slots=True)
+class _Watch:
+    """Progress of one stage, told at most once a second, with an estimate of what is left."""
+
+    what: str
+    total: int
+    say: Say
+    over: int = 0
+    timed: int = 0
+    start: float = field(default_factory=time.monotonic)
+    told: float = 0.0
+
+    def count(self, timed: bool = False) -> None:
+        self.over += 1
+        self.timed += timed
+        if time.monotonic() - self.told > 1.0:
+            self.tell()
+
+    def tell(self, width: int | None = None) -> None:
+        """Say where the study stands; where it is told how many can be at work and that is none, that too."""
+        self.told = time.monotonic()
+        share = self.over / self.total if self.total else 1.0
+        line = f"{self.what}: {self.over:,} of {self.total:,} over ({share:.0%})"
+        if self.over < self.total:
+            left_s = (self.total - self.over) * (self.told - self.start) / self.timed if self.timed else None
+            line += "; the first ones are at work" if left_s is None else f"; {_about(left_s)} left"
+        self.say(line + ("; no worker is there, waiting for one" if width == 0 else ""))
+
+
+def _about(seconds: float) -> str:
+    if seconds < 90:
+        return f"about {seconds:.0f} s"
+    return f"about {seconds / 60:.0f} min" if seconds < 5400 else f"about {seconds / 3600:.1f} h"

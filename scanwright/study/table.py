@@ -1,0 +1,125 @@
+"""What a study came to: `study.csv` and `study.parquet` with a row for every candidate, and the lines for a person."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from design.atomic_file import whole_file
+from design.errors import BuildError
+from design.task.task import NAMES
+from scanwright.study.crossing import AXES
+from scanwright.study.front import COLUMNS, costs
+from scanwright.study.front_picture import front_picture
+from scanwright.study.study import Study
+
+Row = dict[str, Any]
+"""One candidate: see `FIELDS`; what it has no value for is left out."""
+
+NUMBERS = (*(f"{name}_deg" for name in NAMES), *COLUMNS, "J_error")
+FIELDS = ("name", *AXES, "status", "reason", *NUMBERS, "weakest")
+STATUSES = {
+    "front": "on the front of their task",
+    "built": "made and beaten",
+    "dominated": "their bound is beaten",
+    "refused": "cannot be built",
+    "failed": "could not be finished",
+}
+GROUP = 10_000  # rows of a Parquet group, which is what is held in memory
+MOST_REASONS = 5
+
+
+def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
+    """Write the tables and `front.png`; what they say in short.
+
+    Raises:
+        BuildError: they cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BuildError(f"{folder}: cannot write the study: {error.strerror}") from error
+    front: list[Row] = []
+    reasons: Counter[tuple[str, str]] = Counter()
+
+    def noted() -> Iterator[Row]:
+        for row in rows:
+            if row["status"] == "front":
+                front.append(row)
+            elif row["status"] in ("refused", "failed"):
+                reasons[row["status"], row["reason"]] += 1
+            yield row
+
+    statuses = write_tables(folder, noted())
+    candidates = f"{statuses.total():,} candidates"
+    title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
+    left = front_picture(folder / "front.png", folder / "study.csv", title, study.front)
+    shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
+    told = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
+    told += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
+    if len(reasons) > MOST_REASONS:
+        told.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
+    if left:
+        told.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
+    return told
+
+
+def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:
+    """Write both tables, whole or not at all; how many rows have each status. No Parquet without pyarrow.
+
+    Raises:
+        BuildError: they cannot be written.
+    """
+    statuses: Counter[str] = Counter()
+    with ExitStack() as open_files:
+        text = open_files.enter_context(whole_file(folder / "study.csv", BuildError))
+        file = open_files.enter_context(text.open("w", encoding="utf-8", newline=""))
+        add_group = open_files.enter_context(_parquet(folder / "study.parquet"))
+        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        writer.writeheader()
+        for group in _groups(rows):
+            writer.writerows(group)
+            statuses.update(row["status"] for row in group)
+            add_group(group)
+    return statuses
+
+
+@contextmanager
+def _parquet(path: Path) -> Iterator[Callable[[list[Row]], None]]:
+    """What adds rows to a table; it adds nothing, and an older table goes, where pyarrow is not installed."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        path.unlink(missing_ok=True)
+        yield lambda _: None
+        return
+    schema = pa.schema([(name, pa.float64() if name in NUMBERS else pa.string()) for name in FIELDS])
+    with whole_file(path, BuildError) as part, pq.ParquetWriter(part, schema) as parquet:
+        yield lambda rows: parquet.write_table(
+            pa.Table.from_pylist([{name: row.get(name) for name in FIELDS} for row in rows], schema)
+        )
+
+
+def _groups(rows: Iterable[Row]) -> Iterator[list[Row]]:
+    rows = iter(rows)
+    while group := list(islice(rows, GROUP)):
+        yield group
+
+
+def _front_lines(rows: list[Row], columns: tuple[str, ...]) -> list[str]:
+    """The front as a table for a terminal, the best of each task by the first column first."""
+    if not rows:
+        return ["no candidate could be built"]
+    shown = list(dict.fromkeys([*columns, "period_s", "hidden_fraction", "load_margin"]))
+    width = max(len(row["name"]) for row in rows)
+    lines = [" " * width + "".join(f"  {name:>15}" for name in shown)]
+    for row in sorted(rows, key=lambda row: (row["task"], float(costs(row, columns[:1])[0]), row["name"])):
+        numbers = ("?" if row.get(name) is None else f"{row[name]:,.6g}" for name in shown)
+        lines.append(f"{row['name']:{width}}" + "".join(f"  {number:>15}" for number in numbers))
+    return lines

@@ -1,0 +1,206 @@
+"""Units of work over an executor, a window of them at a time: the client stays small however many there are.
+
+A unit is looked up, else computed under a time limit, and kept at once by the worker that has it. One that fails or
+whose worker dies is asked for again, `TRIES` times in all; what fails then is told as a failure.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from design.errors import BuildError, ScanwrightError
+from scanwright.study.results import Result, Results, program
+
+TRIES = 3
+TICK_S = 5.0  # between two words on a long silence
+DEATHS = ("BrokenProcessPool", "KilledWorker")  # by name: Dask need not be there
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A pure function and its arguments; `address` is that of its result."""
+
+    address: str
+    function: Callable[..., Result]
+    arguments: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What a worker hands back.
+
+    Attributes:
+        result: of the unit.
+        seconds: it took, None where the result was there.
+        memory_mb: the most that the worker has ever had.
+        kept: whether the result is in the results folder.
+    """
+
+    result: Result
+    seconds: float | None
+    memory_mb: float
+    kept: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A unit that is over: what it came to, or why there is nothing."""
+
+    unit: Unit
+    done: Done | None
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Crew:
+    """Who does the work.
+
+    Attributes:
+        executor: takes the units.
+        width: how many of them can be at work now; raises BuildError where nobody will come.
+    """
+
+    executor: Executor
+    width: Callable[[], int]
+
+
+def finished(
+    crew: Crew,
+    units: Iterable[Unit],
+    results: Results,
+    limit_s: float,
+    tick: Callable[[int], None] = lambda _: None,
+) -> Iterator[Finished]:
+    """Do units; they come back in the order they end.
+
+    `units` is asked for the next one only when there is room, so it may look at what has come back so far.
+
+    Args:
+        crew: who does them.
+        units: what to do; those in the results folder are looked up and not sent.
+        results: where results are kept.
+        limit_s: that a unit may take.
+        tick: called in a long silence with the width of the crew.
+
+    Raises:
+        BuildError: nobody can do the work any more, or somebody's results would differ.
+    """
+    waiting = ((unit, 1) for unit in units)
+    again: list[tuple[Unit, int]] = []
+    at_work: dict[Future[Done], tuple[Unit, int]] = {}
+    more = True
+    while more or again or at_work:
+        while (more or again) and len(at_work) < max(1, crew.width()):
+            asked = again.pop() if again else next(waiting, None)
+            if asked is None:
+                more = False
+                continue
+            known = results.get(asked[0].address)
+            if known is None:
+                at_work[crew.executor.submit(do, asked[0], results, program(), limit_s)] = asked
+            else:
+                yield Finished(asked[0], Done(known, None, 0.0, True))
+        ended, _ = wait(at_work, TICK_S, FIRST_COMPLETED)
+        if at_work and not ended:
+            tick(crew.width())
+        for future in ended:
+            unit, tries = at_work.pop(future)
+            try:
+                done = future.result()
+            except (ScanwrightError, CancelledError):  # not the unit's fault: what it refuses is a result
+                raise
+            except ImportError as error:
+                raise BuildError(f"a worker cannot take part ({error}): install the same scanwright there") from error
+            except Exception as error:
+                if tries < TRIES:
+                    again.append((unit, tries + 1))
+                else:
+                    yield Finished(unit, None, _reason(error, limit_s))
+                continue
+            if not done.kept:
+                results.put(unit.address, done.result)
+            yield Finished(unit, done)
+
+
+def do(unit: Unit, results: Results, asked_by: dict[str, str], limit_s: float) -> Done:
+    """Do a unit, as a worker.
+
+    Args:
+        unit: what to do.
+        results: folder of the client; used if this worker sees it.
+        asked_by: `program` of the client.
+        limit_s: after which the worker ends itself.
+
+    Raises:
+        BuildError: this worker's program is another one.
+    """
+    own = program()
+    differs = sorted(name for name in own.keys() | asked_by.keys() if own.get(name) != asked_by.get(name))
+    if differs:
+        name = differs[0]
+        more = f" (and {len(differs) - 1} more)" if len(differs) > 1 else ""
+        raise BuildError(
+            f"a worker has {name} {own.get(name, 'missing')}, this computer {asked_by.get(name, 'missing')}{more}: "
+            "results would differ; install the same versions, and run the study again: it goes on"
+        )
+    here = results.is_here()
+    known = results.get(unit.address) if here else None
+    if known is not None:
+        return Done(known, None, _memory_mb(), True)
+    start = time.monotonic()
+    with _limited(limit_s):
+        result = unit.function(*unit.arguments)
+        if here:
+            results.put(unit.address, result)
+    return Done(result, time.monotonic() - start, _memory_mb(), here)
+
+
+_deadlines: dict[int, float] = {}  # of the threads of this process, which has but one alarm
+_lock = threading.Lock()
+
+
+@contextmanager
+def _limited(limit_s: float) -> Iterator[None]:
+    """End the process when the block takes longer: by an alarm of the system, which no held lock can stop.
+
+    A process that no other one has made is the client itself, or a worker that nobody would start again: none there.
+    """
+    if multiprocessing.parent_process() is None:
+        yield
+        return
+    me = threading.get_ident()
+    try:
+        with _lock:
+            _deadlines[me] = time.monotonic() + limit_s
+            _set_alarm()
+        yield
+    finally:
+        with _lock:
+            del _deadlines[me]
+            _set_alarm()
+
+
+def _set_alarm() -> None:
+    left_s = max(1e-3, min(_deadlines.values()) - time.monotonic()) if _deadlines else 0.0  # 0: no alarm
+    signal.setitimer(signal.ITIMER_REAL, left_s)
+
+
+def _memory_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _reason(error: Exception, limit_s: float) -> str:
+    """Why a unit has no result, the same words whichever worker it was."""
+    if type(error).__name__ in DEATHS:
+        return f"every worker that tried died: killed, out of memory, or longer than time_limit_s = {limit_s:g}"
+    said = str(error).splitlines()
+    return f"{type(error).__name__}: {said[0] if said else 'no message'}"

@@ -1,0 +1,146 @@
+"""Who does the work of a study: processes of this computer, or the workers of a Dask scheduler that its user runs."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import AbstractContextManager, contextmanager
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+from design.concurrency.second_process import cores, kill, spawn_pool
+from design.errors import BuildError, TaskError, require
+from scanwright.study.units import Crew
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
+CONNECT_S = 10.0
+ALONE_S = 60.0  # without any worker: a nanny whose worker dies while it starts gives up
+LOOK_S = 5.0  # between two looks at who is there
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # as Dask sets for its own workers
+
+
+def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractContextManager[Crew]:
+    """The crew of a running scheduler, or processes of this computer that end with the block.
+
+    Args:
+        scheduler: address such as tcp://HOST:PORT; None for this computer.
+        processes: of this computer; as many as it has cores if not told.
+
+    Raises:
+        InstallError: Dask is not installed.
+        TaskError: the scheduler is not there, or no scheduler at all can be.
+        BuildError: while it works: the scheduler is gone, or no worker has been there for a minute.
+    """
+    return _here(processes or cores()) if scheduler is None else _at_scheduler(scheduler)
+
+
+class SingleProcesses(Executor):
+    """Processes, each a pool of its own: one that dies breaks its pool, and takes nobody else's work with it.
+
+    In one pool the death of a worker ends all the others, and nobody can tell whose unit it was that killed it.
+    """
+
+    def __init__(self, processes: int) -> None:
+        self._pools = [spawn_pool() for _ in range(processes)]
+        self._idle: SimpleQueue[int] = SimpleQueue()
+        for number in range(processes):
+            self._idle.put(number)
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """See `Executor`; waits for a process that has nothing to do. A dead one is replaced."""
+        number = self._idle.get()
+        # born with Ctrl-C held back: it may come before the process can turn a deaf ear
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            future = self._pools[number].submit(fn, *args, **kwargs)
+        except BrokenExecutor:
+            self._pools[number] = spawn_pool()
+            future = self._pools[number].submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        future.add_done_callback(lambda _: self._idle.put(number))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002  one way to end
+        """End all processes, at work or not."""
+        for pool in self._pools:
+            kill(pool)
+
+
+@contextmanager
+def _here(processes: int) -> Iterator[Crew]:
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        with SingleProcesses(processes) as executor:
+            yield Crew(executor, lambda: processes)
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
+
+
+@contextmanager
+def _at_scheduler(address: str) -> Iterator[Crew]:
+    require("cluster", "--scheduler needs Dask", "dask", "distributed")
+    from distributed import Client
+
+    if not ADDRESS.fullmatch(address):
+        raise TaskError(f"--scheduler = '{address}': an address is tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
+    for name in ("distributed", "distributed.client"):  # deaths are told in the table, or in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise TaskError(
+            f"--scheduler = '{address}': no scheduler answers there ({said}): start one with `dask scheduler`, "
+            "and give the tcp:// address that it prints"
+        ) from error
+    with client:
+        try:
+            # pure: the same unit asked for again would get the future of its failure
+            yield Crew(client.get_executor(pure=False), _Threads(client, address))
+        except Exception as error:  # whatever the transport raises, and futures that it has cancelled
+            if client.status == "running":
+                raise
+            raise BuildError(
+                f"the scheduler at {address} is gone: run the study again, it goes on where it was"
+            ) from error
+
+
+class _Threads:
+    """How many threads of workers a scheduler has, looked up now and then."""
+
+    def __init__(self, client: Client, address: str) -> None:
+        self._client, self._address = client, address
+        self._looked = self._seen = time.monotonic()
+        self._number = self._now()
+
+    def __call__(self) -> int:
+        if time.monotonic() - self._looked > (LOOK_S if self._number else 0.1):
+            self._number = self._now()
+        if self._seen < self._looked - ALONE_S:
+            raise BuildError(
+                f"no worker has been there for {ALONE_S:g} s: start `dask worker {self._address} --nthreads 1`, "
+                "and run the study again: it goes on"
+            )
+        return self._number
+
+    def _now(self) -> int:
+        number = sum(self._client.nthreads().values())
+        self._looked = time.monotonic()
+        self._seen = self._looked if number else self._seen
+        return number
