@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from design.frames import Array
+from design.arrays import Array
 
 
 def diamond(half: float, y: float) -> Array:

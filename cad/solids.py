@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
+from design.arrays import Array
 from design.errors import BuildError
-from design.frames import Array
 
 
 @contextmanager

@@ -18,12 +18,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError
 
 from design import frames
+from design.arrays import Pose, Rotation, Setting, Vector
 from design.errors import TaskError
-from design.frames import Array
 from design.motion import Motion
 from design.record import Record, explain
 
@@ -31,7 +33,7 @@ STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
 
 
-def standard_settings() -> dict[str, Array]:
+def standard_settings() -> dict[str, Setting]:
     """The standard alignments in radians: what an optimum is compared with."""
     return {name: np.radians(angles) for name, angles in STANDARD_DEG.items()}
 
@@ -67,28 +69,28 @@ class AngleSet(Record):
     covariance: tuple[tuple[float, float, float, float], ...] | None = Field(default=None, min_length=4, max_length=4)
     versions: dict[str, str] = Field(default_factory=dict)
 
-    def R_rot_laser(self) -> Array:
+    def R_rot_laser(self) -> Rotation:
         """Orientation of the laser in the rotation frame, calibration included, shape (3, 3)."""
         a = self.angles_deg
         designed = frames.R_rot_laser(*np.radians([a.alpha_laser, a.beta_laser, a.gamma_laser]))
         return frames.rotvec_to_matrix(np.radians([*self.delta_rotvec_rot_deg, 0.0])) @ designed
 
-    def T_rot_laser(self) -> Array:
+    def T_rot_laser(self) -> Pose:
         """Pose of the laser in the rotation frame [m], shape (4, 4)."""
         return frames.rigid(self.R_rot_laser(), np.array(self.t_rot_laser_mm) / 1000)
 
-    def T_world_rot(self, joint_rad: ArrayLike) -> Array:
+    def T_world_rot(self, joint_rad: ArrayLike) -> Float[ndarray, "*k 4 4"]:
         """Pose of the turning rotation frame in the world [m] at joint positions [rad], shape (..., 4, 4)."""
         a = self.angles_deg
         gamma = np.asarray(joint_rad, dtype=float) + np.radians(a.gamma_rot)
         R = frames.R_world_rot(np.radians(a.alpha_rot), np.radians(a.beta_rot), gamma)
         return frames.rigid(R, np.array(self.t_world_rot_mm) / 1000)
 
-    def T_world_laser(self, joint_rad: ArrayLike) -> Array:
+    def T_world_laser(self, joint_rad: ArrayLike) -> Float[ndarray, "*k 4 4"]:
         """Pose of the laser in the world [m] at joint positions [rad], shape (..., 4, 4)."""
         return self.T_world_rot(joint_rad) @ self.T_rot_laser()
 
-    def axis_world(self) -> Array:
+    def axis_world(self) -> Vector:
         """Unit vector of the rotation axis in the world, shape (3,)."""
         return self.T_world_rot(0.0)[:3, 2]
 

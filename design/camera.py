@@ -16,10 +16,12 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from pydantic import Field, model_validator
 
 from design import frames
-from design.frames import Array
+from design.arrays import Pose
 from design.record import Record
 
 Pixels = Annotated[int, Field(strict=True, ge=1, le=100_000)]
@@ -54,18 +56,18 @@ class Camera(Record):
             raise ValueError(f"distortion has {len(self.distortion)} numbers, a {self.model} camera {allowed}")
         return self
 
-    def T_frame_camera(self) -> Array:
+    def T_frame_camera(self) -> Pose:
         """Pose of the camera in its frame [m], shape (4, 4)."""
         return frames.rigid(frames.rotvec_to_matrix(np.radians(self.rotvec_deg)), np.array(self.position_mm) / 1000)
 
-    def pixels(self, points_m: Array) -> Array:
+    def pixels(self, points_m: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
         """Where points of the camera frame, shape (n, 3), are seen, (n, 2); NaN outside of the image."""
         x, y = self._pinhole(points_m) if self.model == "pinhole" else self._fisheye(points_m)
         uv = np.stack([x, y], axis=1) * self.focal_px + self.centre_px
         inside = np.all((uv >= -0.5) & (uv < np.array(self.size_px) - 0.5), axis=1)
         return np.where(inside[:, None], uv, np.nan)
 
-    def _pinhole(self, points_m: Array) -> tuple[Array, Array]:
+    def _pinhole(self, points_m: Float[ndarray, "n 3"]) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         k1, k2, p1, p2, k3 = (*self.distortion, *(0.0,) * (5 - len(self.distortion)))
         ahead = points_m[:, 2] > 0
         x, y = np.divide(points_m[:, :2].T, points_m[:, 2], where=ahead, out=np.full((2, len(points_m)), np.nan))
@@ -77,7 +79,7 @@ class Camera(Record):
             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
         )
 
-    def _fisheye(self, points_m: Array) -> tuple[Array, Array]:
+    def _fisheye(self, points_m: Float[ndarray, "n 3"]) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         aside = np.hypot(points_m[:, 0], points_m[:, 1])
         t = np.arctan2(aside, points_m[:, 2])
         t[t > _fold(self.distortion)] = np.nan

@@ -8,41 +8,40 @@ scan plane).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from jaxtyping import Float
+from numpy import ndarray
+from numpy.typing import ArrayLike
 
-Array = NDArray[Any]
-"""float64 unless a docstring says otherwise."""
+from design.arrays import Array, Pose, Rotation
 
 
-def Rx(angle_rad: ArrayLike) -> Array:
+def Rx(angle_rad: ArrayLike) -> Float[ndarray, "*k 3 3"]:
     """Rotation about x, shape (..., 3, 3)."""
     return _axis_rotation(angle_rad, 0)
 
 
-def Ry(angle_rad: ArrayLike) -> Array:
+def Ry(angle_rad: ArrayLike) -> Float[ndarray, "*k 3 3"]:
     """Rotation about y, shape (..., 3, 3)."""
     return _axis_rotation(angle_rad, 1)
 
 
-def Rz(angle_rad: ArrayLike) -> Array:
+def Rz(angle_rad: ArrayLike) -> Float[ndarray, "*k 3 3"]:
     """Rotation about z, shape (..., 3, 3)."""
     return _axis_rotation(angle_rad, 2)
 
 
-def R_world_rot(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Array:
+def R_world_rot(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Float[ndarray, "*k 3 3"]:
     """Rotation frame in the world, `Rx(alpha_rot) Ry(beta_rot) Rz(gamma_rot)` (paper, section 4.1)."""
     return Rx(alpha_rad) @ Ry(beta_rad) @ Rz(gamma_rad)
 
 
-def R_rot_laser(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Array:
+def R_rot_laser(alpha_rad: ArrayLike, beta_rad: ArrayLike, gamma_rad: ArrayLike = 0.0) -> Float[ndarray, "*k 3 3"]:
     """Laser in the rotation frame, `Rz(gamma_laser) Ry(beta_laser) Rx(alpha_laser)` (paper, section 4.1)."""
     return Rz(gamma_rad) @ Ry(beta_rad) @ Rx(alpha_rad)
 
 
-def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Array:
+def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Rotation:
     """Rotation about v by its length (Rodrigues), shape (3, 3)."""
     v = np.asarray(rotvec_rad, dtype=float)
     angle = float(np.linalg.norm(v))
@@ -51,7 +50,7 @@ def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Array:
     return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
 
 
-def rigid(R_a_b: Array, t_a_b: ArrayLike) -> Array:
+def rigid(R_a_b: Float[ndarray, "... 3 3"], t_a_b: ArrayLike) -> Float[ndarray, "*k 4 4"]:
     """4x4 transform from a rotation and the origin of b in a; leading axes broadcast."""
     t = np.asarray(t_a_b, dtype=float)
     T = np.zeros((*np.broadcast_shapes(R_a_b.shape[:-2], t.shape[:-1]), 4, 4))
@@ -61,7 +60,7 @@ def rigid(R_a_b: Array, t_a_b: ArrayLike) -> Array:
     return T
 
 
-def apply(T_a_b: Array, points_b: Array) -> Array:
+def apply(T_a_b: Pose, points_b: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """Points of frame b, shape (n, 3), in frame a."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
 

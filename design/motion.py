@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from design.frames import Array
+from design.arrays import Array
 from design.record import Record
 
 LONGEST_S = 600.0

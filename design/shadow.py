@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float
+from numpy import ndarray
 
 from design.errors import BuildError
-from design.frames import Array
 
 AXIS_STEPS = 720  # equal steps of the axis angle, from 0, in [0, 2 pi)
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,17 +25,17 @@ class Shadow:
         stator: hidden by what stands still, at `AXIS_STEPS` axis angles, shape (B, G); None where it was not asked for.
     """
 
-    beams: Mask
-    stator: Mask | None
+    beams: Bool[ndarray, " beams"]
+    stator: Bool[ndarray, "beams angles"] | None
 
-    def hidden(self) -> Array:
+    def hidden(self) -> Float[ndarray, " beams"]:
         """Share of the axis angles at which each beam is hidden, shape (B,)."""
         if self.stator is None:
             return self.beams.astype(float)
         return np.where(self.beams, 1.0, self.stator.mean(axis=1))
 
 
-def own_body_bytes(shadow: Shadow, bearings_rad: Array) -> bytes:
+def own_body_bytes(shadow: Shadow, bearings_rad: Float[ndarray, " beams"]) -> bytes:
     """`own_body.npz`: arrays `beams`, `stator` (none hidden where it was not asked for) and `bearing_rad`."""
     stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
     stream = io.BytesIO()
@@ -45,7 +43,7 @@ def own_body_bytes(shadow: Shadow, bearings_rad: Array) -> bytes:
     return stream.getvalue()
 
 
-def load_own_body(path: Path) -> tuple[Shadow, Array]:
+def load_own_body(path: Path) -> tuple[Shadow, Float[ndarray, " beams"]]:
     """What the parts hide, and the bearings of the beams [rad], increasing, from `own_body.npz`.
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 
 import scanwright as sw
 from design.frames import Rz, apply, rigid
-from design.scene.ray_caster import scene_of
+from design.scene.ray_caster import build_scene
 from firmware_io.twins.simulated import simulated_recording
 from firmware_io.twins.world import furnished_room
 
@@ -33,7 +33,7 @@ def main() -> None:
     room = furnished_room()  # triangles, (t, 3, 3)
     for name, T_room_world in STANDS.items():
         seen_from = apply(np.linalg.inv(T_room_world), room.reshape(-1, 3)).reshape(-1, 3, 3)
-        seen = simulated_recording(angles, scene_of(seen_from))
+        seen = simulated_recording(angles, build_scene(seen_from))
         r = np.where(np.isfinite(seen.range_m), seen.range_m, np.nan).ravel()
         b = seen.bearing_rad.ravel()
         in_laser = np.stack([r * np.cos(b), r * np.sin(b), 0 * r, np.ones_like(r)], axis=1)

@@ -10,13 +10,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Float32, Float64, Int64
+from numpy import ndarray
 
 from design.errors import RecordingError
-
-Float32s = NDArray[np.float32]
-Floats = NDArray[np.float64]
-Times = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,16 +39,16 @@ class Scan:
     scan_time_s: float
     range_min_m: float
     range_max_m: float
-    range_m: Float32s
-    intensity: Float32s
+    range_m: Float32[ndarray, " n"]
+    intensity: Float32[ndarray, " m"]
 
     @property
-    def bearing_rad(self) -> Floats:
+    def bearing_rad(self) -> Float64[ndarray, " beams"]:
         """Bearing of each beam in the scan plane, shape (n,)."""
         return self.angle_min_rad + self.angle_increment_rad * np.arange(self.range_m.size, dtype=np.float64)
 
     @property
-    def time_ns(self) -> Times:
+    def time_ns(self) -> Int64[ndarray, " beams"]:
         """Time of each beam, shape (n,)."""
         offset_ns = np.rint(np.arange(self.range_m.size) * (self.time_increment_s * 1e9))
         return self.stamp_ns + offset_ns.astype(np.int64)
@@ -69,9 +66,9 @@ class Block:
     """
 
     first: Scan
-    stamp_ns: Times
-    range_m: Float32s
-    intensity: Float32s
+    stamp_ns: Int64[ndarray, " scans"]
+    range_m: Float32[ndarray, "scans beams"]
+    intensity: Float32[ndarray, "scans m"]
 
 
 def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
@@ -116,8 +113,8 @@ class JointLog:
         position_rad: shape (m,), unwrapped (it counts turns), finite.
     """
 
-    time_ns: Times
-    position_rad: Floats
+    time_ns: Int64[ndarray, " n"]
+    position_rad: Float64[ndarray, " n"]
 
     def __post_init__(self) -> None:
         if self.time_ns.shape != self.position_rad.shape or self.time_ns.ndim != 1 or not self.time_ns.size:
@@ -128,7 +125,7 @@ class JointLog:
             where = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
             raise RecordingError(f"joint log: sample {where} is not later than the one before it")
 
-    def angle_at(self, time_ns: Times) -> Floats:
+    def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
         """Angle [rad] at each time, straight between samples, shape (n,).
 
         Outside the log it is NaN: where the axis was before the first and after the last sample nobody knows.
@@ -155,10 +152,10 @@ class AxisCurve:
         coefficient: shape (k, 4); in piece i the angle [rad] is sum_j coefficient[i, j] s^j, s seconds into the piece.
     """
 
-    knot_ns: Times
-    coefficient: Floats
+    knot_ns: Int64[ndarray, " knots"]
+    coefficient: Float64[ndarray, "pieces 4"]
 
-    def angle_at(self, time_ns: Times) -> Floats:
+    def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
         """Angle [rad] at each time, shape (n,); NaN outside the curve."""
         piece = np.searchsorted(self.knot_ns, time_ns, side="right") - 1
         inside = (piece >= 0) & (time_ns <= self.knot_ns[-1])

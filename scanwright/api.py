@@ -20,8 +20,8 @@ from design.errors import RecordingError
 from design.task.task import LoadedTask
 from design.task.task import load_task as load_task
 from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.clouds.files import read_clouds, write_clouds
-from firmware_io.clouds.record import Cloud
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.clouds.formats import read_clouds, write_clouds
 from scanwright.pipeline.build import Build, build_task
 
 if TYPE_CHECKING:
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 
     from cad.assembly.assembly import Assembly
     from cad.checks.check import Check
-    from design.evaluation.comparison import Row
+    from design.evaluation.comparison import ComparisonRow
     from design.evaluation.evaluation import Evaluation
     from design.search.optimum import Optimum
     from firmware_io.assembly.assemble import AssembleSummary
-    from firmware_io.calibration.session import Calibration
-    from firmware_io.lidar.scip.driver import Lidar
+    from firmware_io.calibration.calibrate import Calibration
+    from firmware_io.lidar.scip.driver import ScipLidar
     from firmware_io.recording.arrays import RecordingArrays
     from firmware_io.recording.importer import ImportSummary
     from firmware_io.recording.recording import Recording
-    from firmware_io.registration.session import Session
+    from firmware_io.registration.register_files import RegisteredFiles
     from firmware_io.scan.acquire import ScanSummary
-    from firmware_io.servo.dynamixel.driver import Servo
+    from firmware_io.servo.dynamixel.driver import DynamixelServo
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A task: loaded, the name of a shipped one, a file, or a table with the keys of a task file."""
@@ -82,9 +82,9 @@ def optimise(task: TaskLike, *, say: Say = _quiet) -> Optimum:
         >>> alpha_rot, beta_rot  # this task fixes them: it hangs upside down
         (180.0, 0.0)
     """
-    from design.search.optimum import optimum_of
+    from design.search.optimum import find_optimum
 
-    return optimum_of(_task(task), say)
+    return find_optimum(_task(task), say)
 
 
 def evaluate(
@@ -120,16 +120,16 @@ def evaluate(
     return evaluation.evaluate(loaded, problem, evaluation.setting_rad(angles_deg), pole, say)
 
 
-def compare(task: TaskLike, *, say: Say = _quiet) -> tuple[Optimum, list[Row]]:
+def compare(task: TaskLike, *, say: Say = _quiet) -> tuple[Optimum, list[ComparisonRow]]:
     """Put the optimum of a task beside the usual mounts and ready-made scanners.
 
     Raises:
         TaskError: as for `optimise`.
     """
     from design.evaluation.comparison import compare
-    from design.search.optimum import optimum_of
+    from design.search.optimum import find_optimum
 
-    optimum = optimum_of(_task(task), say)
+    optimum = find_optimum(_task(task), say)
     return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
 
 
@@ -211,7 +211,7 @@ def check(folder: str | Path, *, say: Say = _quiet) -> list[Check]:
     return check_scanner(scanner, say)
 
 
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> Servo:
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> DynamixelServo:
     """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
 
     Args:
@@ -227,7 +227,7 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     return open_servo(port, model, servo_id)
 
 
-def open_lidar(address: str) -> Lidar:
+def open_lidar(address: str) -> ScipLidar:
     """Open a lidar at a serial port or HOST:PORT, whatever it is doing. Use it with `with`.
 
     Raises:
@@ -432,7 +432,7 @@ def calibrate(
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
     """
-    from firmware_io.calibration.session import calibrate_recordings
+    from firmware_io.calibration.calibrate import calibrate_recordings
 
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
     paths = [Path(recording) for recording in recordings]
@@ -448,7 +448,7 @@ def register(
     spacing_m: float = 0.1,
     map_spacing_m: float = 0.02,
     say: Say = _quiet,
-) -> Session:
+) -> RegisteredFiles:
     """Find where clouds stand to each other, from no start if need be, and merge them into one map.
 
     Args:
@@ -463,7 +463,7 @@ def register(
     Raises:
         RecordingError: a file cannot be read or written, or there is only one cloud.
     """
-    from firmware_io.registration.session import register_files
+    from firmware_io.registration.register_files import register_files
 
     target = Path(out)
     tum = target.with_suffix(".tum") if poses is None else Path(poses)
@@ -481,7 +481,7 @@ def read_cloud(path: str | Path) -> Cloud:
     clouds, _unread = read_clouds(Path(path))
     if len(clouds) != 1:
         raise RecordingError(
-            f"{path}: holds {len(clouds)} clouds, not one: firmware_io.clouds.files.read_clouds reads all"
+            f"{path}: holds {len(clouds)} clouds, not one: firmware_io.clouds.formats.read_clouds reads all"
         )
     return clouds[0]
 

@@ -20,9 +20,9 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from design.accuracy.methods import Reference, reference
+from design.arrays import Array
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
-from design.frames import Array
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, quick_J, score
 from design.search.families import EQUAL, Family

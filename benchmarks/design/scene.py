@@ -14,7 +14,7 @@ from statistics import median
 import numpy as np
 import trimesh
 
-from design.scene.ray_caster import cast, load_triangles, scene_of
+from design.scene.ray_caster import build_scene, cast, load_triangles
 
 RAYS = 1_000_000
 HALF_M = np.array([5.0, 4.0, 1.5])
@@ -28,7 +28,7 @@ def main() -> None:
     origins = rng.uniform(-0.99, 0.99, (RAYS, 3)) * HALF_M
     box = trimesh.creation.box(extents=2 * HALF_M)
     true_m = np.min((np.sign(directions) * HALF_M - origins) / directions, axis=1)
-    found = cast(scene_of(np.array(box.triangles)), origins, directions)
+    found = cast(build_scene(np.array(box.triangles)), origins, directions)
     places, rows, _ = box.ray.intersects_location(origins, directions, multiple_hits=False)
     theirs_m = np.linalg.norm(places - origins[rows], axis=1)
     print(
@@ -37,7 +37,7 @@ def main() -> None:
     )
     triangles = load_triangles(Path(sys.argv[1])) if len(sys.argv) > 1 else np.array(box.triangles)
     mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
-    scene, place = scene_of(triangles), np.broadcast_to(triangles.mean(axis=(0, 1)), directions.shape)
+    scene, place = build_scene(triangles), np.broadcast_to(triangles.mean(axis=(0, 1)), directions.shape)
     ours_s, theirs_s = [], []
     for _ in range(5):
         start_s = time.perf_counter()

@@ -20,9 +20,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from design.frames import Array
+from design.arrays import Array
 from design.objective.ball_search import scan_tree
-from design.objective.objectives import Moment, log_density
+from design.objective.named_objectives import Moment, log_density
 from design.objective.problem import Problem, problem_of
 from design.objective.score import score
 from design.search.plane_axis_product import BothWays, both_ways

@@ -31,13 +31,14 @@ from kiss_icp.preprocess import Preprocessor
 from mcap_ros2.reader import read_ros2_messages
 
 from design.angles import Angles, AngleSet, load_angles
+from design.arrays import Floats
 from firmware_io.assembly.axis_curve import interpolation_orders
 from firmware_io.assembly.deskew import place
 from firmware_io.assembly.deskew_kernel import place_block
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.ply import PlyWriter
 from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import AxisCurve, Block, Floats, JointLog, Scan, blocks, straight
+from firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
 
 ROUNDS = 7
 PROGRAM_ROUNDS = 2

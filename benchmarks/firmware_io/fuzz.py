@@ -14,7 +14,7 @@ from unittest.mock import patch
 
 from design.errors import DeviceError, ProtocolError
 from firmware_io.lidar.scip import parameters, protocol
-from firmware_io.servo.dynamixel import bus, port
+from firmware_io.servo.dynamixel import bus, serial_line
 from firmware_io.servo.dynamixel.bus import ServoBus
 from firmware_io.servo.dynamixel.registers import Register
 from firmware_io.twins.servo_packets import status
@@ -134,8 +134,8 @@ def servo(answers: int, seed: int) -> None:
     """Damage answers to one read of a block, and print what became of them."""
     rng, wire = random.Random(seed), Wire()
     with (
-        patch("firmware_io.servo.dynamixel.port.serial.Serial", lambda *_, **__: wire),
-        patch.object(port.Line, "wait_s", 0.0002),
+        patch("firmware_io.servo.dynamixel.serial_line.serial.Serial", lambda *_, **__: wire),
+        patch.object(serial_line.SerialLine, "wait_s", 0.0002),
         patch.object(bus, "_TRIES", 1),
     ):
         buses = {protocol: ServoBus("wire", protocol=protocol) for protocol in (1.0, 2.0)}

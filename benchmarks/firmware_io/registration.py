@@ -16,10 +16,10 @@ import numpy as np
 import small_gicp
 
 from design import frames
+from design.arrays import Floats
 from firmware_io.registration.pairwise import align
 from firmware_io.registration.register import register
-from firmware_io.registration.sensor_view import THREADS, view_of
-from firmware_io.samples import Floats
+from firmware_io.registration.sensor_view import THREADS, make_view
 
 ROUNDS = 7
 PAIRS = 12
@@ -105,7 +105,7 @@ def main() -> None:
             truth = np.linalg.inv(poses[0]) @ poses[1]
             ours = timed(by_us, clouds)
             peer = timed(by_peer, clouds)
-            a, b = (view_of(name, cloud, SPACING_M) for name, cloud in zip("ab", clouds, strict=True))
+            a, b = (make_view(name, cloud, SPACING_M) for name, cloud in zip("ab", clouds, strict=True))
             pair = align(a, b, np.eye(4))
             error = motion(truth, pair.T_a_b)
             normalised.append(error @ np.linalg.solve(pair.covariance, error))
@@ -124,7 +124,7 @@ def main() -> None:
         print(f"  ours / peer: {ratio[0]:.2f} of the wall, {ratio[1]:.2f} of the processor")
         print(f"  squared error in sigmas, mean of {len(normalised)}: {np.mean(normalised):.1f}; 6 is honest")
     boxes, stands = building()
-    views = [view_of(f"{k}", scan(boxes, T, 180, 361, k), 0.15) for k, T in enumerate(stands)]
+    views = [make_view(f"{k}", scan(boxes, T, 180, 361, k), 0.15) for k, T in enumerate(stands)]
     start = time.perf_counter(), time.process_time()
     found = register(views, [], lambda _: None)
     wall, cpu = time.perf_counter() - start[0], time.process_time() - start[1]
@@ -147,7 +147,7 @@ def two_stands(rng: np.random.Generator, lines: int, seed: int) -> tuple[list[Fl
 
 def by_us(a: Floats, b: Floats) -> Floats:
     """Everything: thinning, normals, alignment, verdict."""
-    return align(view_of("a", a, SPACING_M), view_of("b", b, SPACING_M), np.eye(4)).T_a_b
+    return align(make_view("a", a, SPACING_M), make_view("b", b, SPACING_M), np.eye(4)).T_a_b
 
 
 def by_peer(a: Floats, b: Floats) -> Floats:

@@ -21,8 +21,9 @@ import trimesh
 import scanwright as sw
 from benchmarks.scanwright.canvas import Canvas
 from design.angles import AngleSet
-from design.frames import Array, Rz, rigid
-from design.scene.ray_caster import scene_of
+from design.arrays import Array
+from design.frames import Rz, rigid
+from design.scene.ray_caster import build_scene
 from firmware_io.recording.arrays import RecordingArrays
 from firmware_io.twins.simulated import simulated_recording
 
@@ -104,7 +105,7 @@ def surroundings() -> list[trimesh.Trimesh]:
 def cloud(angles: AngleSet, bodies: list[trimesh.Trimesh]) -> Array:
     """Every point of one full scan in the robot's frame [m], shape (n, 3)."""
     triangles = np.concatenate([body.triangles for body in bodies]) - DECK_M
-    points = points_of(simulated_recording(angles, scene_of(triangles), sigma_mm=4.0), angles) + DECK_M
+    points = points_of(simulated_recording(angles, build_scene(triangles), sigma_mm=4.0), angles) + DECK_M
     near = (points[:, 0] > -1.0) & (points[:, 0] < 5.0) & (abs(points[:, 1]) < 3.0)
     on_robot = (abs(points[:, 0]) < 0.45) & (abs(points[:, 1]) < 0.25) & (points[:, 2] > 0.02)
     return points[near & ~on_robot]

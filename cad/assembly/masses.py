@@ -12,7 +12,7 @@ from cad.geometry import inertia
 from cad.geometry.inertia import Inertial
 from cad.layout.drive import Mass, Stack
 from cad.layout.loads import Weight, weight_of
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 

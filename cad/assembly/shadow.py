@@ -15,12 +15,12 @@ import numpy as np
 
 from cad.layout.drive import Stack
 from cad.layout.layout import config_hash, drive_of
+from design.arrays import Array, Mask
 from design.errors import BuildError
-from design.frames import Array
 from design.scanner import Scanner
 from design.scene import ray_caster
 from design.search.with_parts import Refused
-from design.shadow import AXIS_STEPS, Mask, Shadow
+from design.shadow import AXIS_STEPS, Shadow
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
@@ -87,7 +87,7 @@ def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Conta
     for name, triangles in triangles_m.items():
         by_motion[name in turning].append(triangles)
     origins, directions = bundles(scanner)
-    rotor = _hidden(ray_caster.scene_of(np.concatenate(by_motion[True])), origins, directions)
+    rotor = _hidden(ray_caster.build_scene(np.concatenate(by_motion[True])), origins, directions)
     return Shadow(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
 
 
@@ -122,7 +122,7 @@ def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:
     polar = np.arccos(np.clip(-directions[:, :, 2], -1.0, 1.0)).min(axis=1)
     near = np.flatnonzero(polar < widest + margin)
     hidden = np.zeros((len(directions), AXIS_STEPS), bool)
-    solid = ray_caster.scene_of(triangles_m)
+    solid = ray_caster.build_scene(triangles_m)
     for k in range(AXIS_STEPS):
         gamma = 2 * math.pi * k / AXIS_STEPS
         c, s = math.cos(gamma), math.sin(gamma)

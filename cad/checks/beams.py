@@ -10,10 +10,10 @@ import numpy as np
 from cad.assembly.shadow import bundles
 from cad.checks.check import Check, at_most, note
 from cad.layout.names import ALIGNMENT_LINKAGE
-from design.frames import Array
+from design.arrays import Array, Mask
 from design.scanner import Scanner
 from design.scene import ray_caster
-from design.shadow import Mask, Shadow
+from design.shadow import Shadow
 
 OWN_LIMIT_DEG = 2.0  # of the fan that the linkage may hide beyond servo, ring and shaft
 
@@ -50,7 +50,7 @@ def beam_checks(
 def _middle_hidden(scanner: Scanner, triangles_m: Array) -> Mask:
     """Beams whose middle ray meets these parts at gamma = 0."""
     origins, directions = bundles(scanner)
-    hits = ray_caster.cast(ray_caster.scene_of(triangles_m), origins[:, 0], directions[:, 0])
+    hits = ray_caster.cast(ray_caster.build_scene(triangles_m), origins[:, 0], directions[:, 0])
     return np.asarray(np.isfinite(hits.range_m))
 
 

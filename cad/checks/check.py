@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from design.frames import Array
+from design.arrays import Array
 
 Severity = Literal["pass", "note", "warning", "error"]
 

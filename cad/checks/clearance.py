@@ -18,7 +18,7 @@ import shapely
 from cad.assembly.assembly import Assembly
 from cad.checks.check import Check, at_least, at_most
 from cad.geometry.mesh import TriMesh
-from design.frames import Array
+from design.arrays import Array
 
 CHORD = 0.01  # error of an image's edges
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)

@@ -27,7 +27,7 @@ from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.parts.servo_shaft import shaft_is_turned
 from cad.statics.sag import Sag, linkage_sag, with_shaft
 from cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 POSITIONS = 72  # of the servo, around a turn

@@ -19,8 +19,8 @@ from cad.checks.islands import islands_check
 from cad.geometry.holes import Round, rounds_of
 from cad.geometry.mesh import TriMesh
 from cad.geometry.print_pose import PrintPose, print_pose
+from design.arrays import Array
 from design.catalogue.products import Printer
-from design.frames import Array
 from design.scene import ray_caster
 
 POINTS = 6000  # per part
@@ -67,7 +67,7 @@ class ThinWalls:
 def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:
     """Measure the walls of a part; of places of one thickness, the one nearest to their middle is told."""
     points, normals, area = _surface(mesh)
-    solid = ray_caster.scene_of(mesh.vertices[mesh.faces] / 1000)
+    solid = ray_caster.build_scene(mesh.vertices[mesh.faces] / 1000)
     inside = 1e-6  # m, below the surface
     hits = ray_caster.cast(solid, points / 1000 - inside * normals, -normals)
     parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL)

@@ -12,7 +12,7 @@ from cad.drawings.patterns import Pattern, on_axis, patterns_of
 from cad.drawings.slots import Slot, slots_of
 from cad.geometry.holes import Round
 from cad.layout.fits import OnSheet, ToleratedDiameter
-from design.frames import Array
+from design.arrays import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
 PLANE_MM2 = 3.0  # smaller faces get no ordinate

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cad.geometry.holes import Round
-from design.frames import Array
+from design.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from OCP.TopAbs import TopAbs_REVERSED
 
 from cad.drawings.patterns import number
 from cad.geometry.holes import Piercing
-from design.frames import Array
+from design.arrays import Array
 
 HALF_TURN = 0.02  # rad, from half a turn
 SAME = 1e-3

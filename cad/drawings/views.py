@@ -15,7 +15,7 @@ from cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_acro
 from cad.drawings.patterns import Pattern, along_pattern, number
 from cad.drawings.pen import Point
 from cad.drawings.project import Curve, project
-from design.frames import Array
+from design.arrays import Array
 
 Z = np.array([0.0, 0.0, 1.0])
 

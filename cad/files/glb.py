@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cad.geometry.mesh import TriMesh
-from design.frames import Array
+from design.arrays import Array
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963

@@ -18,7 +18,7 @@ from cad.files.glb import Node, glb_bytes
 from cad.geometry.mesh import TriMesh
 from cad.layout.balance.counterweight import Counterweight
 from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 GAP_MM = 15.0  # between the products of the exploded view

@@ -16,7 +16,7 @@ import numpy as np
 
 from cad.geometry.inertia import Inertial
 from cad.layout.drive import Cuboid, DriveLayout, Rod
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 

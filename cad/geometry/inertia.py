@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cadquery as cq
 import numpy as np
 
-from design.frames import Array
+from design.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

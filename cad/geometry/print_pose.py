@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from cad.geometry.mesh import TriMesh
-from design.frames import Array, rigid
+from design.arrays import Array
+from design.frames import rigid
 
 OVERHANG_RAD = math.radians(45.0)
 CONTACT_SHARE = 0.25  # of the largest flat on the hull: what is smaller holds badly

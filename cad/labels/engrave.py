@@ -20,8 +20,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Wire
 
 from cad import solids
 from cad.labels.flats import Flat
+from design.arrays import Array
 from design.catalogue.products import Printer
-from design.frames import Array
 
 WIDTHS = (0.4, 0.9)  # of grooves, least and most
 DEPTHS = (0.3, 0.6)

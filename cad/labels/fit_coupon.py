@@ -23,7 +23,7 @@ from cad.layout.hub import Hub
 from cad.layout.names import FIT_COUPON
 from cad.screws import SCREWS, Trap, trap_of
 from cad.solids import building, checked
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 NUT = SCREWS["M3"]  # that the parts trap

@@ -29,8 +29,8 @@ from cad.labels.flats import Flat, flat_at, flats_of
 from cad.labels.lettering import Lettering, Place
 from cad.labels.sight import Sight
 from cad.parts.part_spec import PartSpec
+from design.arrays import Array
 from design.errors import BuildError
-from design.frames import Array
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

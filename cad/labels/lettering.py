@@ -10,7 +10,7 @@ import shapely.affinity
 
 from cad.labels.flats import Flat
 from cad.labels.glyphs import letters, text_width
-from design.frames import Array
+from design.arrays import Array
 
 LEADING = 1.65  # from line to line, of the height
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cad.assembly.assembly import Assembly
 from cad.labels.flats import Flat
-from design.frames import Array
+from design.arrays import Array
 from design.scene import ray_caster
 
 READING = 200.0  # from a face to the eye: what stands farther off leaves room for a head
@@ -31,7 +31,9 @@ class Sight:
         turning = assembly.turning()
         for name, mesh in assembly.meshes().items():
             corners[name in turning].append(mesh.vertices[mesh.faces])
-        self._scenes = {turning: ray_caster.scene_of(np.concatenate(all_) / 1000) for turning, all_ in corners.items()}
+        self._scenes = {
+            turning: ray_caster.build_scene(np.concatenate(all_) / 1000) for turning, all_ in corners.items()
+        }
 
     def touched(self, flat: Flat) -> bool:
         """Whether anything lies on a face."""

@@ -17,9 +17,9 @@ from cad.layout.envelope import rotor_radius
 from cad.layout.hub import Hub
 from cad.layout.names import BASE_MOUNT
 from cad.screws import SCREWS, Screw
+from design.arrays import Array
 from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
-from design.frames import Array
 from design.scanner import Scanner
 
 FOOT_THICKNESS = 6.0

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.stack import DirectStack
 from cad.screws import Screw
+from design.arrays import Array
 from design.catalogue.products import Bearing, Belt
-from design.frames import Array
 from design.left_out import LeftOut
 
 Stack = DirectStack | BeltStack

@@ -13,9 +13,9 @@ import numpy as np
 from cad.layout.hub import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS
+from design.arrays import Array
 from design.catalogue.products import Lidar
 from design.errors import BuildError
-from design.frames import Array
 from design.scanner import Scanner
 
 PLATE_THICKNESS = 8.0

@@ -16,8 +16,8 @@ import numpy as np
 
 from cad.outlines import polygon
 from cad.screws import SCREWS, Screw, Thread
+from design.arrays import Array
 from design.catalogue.products import Lidar, Servo
-from design.frames import Array
 
 # ISO 4762 and ISO 4026
 LENGTHS = {

@@ -21,8 +21,8 @@ from cad.layout.envelope import (
 )
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from design.arrays import Array
 from design.errors import BuildError
-from design.frames import Array
 from design.scanner import Scanner
 
 CLAMP_SCREW = SCREWS["M3"]

@@ -24,7 +24,7 @@ from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Screw, passing_hole
 from cad.solids import building, checked
-from design.frames import Array
+from design.arrays import Array
 
 OF_SERVO = (
     "servo.case_min_mm",

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from cad import solids
 from cad.layout.envelope import Box
-from design.frames import Array
+from design.arrays import Array
 
 FAR = 200.0  # beyond any linkage
 THIN = 3.0  # what would stand thinner than this is cut off

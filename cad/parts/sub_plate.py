@@ -22,7 +22,7 @@ from cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import SCREWS, passing_hole
 from cad.solids import building, checked
-from design.frames import Array
+from design.arrays import Array
 from design.scanner import Scanner
 
 CHAMFER = 3.0

@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from cad.statics.voxels import Grid
-from design.frames import Array
+from design.arrays import Array
 
 OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
 HOLD = 20.0  # stiffness per area of what holds a surface, of modulus by edge: softens by some 1e-3

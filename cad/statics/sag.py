@@ -20,7 +20,7 @@ from cad.layout.loads import STANDARD_GRAVITY
 from cad.statics import elastic
 from cad.statics.shaft import ShaftBend
 from cad.statics.voxels import Grid, filled
-from design.frames import Array
+from design.arrays import Array
 
 EDGES = (8.0, 6.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell

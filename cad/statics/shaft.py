@@ -16,7 +16,7 @@ from cad.layout.belt.loads import belt_nm_per_rad
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.stack import WAIST, DirectStack
 from cad.layout.loads import ALUMINIUM_PA
-from design.frames import Array
+from design.arrays import Array
 
 SLICES = 400  # of the shaft's length: bend within 1e-4
 POISSON = 0.33

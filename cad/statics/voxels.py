@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.frames import Array
+from design.arrays import Array
 from design.scene import ray_caster
 
 RAYS = 2  # through a cube, along x and along y: a wall as thin as a cube keeps its thickness
@@ -45,7 +45,7 @@ def filled(triangles: Array, grid: Grid) -> Array:
     Returns:
         Shape (nx, ny, nz) * parts, 0 to 1.
     """
-    solid = ray_caster.scene_of(triangles / 1000)
+    solid = ray_caster.build_scene(triangles / 1000)
     below = min(float(grid.low[2]), float(triangles[:, :, 2].min())) - 1.0
     offsets = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * grid.edge / grid.parts
     return np.mean([_along_lines(solid, grid, below, dx, dy) for dx in offsets for dy in offsets], axis=0)

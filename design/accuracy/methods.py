@@ -13,18 +13,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from scipy.special import roots_legendre
 
 from design.accuracy.front import undominated
+from design.arrays import Array, Setting
 from design.density.ball_count import ball_count
 from design.density.beams import beam_directions_rot, polar_and_azimuth, simulated_scan
 from design.density.spin import ball_search, mean_count, zones
 from design.errors import ScanwrightError, TaskError
-from design.frames import Array, R_world_rot
+from design.frames import R_world_rot
 from design.motion import Sweep
-from design.objective.objectives import log_density
+from design.objective.named_objectives import log_density
 from design.objective.problem import Problem
-from design.objective.quadrature import breaks_of, rule_of
+from design.objective.quadrature import breaks_of, polar_rule
 from design.objective.score import quick_J
 from design.sphere.directions import equal_angle_grid
 from design.task.task import LoadedTask
@@ -86,7 +89,7 @@ def as_log(loaded: LoadedTask) -> LoadedTask:
     return replace(loaded, task=loaded.task.model_copy(update={"density": density}))
 
 
-def reference(problem: Problem, angles_rad: Array) -> Reference:
+def reference(problem: Problem, angles_rad: Setting) -> Reference:
     """J of a setting from smooth pieces; see the head of this file.
 
     Raises:
@@ -109,25 +112,25 @@ def reference(problem: Problem, angles_rad: Array) -> Reference:
     return Reference(J[1], abs(J[1] - J[0]))
 
 
-def by_segments(problem: Problem, angles_rad: Array, nodes: int) -> float:
+def by_segments(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """What the program uses: exact counts on nodes that gather at the ends of segments (`design.objective.score`)."""
     return quick_J(problem, angles_rad, nodes)
 
 
-def by_mean_count(problem: Problem, angles_rad: Array, nodes: int) -> float:
+def by_mean_count(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """As `by_segments`, with g of the mean count: the bound, which cannot see the gaps of a fast scan."""
-    rule, polar, _ = rule_of(problem, angles_rad, nodes)
+    rule, polar, _ = polar_rule(problem, angles_rad, nodes)
     g = log_density(mean_count(rule.polar_rad, polar, problem.lines, problem.ball_rad))
     return float(rule.fine @ g / rule.fine.sum())
 
 
-def by_rings(problem: Problem, angles_rad: Array, rings: int) -> float:
+def by_rings(problem: Problem, angles_rad: Setting, rings: int) -> float:
     """Exact counts on evenly spaced rings about the axis, no thought of edges."""
     t = (np.arange(rings) + 0.5) * np.pi / rings
     return _from_rings(problem, angles_rad, t, np.sin(t))
 
 
-def by_rings_single(problem: Problem, angles_rad: Array, rings: int) -> float:
+def by_rings_single(problem: Problem, angles_rad: Setting, rings: int) -> float:
     """As `by_rings`, product and sum in single precision, as the search makes it."""
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     t = (np.arange(rings) + 0.5) * np.pi / rings
@@ -135,13 +138,13 @@ def by_rings_single(problem: Problem, angles_rad: Array, rings: int) -> float:
     return float((weight / weight.sum(dtype=np.float32)) @ _zonal(problem, angles_rad, t).astype(np.float32))
 
 
-def by_gauss(problem: Problem, angles_rad: Array, nodes: int) -> float:
+def by_gauss(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """Exact counts on Gauss-Legendre nodes of the whole polar axis: best for smooth densities, which these are not."""
     z, w = roots_legendre(nodes)
     return _from_rings(problem, angles_rad, np.arccos(z), w)
 
 
-def by_harmonics(problem: Problem, angles_rad: Array, band: int) -> float:
+def by_harmonics(problem: Problem, angles_rad: Setting, band: int) -> float:
     """Zonal harmonics of density and weight up to a degree (Funk-Hecke), their coefficients from Gauss nodes."""
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     z, w = roots_legendre(2 * band + 2)
@@ -153,12 +156,12 @@ def by_harmonics(problem: Problem, angles_rad: Array, band: int) -> float:
     return float((degrees * of_g * of_weight).sum() / (2 * of_weight[0]))
 
 
-def by_ball_search(problem: Problem, angles_rad: Array, directions: int) -> float:
+def by_ball_search(problem: Problem, angles_rad: Setting, directions: int) -> float:
     """The paper's way: a simulated scan, a KD-tree, an equal-angle grid; solid angles put right, one start phase."""
     return _on_a_grid(problem, angles_rad, directions, ball_search)
 
 
-def by_ball_count(problem: Problem, angles_rad: Array, directions: int) -> float:
+def by_ball_count(problem: Problem, angles_rad: Setting, directions: int) -> float:
     """As `by_ball_search`, with the counts from a grid on the sphere (`design.density.ball_count`)."""
     return _on_a_grid(problem, angles_rad, directions, ball_count)
 
@@ -175,7 +178,7 @@ METHODS: dict[str, tuple[Method, str, tuple[int, ...]]] = {
 }
 
 
-def measure(problem: Problem, angles_rad: Array, progress: Progress) -> tuple[Reference, list[Point]]:
+def measure_methods(problem: Problem, angles_rad: Setting, progress: Progress) -> tuple[Reference, list[Point]]:
     """All methods at all their knobs on one setting, against the reference."""
     truth = reference(problem, angles_rad)
     nearby = LOOK_DEG * np.linspace(-1, 1, 9)
@@ -197,7 +200,7 @@ def best_points(points: list[Point], reference_error: float) -> list[bool]:
 
 def _point(
     problem: Problem,
-    angles_rad: Array,
+    angles_rad: Setting,
     truth: Reference,
     nearby_deg: Array,
     true_minimum_deg: float,
@@ -229,7 +232,7 @@ def _median(point: Point) -> float:
     return float(np.median(point.seconds)) if point.seconds else np.inf
 
 
-def _turned(angles_rad: Array, degrees: float) -> Array:
+def _turned(angles_rad: Setting, degrees: float) -> Setting:
     return angles_rad + np.array([0.0, 0.0, 0.0, np.radians(degrees)])
 
 
@@ -241,18 +244,20 @@ def _minimum(x: Array, y: list[float]) -> float:
     return float(x[i] + (0 if bend <= 0 else np.clip((a - c) / (2 * bend), -1, 1)) * (x[1] - x[0]))
 
 
-def _zonal(problem: Problem, angles_rad: Array, t: Array) -> Array:
+def _zonal(problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
     return zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
 
 
-def _from_rings(problem: Problem, angles_rad: Array, t: Array, width: Array) -> float:
+def _from_rings(problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"], width: Float[ndarray, " n"]) -> float:
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     weight = problem.field.on_circles(axis, t)[0] * width
     return float(weight @ _zonal(problem, angles_rad, t) / weight.sum())
 
 
-def _on_a_grid(problem: Problem, angles_rad: Array, rows: int, count: Callable[[Array, Array, float], Array]) -> float:
+def _on_a_grid(
+    problem: Problem, angles_rad: Setting, rows: int, count: Callable[[Array, Array, float], Array]
+) -> float:
     grid = equal_angle_grid(180 / rows)
     weight = problem.field.weight_at(grid) * np.sqrt(np.maximum(1 - grid[:, 2] ** 2, 0))
     scan = simulated_scan(problem.bearings_rad, problem.lines, angles_rad)

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.methods import Point, Reference, as_log, best_points, measure
-from design.accuracy.stress import Row, stress_rows
+from design.accuracy.methods import Point, Reference, as_log, best_points, measure_methods
+from design.accuracy.stress import StressRow, stress_rows
 from design.objective.problem import problem_of
-from design.search.optimum import optimum_of
+from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 
 MARKS = "osD^vP*X"
 GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
 
 
-def write_points(path: Path, points: list[Point], truth: Reference) -> None:
+def write_method_points(path: Path, points: list[Point], truth: Reference) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
     header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front failed"
     rows = []
@@ -33,7 +33,7 @@ def write_points(path: Path, points: list[Point], truth: Reference) -> None:
     _write(path, header.split(), rows)
 
 
-def write_rows(path: Path, rows: list[Row]) -> None:
+def write_rows(path: Path, rows: list[StressRow]) -> None:
     """The stress table."""
     header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
     _write(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
@@ -106,10 +106,10 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
-    optimum = optimum_of(as_log(loaded), say)
-    truth, points = measure(optimum.problem, optimum.search.best[0].angles_rad, say)
+    optimum = find_optimum(as_log(loaded), say)
+    truth, points = measure_methods(optimum.problem, optimum.search.best[0].angles_rad, say)
     folder.mkdir(parents=True, exist_ok=True)
-    write_points(folder / "work_precision.csv", points, truth)
+    write_method_points(folder / "work_precision.csv", points, truth)
     work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
     lines = [f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
     for point, front in zip(points, best_points(points, truth.J_error), strict=True):

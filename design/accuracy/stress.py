@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.arrays import Array
 from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density.spin import mean_count, zones
 from design.errors import TaskError
-from design.frames import Array
-from design.objective.objectives import log
+from design.objective.named_objectives import log
 from design.objective.problem import Problem
 from design.objective.score import quick_J, score
 from design.sphere.directions import EMPTY
 from design.sphere.regions import field_of
-from design.task.shapes import All
+from design.task.shapes import AllRegion
 from design.task.task import LoadedTask, Task
 
 PIECE_NODES = 8
@@ -28,7 +28,7 @@ HALF_TURN = np.pi
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class StressRow:
     """One case; `error` is relative where `expected` is not zero."""
 
     case: str
@@ -44,9 +44,9 @@ class Row:
         return bool(self.error <= self.allowed)
 
 
-def stress_rows(loaded: LoadedTask, problem: Problem) -> list[Row]:
+def stress_rows(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """All cases, with the beams of a task."""
-    cases: list[Callable[[LoadedTask, Problem], list[Row]]] = [
+    cases: list[Callable[[LoadedTask, Problem], list[StressRow]]] = [
         _planes,
         _focus,
         _balls,
@@ -59,9 +59,9 @@ def stress_rows(loaded: LoadedTask, problem: Problem) -> list[Row]:
     return [row for case in cases for row in case(loaded, problem)]
 
 
-def _row(case: str, quantity: str, expected: float, got: float, allowed: float) -> Row:
+def _row(case: str, quantity: str, expected: float, got: float, allowed: float) -> StressRow:
     error = abs(got - expected) / (abs(expected) if expected else 1.0)
-    return Row(case, quantity, expected, got, error, allowed)
+    return StressRow(case, quantity, expected, got, error, allowed)
 
 
 def _integral(bearings: Array, plane: tuple[float, float], turns: float, ball: float) -> float:
@@ -77,13 +77,15 @@ def _integral(bearings: Array, plane: tuple[float, float], turns: float, ball: f
     return float(2 * np.pi * (width * np.sin(t)) @ mean_count(t, polar, scan_lines(turns, 1.0), ball))
 
 
-def _law(name: str, bearings: Array, plane: tuple[float, float], turns: float, ball: float, allowed: float) -> Row:
+def _law(
+    name: str, bearings: Array, plane: tuple[float, float], turns: float, ball: float, allowed: float
+) -> StressRow:
     lines = scan_lines(turns, 1.0).count
     expected = len(bearings) * lines * 2 * np.pi * (1 - np.cos(ball))
     return _row(name, "integral of d", expected, _integral(bearings, plane, turns, ball), allowed)
 
 
-def _planes(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """Scan planes at and next to the perpendicular one, and with the fan's end on the axis."""
     b, ball = problem.bearings_rad, problem.ball_rad
     rows = []
@@ -103,7 +105,7 @@ def _planes(_loaded: LoadedTask, problem: Problem) -> list[Row]:
     return rows
 
 
-def _focus(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _focus(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """At a focus point every line of the beams within a ball counts, at every phase."""
     b, ball = problem.bearings_rad, problem.ball_rad
     polar, _ = polar_and_azimuth(beam_directions_rot(b, 0.0, -HALF_TURN / 2))
@@ -118,7 +120,7 @@ def _focus(_loaded: LoadedTask, problem: Problem) -> list[Row]:
     ]
 
 
-def _balls(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _balls(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     plane = (float(np.radians(-50.0)), float(np.radians(35.0)))
     return [
         _law(f"ball of {r:g} deg", problem.bearings_rad, plane, 720, float(np.radians(r)), 1e-5)
@@ -126,7 +128,7 @@ def _balls(_loaded: LoadedTask, problem: Problem) -> list[Row]:
     ]
 
 
-def _lines(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _lines(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """From one line to ten million beams, one beam, and turns that are no whole number of lines."""
     b, ball = problem.bearings_rad, problem.ball_rad
     plane = (float(np.radians(-50.0)), float(np.radians(35.0)))
@@ -142,7 +144,7 @@ def _lines(_loaded: LoadedTask, problem: Problem) -> list[Row]:
     return rows
 
 
-def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """Angles that name the same machine give the same J."""
     pairs = [
         ("beta_rot = 90: alpha_rot only rolls the case", (0, 90, 20, -40), (77, 90, 20, -40)),
@@ -157,7 +159,7 @@ def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[Row]:
     ]
 
 
-def _weights(loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _weights(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """J does not know the unit of the weights."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     cone = {"shape": "cone", "axis": [1, 0, -1], "half_angle_deg": 40}
@@ -170,7 +172,7 @@ def _weights(loaded: LoadedTask, problem: Problem) -> list[Row]:
     ]
 
 
-def _regions(loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """A region that is nearly a point sees the density of that point."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
@@ -184,7 +186,7 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[Row]:
     ]
 
 
-def _refusals(loaded: LoadedTask, problem: Problem) -> list[Row]:
+def _refusals(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """What has no answer is refused, and no number comes instead: 1 for a refusal."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
@@ -199,7 +201,7 @@ def _refusals(loaded: LoadedTask, problem: Problem) -> list[Row]:
         )
     )
     try:
-        All.model_validate({"shape": "all", "value": float("nan")})
+        AllRegion.model_validate({"shape": "all", "value": float("nan")})
         refused = 0
     except ValueError:
         refused = 1

@@ -9,9 +9,10 @@ import json
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from pydantic import Field, PrivateAttr, model_validator
 
-from design.frames import Array
 from design.record import Record
 
 Pair = tuple[float, float]
@@ -87,7 +88,7 @@ class Lidar(Product):
             raise ValueError(f"range_min_mm {self.range_min_mm} is not below range_max_mm {self.range_max_mm}")
         return self
 
-    def bearings_rad(self) -> Array:
+    def bearings_rad(self) -> Float[ndarray, " beams"]:
         """Angle of every beam about the scan-plane normal, 0 to the front, shape (beams,) (SCIP 2.0, p. 5)."""
         steps = np.arange(self.first_step, self.last_step + 1)
         return (steps - self.front_step) * (2 * np.pi / self.steps_per_turn)

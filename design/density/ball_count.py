@@ -7,16 +7,20 @@ then one or two unbroken stretches of memory per row, and each is tested.
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float, Int, Int64
 from numba import njit
+from numpy import ndarray
 
+from design.arrays import Array
 from design.concurrency.parallel import in_chunks
-from design.frames import Array
 
 MOST_ROWS = 1440
 CELLS_PER_BALL = 3  # rows and cells across a ball radius: fewer test too many beams, more jump too often
 
 
-def ball_count(beams: Array, directions: Array, ball_rad: float) -> Array:
+def ball_count(
+    beams: Float[ndarray, "beams 3"], directions: Float[ndarray, "n 3"], ball_rad: float
+) -> Int[ndarray, " n"]:
     """Beams within `ball_rad` of each direction.
 
     Args:
@@ -40,7 +44,7 @@ def ball_count(beams: Array, directions: Array, ball_rad: float) -> Array:
     return np.concatenate(counts)
 
 
-def _columns(rows: int) -> Array:
+def _columns(rows: int) -> Int64[ndarray, " {rows}"]:
     """Azimuth cells of each row, about as wide as the row is high, shape (rows,), integers."""
     middle = (np.arange(rows) + 0.5) * np.pi / rows
     return np.maximum(1, (2 * rows * np.sin(middle)).astype(np.int64))

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from design import frames
-from design.frames import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Lines:
+class ScanLines:
     """The scan lines of one full turn: line k stands at `k * step_rad`, k = 0 .. count - 1.
 
     `T f` is not rounded: where it is no integer the gap behind the last line is shorter than `step_rad`.
@@ -24,26 +25,29 @@ class Lines:
     repeats: int = 1
 
     @property
-    def angles_rad(self) -> Array:
+    def angles_rad(self) -> Float[ndarray, " {self.count}"]:
         """Axis angles of all lines, shape (count,)."""
         return self.step_rad * np.arange(self.count)
 
 
-def scan_lines(period_s: float, scan_rate_hz: float) -> Lines:
+def scan_lines(period_s: float, scan_rate_hz: float) -> ScanLines:
     """Lines of one turn of `period_s` seconds: `gamma_k = 2 pi k / (T f)`, k = 0 .. ceil(T f) - 1."""
     turns = period_s * scan_rate_hz
     nearest = round(turns)
     if nearest >= 1 and abs(turns - nearest) < 1e-9 * turns:  # 0.07 * 100 is 7 and not 7.000000000000001
         turns = nearest
-    return Lines(count=int(np.ceil(turns)), step_rad=2 * np.pi / turns)
+    return ScanLines(count=int(np.ceil(turns)), step_rad=2 * np.pi / turns)
 
 
 NO_LEVER = (0.0, 0.0, 0.0)
 
 
 def beam_directions_rot(
-    bearings_rad: Array, alpha_laser_rad: float, beta_laser_rad: float, lever: ArrayLike = NO_LEVER
-) -> Array:
+    bearings_rad: Float[ndarray, " beams"],
+    alpha_laser_rad: float,
+    beta_laser_rad: float,
+    lever: ArrayLike = NO_LEVER,
+) -> Float[ndarray, "beams 3"]:
     """Unit vectors of all beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`.
 
     With a lever arm, `t_rot_laser / range`, they point from the axis to where the beams end at that range. The arm
@@ -57,14 +61,16 @@ def beam_directions_rot(
     return ends / np.linalg.norm(ends, axis=1, keepdims=True)
 
 
-def polar_of_planes(bearings_rad: Array, planes_rad: Array) -> Array:
+def polar_of_planes(
+    bearings_rad: Float[ndarray, " beams"], planes_rad: Float[ndarray, "n 2"]
+) -> Float[ndarray, "n beams"]:
     """Polar angles of all beams for many scan planes (alpha_laser, beta_laser) (n, 2), shape (n, beams)."""
     R = frames.R_rot_laser(*planes_rad.T)[:, :, :2]
     x, y, z = np.einsum("nij,jb->inb", R, np.stack([np.cos(bearings_rad), np.sin(bearings_rad)]))
     return np.arctan2(np.hypot(x, y), z)
 
 
-def line_spacing(beams: Array, plane_rad: ArrayLike) -> float:
+def line_spacing(beams: Float[ndarray, "n 3"], plane_rad: ArrayLike) -> float:
     """Widest distance between neighbouring lines of one family, across them, as a share of the axis step.
 
     Args:
@@ -75,13 +81,15 @@ def line_spacing(beams: Array, plane_rad: ArrayLike) -> float:
     return float(np.abs(np.cross([0.0, 0.0, 1.0], beams) @ normal).max())
 
 
-def polar_and_azimuth(directions: Array) -> tuple[Array, Array]:
+def polar_and_azimuth(directions: Float[ndarray, "n 3"]) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
     """Angle from z and angle about z of unit vectors, (n, 3) -> (n,), (n,) [rad]; accurate close to the poles."""
     x, y, z = directions.T
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
-def simulated_scan(bearings_rad: Array, lines: Lines, angles_rad: ArrayLike, start_phase_rad: float = 0.0) -> Array:
+def simulated_scan(
+    bearings_rad: Float[ndarray, " beams"], lines: ScanLines, angles_rad: ArrayLike, start_phase_rad: float = 0.0
+) -> Float[ndarray, "n 3"]:
     """Directions of one full scan in the world (paper, section 4.1), shape (lines * beams, 3), line after line.
 
     Args:
@@ -93,7 +101,12 @@ def simulated_scan(bearings_rad: Array, lines: Lines, angles_rad: ArrayLike, sta
     return scan_at(bearings_rad, lines.angles_rad + start_phase_rad, angles_rad)
 
 
-def scan_at(bearings_rad: Array, joint_rad: Array, angles_rad: ArrayLike, lever: ArrayLike = NO_LEVER) -> Array:
+def scan_at(
+    bearings_rad: Float[ndarray, " beams"],
+    joint_rad: Float[ndarray, " k"],
+    angles_rad: ArrayLike,
+    lever: ArrayLike = NO_LEVER,
+) -> Float[ndarray, "n 3"]:
     """Directions in the world of all beams at each joint angle, shape (joint angles * beams, 3), line after line."""
     alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
     beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser, lever)

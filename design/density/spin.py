@@ -15,12 +15,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float, Int
 from numba import njit
+from numpy import ndarray
 from scipy.spatial import cKDTree
 
+from design.arrays import Array
 from design.concurrency.parallel import in_chunks
-from design.density.beams import Lines
-from design.frames import Array
+from design.density.beams import ScanLines
 
 TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
@@ -37,13 +39,15 @@ class Zones:
         most: highest count at any phase; 0 is blind.
     """
 
-    mean_g: Array
-    mean: Array
-    least: Array
-    most: Array
+    mean_g: Float[ndarray, " n"]
+    mean: Float[ndarray, " n"]
+    least: Float[ndarray, " n"]
+    most: Float[ndarray, " n"]
 
 
-def mean_count(polar_rad: Array, beam_polar_rad: Array, lines: Lines, ball_rad: float) -> Array:
+def mean_count(
+    polar_rad: Float[ndarray, " n"], beam_polar_rad: Float[ndarray, " beams"], lines: ScanLines, ball_rad: float
+) -> Float[ndarray, " n"]:
     """Mean over the start phase of the beams within a ball at polar angles t, in closed form, shape (len(t),)."""
     beams = np.sort(beam_polar_rad)
     parts = in_chunks(lambda chunk: _mean_counts(polar_rad[chunk], beams, ball_rad), len(polar_rad))
@@ -51,7 +55,12 @@ def mean_count(polar_rad: Array, beam_polar_rad: Array, lines: Lines, ball_rad: 
 
 
 def zones(
-    polar_rad: Array, beam_polar_rad: Array, beam_azimuth_rad: Array, lines: Lines, ball_rad: float, g: Array
+    polar_rad: Float[ndarray, " n"],
+    beam_polar_rad: Float[ndarray, " beams"],
+    beam_azimuth_rad: Float[ndarray, " beams"],
+    lines: ScanLines,
+    ball_rad: float,
+    g: Float[ndarray, " counts"],
 ) -> Zones:
     """Exact statistics over the start phase at polar angles t.
 
@@ -78,7 +87,12 @@ def zones(
 
 
 def count_at(
-    polar_rad: float, azimuth_rad: float, beam_polar_rad: Array, beam_azimuth_rad: Array, lines: Lines, ball_rad: float
+    polar_rad: float,
+    azimuth_rad: float,
+    beam_polar_rad: Float[ndarray, " beams"],
+    beam_azimuth_rad: Float[ndarray, " beams"],
+    lines: ScanLines,
+    ball_rad: float,
 ) -> int:
     """Beams within the ball about one direction of the rotation frame, first line at azimuth 0: floor and ceil."""
     half = _half_widths(polar_rad, beam_polar_rad, ball_rad)
@@ -92,7 +106,9 @@ def count_at(
     return int(np.where(half[seen] >= np.pi, lines.count, counts).sum())
 
 
-def ball_search(beams: Array, directions: Array, ball_rad: float) -> Array:
+def ball_search(
+    beams: Float[ndarray, "beams 3"], directions: Float[ndarray, "n 3"], ball_rad: float
+) -> Int[ndarray, " n"]:
     """Beams within `ball_rad` of each direction, the paper's section 4.2: slow, obvious, the oracle of all else.
 
     Args:
@@ -107,7 +123,7 @@ def ball_search(beams: Array, directions: Array, ball_rad: float) -> Array:
     return cKDTree(beams).query_ball_point(directions, chord, return_length=True, workers=-1)
 
 
-def _half_widths(t: float, beam_polar: Array, ball_rad: float) -> Array:
+def _half_widths(t: float, beam_polar: Float[ndarray, " beams"], ball_rad: float) -> Float[ndarray, " beams"]:
     """delta_b at polar angle t; -1 where the ball never meets the beam."""
     return np.array([half_width(t, b, ball_rad) for b in beam_polar])
 

@@ -11,12 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from numba import njit
+from numpy import ndarray
 
+from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
 from design.density.spin import TIE, Zones, half_width
-from design.frames import Array
 from design.motion import Sweep
 
 
@@ -32,12 +34,12 @@ class SweepLines:
         """Scans in one period, in the mean over the start phase."""
         return self.motion.period_s * self.scan_rate_hz
 
-    def angles_rad(self, start: float) -> Array:
+    def angles_rad(self, start: float) -> Float[ndarray, " lines"]:
         """Joint angles of all lines for a start phase in 0 .. 1."""
         k = np.arange(int(np.ceil(self.scans - start - 1e-12)))
         return self.motion.angle_rad((k + start) / self.scan_rate_hz)
 
-    def numbers(self) -> Array:
+    def numbers(self) -> Float[ndarray, " 6"]:
         """Lower limit, range, speed [rad, rad/s], ramp, half a period [s], scan rate: what the kernels read."""
         motion = self.motion
         lower, upper = np.radians(motion.limits_deg)
@@ -45,7 +47,12 @@ class SweepLines:
         return np.array([lower, upper - lower, cruise, motion.ramp_s, motion.period_s / 2, self.scan_rate_hz])
 
 
-def mean_count_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines, ball_rad: float) -> Array:
+def mean_count_swept(
+    directions_rot: Float[ndarray, "n 3"],
+    beams_rot: Float[ndarray, "beams 3"],
+    lines: SweepLines,
+    ball_rad: float,
+) -> Float[ndarray, " n"]:
     """Mean over the start phase of the beams within a ball about directions of the rotation frame, shape (n,).
 
     Args:
@@ -60,7 +67,13 @@ def mean_count_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines,
     return np.concatenate(parts)
 
 
-def zones_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines, ball_rad: float, g: Array) -> Zones:
+def zones_swept(
+    directions_rot: Float[ndarray, "n 3"],
+    beams_rot: Float[ndarray, "beams 3"],
+    lines: SweepLines,
+    ball_rad: float,
+    g: Float[ndarray, " counts"],
+) -> Zones:
     """Exact statistics over the start phase at directions of the rotation frame; arguments as `mean_count_swept`.
 
     `g` holds its value for every count 0, 1, .. lines * beams.
@@ -72,7 +85,9 @@ def zones_swept(directions_rot: Array, beams_rot: Array, lines: SweepLines, ball
     return Zones(mean_g, mean, least, most)
 
 
-def _sorted(directions: Array, beams: Array) -> tuple[Array, Array, Array, Array]:
+def _sorted(
+    directions: Float[ndarray, "n 3"], beams: Float[ndarray, "beams 3"]
+) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " beams"], Float[ndarray, " beams"]]:
     """Polar angles and azimuths of directions, and of beams in the order of their polar angle."""
     t_b, p_b = polar_and_azimuth(beams)
     order = np.argsort(t_b, kind="stable")

@@ -26,14 +26,16 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from design.angles import STANDARD_DEG
+from design.arrays import Array, Setting
 from design.catalogue.products import Multibeam, SlipRing
 from design.density.ball_count import ball_count
-from design.density.beams import Lines
+from design.density.beams import ScanLines
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
-from design.frames import Array
 from design.objective.ball_search import SETS
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score, score, score_on
@@ -55,7 +57,7 @@ BLIND_DIRECTIONS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ComparisonRow:
     """One candidate over one time.
 
     Attributes:
@@ -86,7 +88,9 @@ class Row:
     cost_usd: float | None
 
 
-def compare(loaded: LoadedTask, problem: Problem, best: Family, progress: Progress = lambda _: None) -> list[Row]:
+def compare(
+    loaded: LoadedTask, problem: Problem, best: Family, progress: Progress = lambda _: None
+) -> list[ComparisonRow]:
     """Rows of the optimum, the alignments known from others, and every multibeam of the catalogue.
 
     Args:
@@ -114,7 +118,7 @@ def compare(loaded: LoadedTask, problem: Problem, best: Family, progress: Progre
     return rows
 
 
-def ready_made(problem: Problem, product: Multibeam, turns: int) -> Row:
+def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRow:
     """The row of a multibeam over a number of turns.
 
     Raises:
@@ -124,7 +128,7 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> Row:
         J, J_error, blind_fraction, blind_weight = _zonal(problem, product, turns)
     else:
         J, J_error, blind_fraction, blind_weight = sampled(problem, product, turns)
-    return Row(
+    return ComparisonRow(
         name=product.name,
         setting="upright",
         time_s=turns / product.turn_rate_hz,
@@ -140,16 +144,16 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> Row:
     )
 
 
-def lines_of(product: Multibeam) -> Lines:
+def layer_lines(product: Multibeam) -> ScanLines:
     """Directions in azimuth that each layer measures in one turn: a whole number of them, evenly spread."""
     span = np.ptp(product.azimuth_deg)
     count = max(1, round(span / product.azimuth_step_deg))
-    return Lines(count, float(np.radians(span / count)))
+    return ScanLines(count, float(np.radians(span / count)))
 
 
-def multibeam_scan(product: Multibeam, start: float = 0.0) -> Array:
+def multibeam_scan(product: Multibeam, start: float = 0.0) -> Float[ndarray, "n 3"]:
     """Directions of one turn, upright, shape (lines * layers, 3); `start` is the start phase in azimuth steps."""
-    lines = lines_of(product)
+    lines = layer_lines(product)
     azimuth = np.radians(product.azimuth_deg[0]) + lines.angles_rad + start * lines.step_rad
     p, e = np.meshgrid(azimuth, np.radians(product.elevations_deg), indexing="ij")
     return np.stack([np.cos(e) * np.cos(p), np.cos(e) * np.sin(p), np.sin(e)], axis=-1).reshape(-1, 3)
@@ -191,7 +195,7 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     )
 
 
-def table(rows: list[Row]) -> list[str]:
+def table(rows: list[ComparisonRow]) -> list[str]:
     """Lines of text for a person, the heading first."""
     width = max(len(row.name) for row in rows)
     lines = [
@@ -223,20 +227,20 @@ def notes(loaded: LoadedTask) -> list[str]:
     ]
 
 
-def write_csv(path: Path, rows: list[Row]) -> None:
+def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
     """The rows under the names of their fields; what is not known is empty."""
     with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
+        writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
 
 
-def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Array, judged: Score) -> Row:
+def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score) -> ComparisonRow:
     ring = loaded.task.slip_ring
     parts = [loaded.lidar.price_usd, loaded.servo.price_usd]
     parts += [loaded.products.get(ring, SlipRing).price_usd] if ring else []
     known = [price for price in parts if price is not None]
-    return Row(
+    return ComparisonRow(
         name=name,
         setting="(" + ", ".join(f"{angle:g}" for angle in np.degrees(angles_rad).round(2) + 0.0) + ")",
         time_s=loaded.task.motion.duration_s,
@@ -254,7 +258,7 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Array
 
 def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
     """J, J_error, blind share of the sphere and of the weight, of layers that run all around."""
-    lines = lines_of(product)
+    lines = layer_lines(product)
     fan = problem.with_beams(np.radians(product.elevations_deg), replace(lines, repeats=turns))
     judged = score_on(fan, UPRIGHT_RAD, NODES)
     J, half = judged.J, LAYERED * judged.J_error

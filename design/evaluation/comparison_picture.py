@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from design.evaluation.comparison import Row
+from design.evaluation.comparison import ComparisonRow
 from design.evaluation.density_picture import INK
 
 LONG = {"color": "#555555"}
@@ -14,7 +14,7 @@ SHORT = {"facecolor": "#dddddd", "hatch": "////", "edgecolor": "#777777", "linew
 OPTIMUM = {"color": INK}
 
 
-def compare_picture(path: Path, rows: list[Row], title: str) -> None:
+def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     """Bars of -J, blind share of the weight, widest gap, and cost, one candidate below the other.
 
     Args:
@@ -60,7 +60,7 @@ def compare_picture(path: Path, rows: list[Row], title: str) -> None:
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
 
-def _times(rows: list[Row], name: str) -> str:
+def _times(rows: list[ComparisonRow], name: str) -> str:
     return " and ".join(f"{row.time_s:g} s" for row in reversed(rows) if row.name == name)
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
+from design.arrays import Setting, Vector
 from design.density.beams import polar_and_azimuth
 from design.density.spin import mean_count
 from design.density.sweep import mean_count_swept
-from design.frames import Array, R_world_rot
+from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.scene.surface import Surface
 from design.sphere.directions import spiral
@@ -31,7 +34,7 @@ class Coverage:
     masked_fraction: float
 
 
-def coverage(problem: Problem, angles_rad: Array) -> Coverage:
+def coverage(problem: Problem, angles_rad: Setting) -> Coverage:
     """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     if problem.sweep is not None:
@@ -46,7 +49,7 @@ def coverage(problem: Problem, angles_rad: Array) -> Coverage:
     )
 
 
-def _swept(problem: Problem, angles_rad: Array) -> Coverage:
+def _swept(problem: Problem, angles_rad: Setting) -> Coverage:
     """For a sweep, whose blind region is no zone: over directions of equal solid angle."""
     assert problem.sweep is not None
     directions = spiral(CIRCLES)
@@ -57,7 +60,7 @@ def _swept(problem: Problem, angles_rad: Array) -> Coverage:
     return Coverage(float((~seen).mean()) if len(seen) else 0.0, float(masked.mean()))
 
 
-def mean_density_at(problem: Problem, angles_rad: Array, directions: Array) -> Array:
+def mean_density_at(problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
     """Mean beams per ball at unit vectors (n, 3), from a table over the polar angle where the axis turns all around."""
     R = R_world_rot(angles_rad[0], angles_rad[1])
     beams = problem.beams_rot(angles_rad[2:])
@@ -68,7 +71,7 @@ def mean_density_at(problem: Problem, angles_rad: Array, directions: Array) -> A
     return np.interp(np.arccos(np.clip(directions @ R[:, 2], -1, 1)), table, counts)
 
 
-def points_per_m2(problem: Problem, angles_rad: Array, surface: Surface) -> Array:
+def points_per_m2(problem: Problem, angles_rad: Setting, surface: Surface) -> Float[ndarray, "rows columns"]:
     """Points per square metre of surface in the mean over the start phase, shape (rows, columns); 0 where none is.
 
     Beams per steradian, from those within the ball, over the square metres that lie behind a steradian.
@@ -79,7 +82,7 @@ def points_per_m2(problem: Problem, angles_rad: Array, surface: Surface) -> Arra
     return np.divide(per_sr, area, out=np.zeros_like(area), where=area > 0)
 
 
-def on_surfaces(problem: Problem, angles_rad: Array, surface: Surface) -> dict[str, float]:
+def on_surfaces(problem: Problem, angles_rad: Setting, surface: Surface) -> dict[str, float]:
     """Points per square metre in the weighted region: the lowest, and the median by area."""
     density = points_per_m2(problem, angles_rad, surface).ravel()
     directions = surface.directions.reshape(-1, 3)
@@ -91,7 +94,7 @@ def on_surfaces(problem: Problem, angles_rad: Array, surface: Surface) -> dict[s
     return {"lowest_points_per_m2": float(density[seen[0]]), "median_points_per_m2": float(density[middle])}
 
 
-def blind_zones(beam_polar_rad: Array, ball_rad: float) -> list[tuple[float, float]]:
+def blind_zones(beam_polar_rad: Float[ndarray, " beams"], ball_rad: float) -> list[tuple[float, float]]:
     """Ranges of the polar angle about the axis that lie further than a ball radius from every beam."""
     polar = np.sort(beam_polar_rad)
     starts = np.concatenate([[0.0], polar + ball_rad])
@@ -99,7 +102,7 @@ def blind_zones(beam_polar_rad: Array, ball_rad: float) -> list[tuple[float, flo
     return [(float(a), float(b)) for a, b in zip(starts, ends, strict=True) if b > a]
 
 
-def _unmasked(problem: Problem, axis: Array, low_rad: float, high_rad: float) -> float:
+def _unmasked(problem: Problem, axis: Vector, low_rad: float, high_rad: float) -> float:
     """Share of the whole sphere that lies between two polar angles and outside the masks."""
     height = np.cos(low_rad) - np.cos(high_rad)
     z = np.cos(low_rad) - height * (np.arange(CIRCLES) + 0.5) / CIRCLES

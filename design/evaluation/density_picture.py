@@ -10,20 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from design.arrays import Setting
 from design.evaluation.coverage import mean_density_at
-from design.frames import Array
 from design.objective.problem import Problem
 
 STEP_DEG = 0.5
 INK = "#111111"
 
 
-def density_picture(path: Path, problem: Problem, settings: Mapping[str, Array], title: str) -> None:
+def density_picture(path: Path, problem: Problem, settings: Mapping[str, Setting], title: str) -> None:
     """Write `density_figure` to a PNG."""
     density_figure(problem, settings, title).savefig(path, dpi=110, metadata={"Software": None})
 
 
-def density_figure(problem: Problem, settings: Mapping[str, Array], title: str) -> Figure:
+def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str) -> Figure:
     """Density maps one above the other on one colour scale.
 
     Args:

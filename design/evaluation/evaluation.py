@@ -7,13 +7,15 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
+from design.arrays import Setting
 from design.density.beams import scan_at
 from design.errors import TaskError
 from design.evaluation.coverage import Coverage, coverage, on_surfaces
 from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
-from design.evaluation.poles import PoleChances, pole_chances, pole_of
-from design.frames import Array
+from design.evaluation.poles import PoleChances, parse_pole, pole_chances
 from design.objective.ball_search import BallScore, ball_score
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
@@ -40,7 +42,7 @@ class Evaluation:
     """
 
     problem: Problem
-    angles_rad: Array
+    angles_rad: Setting
     score: Score
     ball: BallScore
     coverage: Coverage
@@ -51,7 +53,7 @@ class Evaluation:
     hit: PoleChances | None
     surfaces: dict[str, float] | None
 
-    def beam_directions(self) -> Array:
+    def beam_directions(self) -> Float[ndarray, "n 3"]:
         """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
         return simulated_beams(self.problem, self.angles_rad)
 
@@ -113,7 +115,7 @@ class Evaluation:
 
 
 def evaluate(
-    loaded: LoadedTask, problem: Problem, angles_rad: Array, pole: str | None, progress: Callable[[str], None]
+    loaded: LoadedTask, problem: Problem, angles_rad: Setting, pole: str | None, progress: Callable[[str], None]
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
@@ -121,13 +123,13 @@ def evaluate(
         loaded: the task.
         problem: its numbers, `problem_to_judge`.
         angles_rad: the setting.
-        pole: as `pole_of` reads it, None for no pole.
+        pole: as `parse_pole` reads it, None for no pole.
         progress: is told what is being computed.
 
     Raises:
         TaskError: no direction has a weight, or the pole makes no sense.
     """
-    asked = None if pole is None else pole_of(pole, loaded.lidar)
+    asked = None if pole is None else parse_pole(pole, loaded.lidar)
     motion, sweep = loaded.task.motion, problem.sweep
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
@@ -155,7 +157,7 @@ def problem_to_judge(loaded: LoadedTask, lever: str | None) -> Problem:
     Raises:
         TaskError: these are no three numbers that make sense, or no direction has a weight.
     """
-    return problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_lever_of(lever))
+    return problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_parse_lever(lever))
 
 
 def angles_in(text: str) -> tuple[float, float, float, float]:
@@ -174,7 +176,7 @@ def angles_in(text: str) -> tuple[float, float, float, float]:
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
-def setting_rad(angles_deg: Sequence[float]) -> Array:
+def setting_rad(angles_deg: Sequence[float]) -> Setting:
     """The setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] from degrees.
 
     Raises:
@@ -185,7 +187,7 @@ def setting_rad(angles_deg: Sequence[float]) -> Array:
     return np.radians(angles_deg)
 
 
-def simulated_beams(problem: Problem, angles_rad: Array) -> Array:
+def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 3"]:
     """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     return scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
@@ -196,7 +198,7 @@ def _cap(cap: BlindCone) -> str:
     return f"{cap.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})"
 
 
-def _lever_of(text: str) -> tuple[float, float, float]:
+def _parse_lever(text: str) -> tuple[float, float, float]:
     try:
         x_mm, y_mm, range_m = (float(part) for part in text.split(","))
     except ValueError:

@@ -10,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
 from scipy.spatial import ConvexHull
 
+from design.arrays import Plane, Setting, Vector
 from design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
-from design.frames import Array, R_rot_laser, R_world_rot
+from design.frames import R_rot_laser, R_world_rot
 from design.objective.problem import NODES, Problem
-from design.objective.quadrature import rule_of
+from design.objective.quadrature import polar_rule
 from design.sphere.directions import weighted_samples
 
 SWEPT_DIRECTIONS = 20_000
@@ -53,7 +56,7 @@ class Gaps:
         return float(np.radians(self.line_gap_deg) * range_m * 1000)
 
 
-def gaps(problem: Problem, angles_rad: Array) -> Gaps:
+def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
     """Gaps of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Raises:
@@ -79,7 +82,7 @@ def gaps(problem: Problem, angles_rad: Array) -> Gaps:
     )
 
 
-def empty_cap(scan: Array) -> BlindCone:
+def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
     """The largest cap that holds no beam of a simulated scan, unit vectors (n, 3): exact, from the convex hull.
 
     The plane of a facet cuts a cap off the sphere, and no beam lies beyond it.
@@ -95,7 +98,7 @@ def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
     return (np.floor(period_s * scan_rate_hz) + 0.5) / scan_rate_hz
 
 
-def _blind_cones(u: Array, beam_polar: Array) -> tuple[BlindCone, ...]:
+def _blind_cones(u: Vector, beam_polar: Float[ndarray, " beams"]) -> tuple[BlindCone, ...]:
     cones = [(u, float(beam_polar.min())), (-u, float(np.pi - beam_polar.max()))]
     found = [
         BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h)))
@@ -105,13 +108,17 @@ def _blind_cones(u: Array, beam_polar: Array) -> tuple[BlindCone, ...]:
     return tuple(sorted(found, key=lambda cone: -cone.half_angle_deg))
 
 
-def _around(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+def _around(
+    problem: Problem, angles_rad: Setting
+) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
     """Polar angles, their weights, and the families that come there, where the axis turns all around."""
-    rule, _, _ = rule_of(problem, angles_rad, NODES)
+    rule, _, _ = polar_rule(problem, angles_rad, NODES)
     return rule.polar_rad, rule.fine, _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)[0]
 
 
-def _within_limits(problem: Problem, angles_rad: Array) -> tuple[Array, Array, Array]:
+def _within_limits(
+    problem: Problem, angles_rad: Setting
+) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
     """The same at directions, for a sweep: a family comes where the joint angle it needs lies within the limits."""
     assert problem.sweep is not None
     samples = weighted_samples(problem.field, SWEPT_DIRECTIONS)
@@ -122,7 +129,9 @@ def _within_limits(problem: Problem, angles_rad: Array) -> tuple[Array, Array, A
     return polar, samples.weights, families & ((azimuth - beam_azimuth - lower) % (2 * np.pi) <= upper - lower)
 
 
-def _families(bearings_rad: Array, plane_rad: Array, polar_rad: Array) -> tuple[Array, Array]:
+def _families(
+    bearings_rad: Float[ndarray, " beams"], plane_rad: Plane, polar_rad: Float[ndarray, " n"]
+) -> tuple[Bool[ndarray, "2 n"], Float[ndarray, "2 n"]]:
     """Whether each of the two bearings of a polar angle lies in the field of view, and the bearings, (2, n) both."""
     alpha, beta = plane_rad
     q = np.array([-np.sin(beta), np.cos(beta) * np.sin(alpha)])
@@ -139,7 +148,9 @@ def _families(bearings_rad: Array, plane_rad: Array, polar_rad: Array) -> tuple[
     return met & ((both - low) % (2 * np.pi) <= high - low), both
 
 
-def _between_families(normal: Array, polar_rad: Array) -> tuple[Array, Array]:
+def _between_families(
+    normal: Vector, polar_rad: Float[ndarray, " n"]
+) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
     """Azimuth between the two lines through a polar angle, 0 to pi, and the angle at which they cross, 0 to pi/2."""
     slope, upright = np.hypot(normal[0], normal[1]), abs(normal[2])
     sine = np.maximum(np.sin(polar_rad), 1e-12)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from design.angles import STANDARD_DEG
+from design.arrays import Array
 from design.errors import BuildError, TaskError
 from design.evaluation.density_picture import INK
-from design.frames import Array
 from design.search.search import SearchResult
 
 OPTIMUM: dict[str, Any] = {"marker": "*", "ms": 15, "color": "white", "mec": INK, "mew": 1.2}

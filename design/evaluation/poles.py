@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.arrays import Array, Setting
 from design.catalogue.products import Lidar
 from design.density.beams import scan_at
 from design.errors import TaskError
-from design.frames import Array
 from design.objective.problem import Problem
 
 BEAMS = 1, 3  # that a pole is asked for: to be seen at all, and to be more than a stray point
@@ -73,7 +73,7 @@ class PoleChances:
     stands: str
 
 
-def pole_of(text: str, lidar: Lidar) -> Pole:
+def parse_pole(text: str, lidar: Lidar) -> Pole:
     """A pole from `WIDTH_MM,HEIGHT_MM,RANGE_M`.
 
     Raises:
@@ -93,7 +93,7 @@ def pole_of(text: str, lidar: Lidar) -> Pole:
     return Pole(width_mm / 1000, height_mm / 1000, range_m)
 
 
-def pole_chances(problem: Problem, angles_rad: Array, pole: Pole) -> PoleChances:
+def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChances:
     """The chance of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] to hit a pole.
 
     Raises:
@@ -129,7 +129,7 @@ def _standing(problem: Problem, pole: Pole) -> tuple[Array, str]:
     return 1.0 - problem.field.masked_at(directions).reshape(CELLS, HEIGHTS).mean(axis=1), "unmasked"
 
 
-def _hits(problem: Problem, angles_rad: Array, pole: Pole, start: float, rng: np.random.Generator) -> Array:
+def _hits(problem: Problem, angles_rad: Setting, pole: Pole, start: float, rng: np.random.Generator) -> Array:
     """Sorted azimuths, -pi to pi, of the beams of one scan that pass at the height of the pole."""
     if problem.sweep is not None:
         joint = problem.sweep.angles_rad(start)

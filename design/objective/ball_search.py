@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from scipy.spatial import cKDTree
 
+from design.arrays import Array, Rotation, Setting
 from design.density.beams import scan_at
-from design.frames import Array, R_world_rot, rotvec_to_matrix
+from design.frames import R_world_rot, rotvec_to_matrix
 from design.objective.problem import Problem
 from design.sphere.directions import sample_set
 
@@ -25,7 +28,7 @@ class BallScore:
     J_error: float
 
 
-def ball_score(problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
+def ball_score(problem: Problem, angles_rad: Setting, directions: int = DIRECTIONS) -> BallScore:
     """Ball search of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], mean over 8 start phases.
 
     Raises:
@@ -36,12 +39,12 @@ def ball_score(problem: Problem, angles_rad: Array, directions: int = DIRECTIONS
     return ball_score_on(scan_tree(problem, angles_rad), problem, angles_rad, directions)
 
 
-def scan_tree(problem: Problem, angles_rad: Array) -> cKDTree:
+def scan_tree(problem: Problem, angles_rad: Setting) -> cKDTree:
     """The simulated full scan of a setting, ready to be searched; it depends on beams and lines only."""
     return _tree(scan_at(problem.bearings_rad, problem.lines.angles_rad, angles_rad, problem.lever))
 
 
-def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions: int = DIRECTIONS) -> BallScore:
+def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Setting, directions: int = DIRECTIONS) -> BallScore:
     """As `ball_score`, for a scan of a full turn that is there already.
 
     Another start phase is the same scan turned about the axis, so the directions are turned back instead.
@@ -55,13 +58,13 @@ def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Array, directions
     return _score(problem, estimates)
 
 
-def start_phases(lines: int, step_rad: float) -> Array:
+def start_phases(lines: int, step_rad: float) -> Float[ndarray, " n"]:
     """Eight phases spread over the turn and, at once, evenly over the gap between two lines, shape (8,)."""
     i = np.arange(PHASES)
     return step_rad * (np.round(i * lines / PHASES) + (i + 0.5) / PHASES)
 
 
-def _swept_score(problem: Problem, angles_rad: Array, directions: int) -> BallScore:
+def _swept_score(problem: Problem, angles_rad: Setting, directions: int) -> BallScore:
     assert problem.sweep is not None
     estimates = []
     for i in range(PHASES):
@@ -72,11 +75,11 @@ def _swept_score(problem: Problem, angles_rad: Array, directions: int) -> BallSc
     return _score(problem, estimates)
 
 
-def _tree(scan: Array) -> cKDTree:
+def _tree(scan: Float[ndarray, "n 3"]) -> cKDTree:
     return cKDTree(scan, balanced_tree=False, compact_nodes=False)
 
 
-def _estimate(tree: cKDTree, problem: Problem, back: Array, wanted: int, index: int) -> Array:
+def _estimate(tree: cKDTree, problem: Problem, back: Rotation, wanted: int, index: int) -> Float[ndarray, " moments"]:
     """Each moment over one set of directions, at one start phase, shape (moments,)."""
     chord = 2 * np.sin(problem.ball_rad / 2)
     values = []

@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
-from design.density.beams import NO_LEVER, Lines, beam_directions_rot, scan_lines
+from design.arrays import Array, Plane
+from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, scan_lines
 from design.density.sweep import SweepLines
 from design.errors import TaskError
-from design.frames import Array
 from design.motion import Motion, Shortest, StopAndGo, Sweep
-from design.objective.objectives import Objective, objective_of
+from design.objective.named_objectives import Objective, objective_of
 from design.sphere.directions import EMPTY, equal_angle_grid, weighted_samples
 from design.sphere.regions import Field, field_of
 from design.task.task import LoadedTask
@@ -39,8 +41,8 @@ class Problem:
         lever: of the optical centre off the axis, `t_rot_laser / range`. By design 0; the search takes it for 0.
     """
 
-    bearings_rad: Array
-    lines: Lines
+    bearings_rad: Float[ndarray, " beams"]
+    lines: ScanLines
     sweep: SweepLines | None
     ball_rad: float
     objective: Objective
@@ -50,7 +52,7 @@ class Problem:
     tolerance: float = 1e-3
     lever: tuple[float, float, float] = NO_LEVER
 
-    def beams_rot(self, plane_rad: Array) -> Array:
+    def beams_rot(self, plane_rad: Plane) -> Float[ndarray, "beams 3"]:
         """Unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser), shape (beams, 3)."""
         return beam_directions_rot(self.bearings_rad, plane_rad[0], plane_rad[1], self.lever)
 
@@ -63,7 +65,9 @@ class Problem:
         """The same scanner with another aim."""
         return replace(self, objective=objective).with_beams(self.bearings_rad, self.lines, self.sweep)
 
-    def with_beams(self, bearings_rad: Array, lines: Lines, sweep: SweepLines | None = None) -> Problem:
+    def with_beams(
+        self, bearings_rad: Float[ndarray, " beams"], lines: ScanLines, sweep: SweepLines | None = None
+    ) -> Problem:
         """The same task for other beams on other lines."""
         counts = lines.repeats * np.arange(lines.count * len(bearings_rad) + 1.0)
         tables = tuple(moment.g(counts) for moment in self.objective.moments)
@@ -89,7 +93,7 @@ def problem_of(loaded: LoadedTask) -> Problem:
         raise TaskError(f"{loaded.source}: {error}") from error
     motion, lidar = loaded.task.motion, loaded.lidar
     bearings = lidar.bearings_rad()
-    lines = lines_of(motion, lidar.scan_rate_hz)
+    lines = motion_lines(motion, lidar.scan_rate_hz)
     return Problem(
         bearings_rad=bearings,
         lines=lines,
@@ -103,14 +107,14 @@ def problem_of(loaded: LoadedTask) -> Problem:
     ).with_beams(bearings, lines, SweepLines(motion, lidar.scan_rate_hz) if isinstance(motion, Sweep) else None)
 
 
-def lines_of(motion: Motion | Shortest, scan_rate_hz: float) -> Lines:
+def motion_lines(motion: Motion | Shortest, scan_rate_hz: float) -> ScanLines:
     """The scan lines of a motion; of a sweep as many as one period holds, the widest step apart."""
     if isinstance(motion, StopAndGo):
         repeats = max(1, int(motion.dwell_s * scan_rate_hz + 1e-9))
-        return Lines(motion.stops, 2 * np.pi / motion.stops, repeats)
+        return ScanLines(motion.stops, 2 * np.pi / motion.stops, repeats)
     if isinstance(motion, Sweep):
         step = np.radians(motion.cruise_deg_s) / scan_rate_hz
-        return Lines(int(np.ceil(motion.period_s * scan_rate_hz)), float(step))
+        return ScanLines(int(np.ceil(motion.period_s * scan_rate_hz)), float(step))
     return scan_lines(motion.duration_s, scan_rate_hz)
 
 

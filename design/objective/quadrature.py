@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float, Int64
+from numpy import ndarray
 
+from design.arrays import Setting, Vector
 from design.density.beams import polar_and_azimuth
 from design.errors import TaskError
-from design.frames import Array, R_world_rot
+from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.sphere.directions import EMPTY, equal_angle_grid
 from design.sphere.regions import Field, frames_about
@@ -34,15 +36,15 @@ class PolarRule:
         segment: the segment that each node belongs to, shape (n,).
     """
 
-    polar_rad: Array
-    fine: Array
-    coarse: Array
-    segment: NDArray[np.intp]
+    polar_rad: Float[ndarray, " n"]
+    fine: Float[ndarray, " n"]
+    coarse: Float[ndarray, " n"]
+    segment: Int64[ndarray, " n"]
 
 
-def rule_of(
-    problem: Problem, angles_rad: Array, nodes: int, field: Field | None = None
-) -> tuple[PolarRule, Array, Array]:
+def polar_rule(
+    problem: Problem, angles_rad: Setting, nodes: int, field: Field | None = None
+) -> tuple[PolarRule, Float[ndarray, " beams"], Float[ndarray, " beams"]]:
     """Quadrature for one setting over the weights of the task, or another field, and the beams' polar angles, azimuths.
 
     Raises:
@@ -58,7 +60,7 @@ def rule_of(
     return rule, polar, azimuth
 
 
-def _grid_rule(field: Field, step_deg: float, axis: Array) -> PolarRule:
+def _grid_rule(field: Field, step_deg: float, axis: Vector) -> PolarRule:
     """The paper's sum: every grid node counts the same, poles and all."""
     grid = equal_angle_grid(step_deg)
     weights = field.weight_at(grid)
@@ -69,7 +71,9 @@ def _grid_rule(field: Field, step_deg: float, axis: Array) -> PolarRule:
     return PolarRule(unique, summed, summed, np.zeros(len(unique), dtype=np.intp))
 
 
-def _circle_rule(field: Field, ball_rad: float, axis: Array, beam_polar_rad: Array, nodes: int) -> PolarRule:
+def _circle_rule(
+    field: Field, ball_rad: float, axis: Vector, beam_polar_rad: Float[ndarray, " beams"], nodes: int
+) -> PolarRule:
     """Midpoint rule on each segment, nodes gathered at its ends: there the integrand starts like a square root."""
     segments = _weighted_segments(field, axis, _density_breaks(beam_polar_rad, ball_rad))
     length = sum(b - a for a, b in segments)
@@ -90,25 +94,25 @@ def _circle_rule(field: Field, ball_rad: float, axis: Array, beam_polar_rad: Arr
     return PolarRule(t, np.concatenate(fine) * around, np.concatenate(coarse) * around, segment)
 
 
-def _density_breaks(beam_polar_rad: Array, ball_rad: float) -> Array:
+def _density_breaks(beam_polar_rad: Float[ndarray, " beams"], ball_rad: float) -> Float[ndarray, " n"]:
     """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends."""
     marks = np.array([beam_polar_rad.min(), beam_polar_rad.max(), beam_polar_rad[0], beam_polar_rad[-1]])
     return np.concatenate([marks - ball_rad, marks, marks + ball_rad])
 
 
-def _fold(polar_rad: Array) -> Array:
+def _fold(polar_rad: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
     """Bring polar angles past a pole back to 0 .. pi."""
     beyond = np.abs(polar_rad) % (2 * np.pi)
     return np.where(beyond > np.pi, 2 * np.pi - beyond, beyond)
 
 
-def breaks_of(field: Field, axis: Array, more_rad: Array) -> Array:
+def breaks_of(field: Field, axis: Vector, more_rad: Float[ndarray, " more"]) -> Float[ndarray, " n"]:
     """Polar angles about an axis where the circle mean of the weight breaks, with some more, sorted, 0 to pi."""
     of_field = _breaks(field, axis)
     return np.unique(np.round(np.concatenate([of_field, _fold(more_rad)]), 12))
 
 
-def _weighted_segments(field: Field, axis: Array, more_rad: Array) -> list[tuple[float, float]]:
+def _weighted_segments(field: Field, axis: Vector, more_rad: Float[ndarray, " n"]) -> list[tuple[float, float]]:
     """Ranges of the polar angle between breaks, those of weight zero left out."""
     breaks = breaks_of(field, axis, more_rad)
     middles = (breaks[:-1] + breaks[1:]) / 2
@@ -116,7 +120,7 @@ def _weighted_segments(field: Field, axis: Array, more_rad: Array) -> list[tuple
     return [(a, b) for a, b, m in zip(breaks[:-1], breaks[1:], means, strict=True) if m > 0 and b - a > 1e-12]
 
 
-def _breaks(field: Field, axis: Array) -> Array:
+def _breaks(field: Field, axis: Vector) -> Float[ndarray, " n"]:
     """Polar angles at which a circle about `axis` touches an edge or passes a corner; 0 and pi too."""
     planes = np.concatenate([field.weight.planes, field.mask.planes])
     if len(planes) > MANY_EDGES:
@@ -128,13 +132,13 @@ def _breaks(field: Field, axis: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _edge_corners(field: Field) -> Array:
+def _edge_corners(field: Field) -> Float[ndarray, "n 3"]:
     """Corners of the region, the same about every axis."""
     corners = _corners(np.concatenate([field.weight.planes, field.mask.planes]))
     return corners[_is_edge(field, corners)]
 
 
-def _is_edge(field: Field, points: Array) -> NDArray[np.bool_]:
+def _is_edge(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
     """Whether the weight changes around points of edge planes: most crossings lie within a region, or outside all."""
     if not len(points):
         return np.zeros(0, dtype=bool)
@@ -147,7 +151,7 @@ def _is_edge(field: Field, points: Array) -> NDArray[np.bool_]:
     return np.ptp(values, axis=1) > 0
 
 
-def _touched(planes: Array, axis: Array) -> Array:
+def _touched(planes: Float[ndarray, "edges 4"], axis: Vector) -> Float[ndarray, "n 3"]:
     """Points of each edge circle nearest to the axis and farthest from it, shape (n, 3)."""
     normals, offsets = planes[:, :3], planes[:, 3:]
     across = axis - normals * (normals @ axis)[:, None]
@@ -158,7 +162,7 @@ def _touched(planes: Array, axis: Array) -> Array:
     return np.concatenate([normals * offsets + side * radius, normals * offsets - side * radius])
 
 
-def _corners(planes: Array) -> Array:
+def _corners(planes: Float[ndarray, "edges 4"]) -> Float[ndarray, "n 3"]:
     """Points of the sphere where two edge planes meet, shape (n, 3)."""
     i, j = np.triu_indices(len(planes), 1)
     m, n = planes[i, :3], planes[j, :3]

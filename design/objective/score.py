@@ -1,4 +1,4 @@
-"""J of one setting, with the error of its own quadrature, for any objective of `design.objective.objectives`.
+"""J of one setting, with the error of its own quadrature, for any objective of `design.objective.named_objectives`.
 
 In coordinates about the axis each moment `int w <g(d)> dO / int w dO` is one-dimensional: the zonal `<g(d)>`
 (`design.density.spin`) times the mean weight of each circle (`design.sphere.regions`), both exact at every polar angle.
@@ -12,13 +12,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
+from design.arrays import Setting
 from design.density.spin import Zones, zones
 from design.density.sweep import zones_swept
-from design.frames import Array, R_world_rot
-from design.objective.objectives import Moment
+from design.frames import R_world_rot
+from design.objective.named_objectives import Moment
 from design.objective.problem import Problem
-from design.objective.quadrature import rule_of
+from design.objective.quadrature import polar_rule
 from design.sphere.directions import sample_set
 
 MOST_NODES = 200_000
@@ -45,7 +48,7 @@ class Score:
     blind_weight: float
 
 
-def score(problem: Problem, angles_rad: Array) -> Score:
+def score(problem: Problem, angles_rad: Setting) -> Score:
     """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], on as many nodes as its tolerance needs.
 
     Raises:
@@ -59,7 +62,7 @@ def score(problem: Problem, angles_rad: Array) -> Score:
         nodes *= 3
 
 
-def score_on(problem: Problem, angles_rad: Array, nodes: int) -> Score:
+def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
     """J of a setting on a number of nodes.
 
     The rule with a third of the nodes is inside the full one. Their differences on the segments have no common sign,
@@ -85,7 +88,7 @@ def score_on(problem: Problem, angles_rad: Array, nodes: int) -> Score:
     )
 
 
-def quick_J(problem: Problem, angles_rad: Array, nodes: int) -> float:
+def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """J alone, as `score` computes it: for searches that call it often."""
     take = _moment_on_circles if problem.sweep is None else _moment_on_directions
     found = [take(problem, k, angles_rad, nodes).value for k in range(len(problem.objective.moments))]
@@ -103,10 +106,10 @@ class _Found:
     blind: float
 
 
-def _moment_on_circles(problem: Problem, index: int, angles_rad: Array, nodes: int) -> _Found:
+def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
     """A moment by quadrature over the polar angle."""
     moment = problem.objective.moments[index]
-    rule, polar, azimuth = rule_of(problem, angles_rad, nodes, moment.field)
+    rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[index])
     lower = moment.g(z.mean)
     if moment.gathered == "highest":
@@ -126,7 +129,7 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Array, nodes: i
     )
 
 
-def _moment_on_directions(problem: Problem, index: int, angles_rad: Array, nodes: int) -> _Found:
+def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
     """A moment over `SETS` sets of directions; four standard errors of their mean are its error."""
     assert problem.sweep is not None
     moment = problem.objective.moments[index]
@@ -154,7 +157,13 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Array, nodes
     )
 
 
-def _highest(moment: Moment, z: Zones, lower: Array, fine: Array, coarse: Array) -> _Found:
+def _highest(
+    moment: Moment,
+    z: Zones,
+    lower: Float[ndarray, " n"],
+    fine: Float[ndarray, " n"],
+    coarse: Float[ndarray, " n"],
+) -> _Found:
     """The highest g anywhere; its error is what a third of the nodes misses."""
     g = moment.g(z.least)
     value = float(g[fine > 0].max())

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from jaxtyping import Float, Int32
+from numpy import ndarray
+from numpy.typing import ArrayLike
 
 from design import frames
+from design.arrays import Array, Vector
 from design.errors import SceneError
-from design.frames import Array
 from design.scene.nearest import Nearest, nearest_search
 
 SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
@@ -38,9 +40,9 @@ class Scene:
         nearest: finds the triangle that a ray hits first.
     """
 
-    triangles_m: Array
-    normals: Array
-    origin_m: Array
+    triangles_m: Float[ndarray, "t 3 3"]
+    normals: Float[ndarray, "t 3"]
+    origin_m: Vector
     nearest: Nearest
 
 
@@ -54,17 +56,17 @@ class Hits:
         triangle: row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 where there is nothing.
     """
 
-    range_m: Array
-    incidence_rad: Array
-    triangle: NDArray[np.int32]
+    range_m: Float[ndarray, " n"]
+    incidence_rad: Float[ndarray, " n"]
+    triangle: Int32[ndarray, " n"]
 
 
 def load_scene(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Scene:
     """Scene of one mesh file; arguments and errors as for `load_triangles`."""
-    return scene_of(load_triangles(path, unit_m, T_world_mesh), str(path))
+    return build_scene(load_triangles(path, unit_m, T_world_mesh), str(path))
 
 
-def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Array:
+def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Float[ndarray, "t 3 3"]:
     """Corners of a mesh in the world [m], shape (t, 3, 3). The file's axes are taken as they are written.
 
     Args:
@@ -94,7 +96,7 @@ def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _A
     return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
 
 
-def scene_of(triangles_m: Array, name: str = "scene") -> Scene:
+def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Scene:
     """Scene of triangles, shape (t, 3, 3); `name` is what an error calls it.
 
     Raises:

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
 
 from design.errors import TaskError
-from design.frames import Array, Rx, Ry, Rz
+from design.frames import Rx, Ry, Rz
 from design.scene.ray_caster import cast, load_scene
 
 
@@ -23,23 +25,23 @@ class Surface:
         points_m: what is hit, in the frame of the mesh, shape (rows, columns, 3).
     """
 
-    directions: Array
-    range_m: Array
-    incidence_rad: Array
-    points_m: Array
+    directions: Float[ndarray, "rows columns 3"]
+    range_m: Float[ndarray, "rows columns"]
+    incidence_rad: Float[ndarray, "rows columns"]
+    points_m: Float[ndarray, "rows columns 3"]
 
-    def area_per_sr(self) -> Array:
+    def area_per_sr(self) -> Float[ndarray, "rows columns"]:
         """Square metres of surface behind a steradian, `r^2 / cos(incidence)`; 0 where nothing is hit."""
         hit = np.isfinite(self.range_m)
         across = np.cos(np.where(hit, self.incidence_rad, 0.0))
         return np.where(hit & (across > 1e-3), np.where(hit, self.range_m, 0.0) ** 2 / np.maximum(across, 1e-3), 0.0)
 
-    def within(self, low_m: float, high_m: float) -> Array:
+    def within(self, low_m: float, high_m: float) -> Bool[ndarray, "rows columns"]:
         """Whether a surface lies between two ranges, shape (rows, columns)."""
         return (self.range_m >= low_m) & (self.range_m <= high_m)
 
 
-def cell_directions(step_deg: float) -> Array:
+def cell_directions(step_deg: float) -> Float[ndarray, "rows columns 3"]:
     """Middles of the cells of a grid in theta and phi, shape (180 / step, 360 / step, 3)."""
     rows = round(180 / step_deg)
     theta = (np.arange(rows) + 0.5) * np.pi / rows

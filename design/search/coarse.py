@@ -12,14 +12,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from numba import njit
+from numpy import ndarray
 
+from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
 from design.density.spin import mean_count, zones
 from design.errors import TaskError
-from design.frames import Array
-from design.objective.objectives import Objective
+from design.objective.named_objectives import Objective
 from design.objective.problem import Problem
 from design.objective.quadrature import MANY_EDGES
 from design.search.grid_classes import Folded
@@ -59,7 +61,7 @@ class Landscape:
     its_axis: tuple[Array, Array]
     by_axis: Array
 
-    def about_axes(self, plane: int) -> Array:
+    def about_axes(self, plane: int) -> Float[ndarray, "ways axes"]:
         """J of one plane class, not flipped, about each axis class, not flipped and flipped, shape (2, axes)."""
         parts = [
             np.stack([gathered(moment, w, g[plane]), gathered(moment, w, g[plane, ::-1])])
@@ -68,7 +70,7 @@ class Landscape:
         return self.objective.join(np.stack(parts))
 
 
-def landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
+def coarse_landscape(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact.
 
     The others keep their bound, g of the mean count: it is above the best by more than the search may be off.
@@ -131,7 +133,7 @@ def _means(problem: Problem, polar: Array, planes_rad: Array) -> Array:
     return np.stack([mean_count(polar, row, problem.lines, problem.ball_rad) for row in beams])
 
 
-def _exact(problem: Problem, polar: Array, planes_rad: Array) -> Array:
+def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) -> Array:
     """`<g(d)>` of scan planes (alpha_laser, beta_laser) (n, 2) at polar angles, shape (moments, n, nodes)."""
 
     def rows(plane: Array) -> Array:
@@ -146,7 +148,9 @@ def _exact(problem: Problem, polar: Array, planes_rad: Array) -> Array:
     return np.stack([row for part in parts for row in part], axis=1)
 
 
-def _weights_over_polar(problem: Problem, field: Field, axes: Array, nodes: int, circles: int) -> Array:
+def _weights_over_polar(
+    problem: Problem, field: Field, axes: Float[ndarray, "axes 3"], nodes: int, circles: int
+) -> Array:
     """Share of a weight near each polar node about each axis, shape (axes, nodes); rows sum to 1."""
     if problem.grid_step_deg or field.edges > MANY_EDGES:
         if problem.grid_step_deg:

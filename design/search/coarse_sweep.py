@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot
 from design.density.sweep import mean_count_swept, zones_swept
 from design.errors import TaskError
-from design.frames import Array, R_world_rot
-from design.objective.objectives import Moment
+from design.frames import R_world_rot
+from design.objective.named_objectives import Moment
 from design.objective.problem import Problem
 from design.search.coarse import MARGIN, Landscape, Progress
 from design.search.grid_classes import Folded
@@ -28,7 +29,7 @@ MOST_SETTINGS = 50_000_000
 REPORT = 200
 
 
-def swept_landscape_of(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
+def swept_landscape(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact; the others keep their bound.
 
     Raises:

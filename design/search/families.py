@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from scipy.optimize import minimize
 
-from design.frames import Array, R_world_rot
+from design.arrays import Array, Mask, Setting
+from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score, quick_J, score
 from design.search.coarse import Landscape
-from design.search.grid_classes import Folded, Mask
+from design.search.grid_classes import Folded
 from design.search.tolerance import worst_within
 from design.task.task import NAMES, AngleRanges
 
@@ -45,7 +48,7 @@ class Family:
     grid_deg: tuple[float, float, float, float] | None = None
 
     @property
-    def angles_rad(self) -> Array:
+    def angles_rad(self) -> Setting:
         """The four angles in radians, shape (4,)."""
         return np.radians(self.angles_deg)
 
@@ -54,7 +57,7 @@ class Family:
 class Leader:
     """Settings of equal coarse J, shown by the one that builds best; no `minimum` is on the slope of a better one."""
 
-    angles_deg: Array
+    angles_deg: Setting
     J_coarse: float
     members: int
     axes: int
@@ -62,7 +65,7 @@ class Leader:
     minimum: bool
 
 
-def leaders_of(land: Landscape, planes: Folded, axes: Folded, mirrors: Array) -> list[Leader]:
+def find_leaders(land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"]) -> list[Leader]:
     """Local minima of J over planes and axes, lowest first, then settings on their slopes; equal ones are one.
 
     A minimum takes its valley with it: settings about nearly the same axis with nearly the same J, whatever the plane.
@@ -139,7 +142,7 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
     return Leader(best, float(J[way, axis]), len(angles), len(distinct), every, minimum)
 
 
-def families_of(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> tuple[Family, ...]:
+def refine_leaders(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> tuple[Family, ...]:
     """Score leaders exactly and refine the minima, the winner twice; valleys of better ones are dropped."""
     minima = [(score(problem, np.radians(leader.angles_deg)), leader) for leader in leaders if leader.minimum]
     minima.sort(key=lambda pair: pair[0].J)
@@ -191,7 +194,7 @@ def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
     return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)
 
 
-def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...]) -> Array:
+def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...]) -> Setting:
     """The nearest minimum of J, rounded to 0.01 deg; angles that the task fixes stay, and an axis that is any."""
     limits = np.array([ranges.limits(name) for name in NAMES])
     free = limits[:, 1] > limits[:, 0]

@@ -12,12 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float, Int64
+from numpy import ndarray
 
-from design.frames import Array, R_world_rot
+from design.frames import R_world_rot
 from design.task.task import AngleRanges
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,21 +33,21 @@ class Folded:
         own: whether a class is its own turned image: its J is the same both ways round, shape (classes,).
     """
 
-    settings_deg: Array
-    points: Array
-    classes: NDArray[np.intp]
-    flip: Mask
-    first: NDArray[np.intp]
-    has: Mask
-    own: Mask
+    settings_deg: Float[ndarray, "n 2"]
+    points: Float[ndarray, "n k"]
+    classes: Int64[ndarray, " n"]
+    flip: Bool[ndarray, " n"]
+    first: Int64[ndarray, " classes"]
+    has: Bool[ndarray, "2 classes"]
+    own: Bool[ndarray, " classes"]
 
     @property
-    def representatives(self) -> Array:
+    def representatives(self) -> Float[ndarray, "classes k"]:
         """`points` of the first setting of each class."""
         return self.points[self.first]
 
 
-def mirrors_of(bearings_rad: Array) -> Array:
+def mirrors_of(bearings_rad: Float[ndarray, " beams"]) -> Float[ndarray, "mirrors 2 2"]:
     """Mirrors of (q0, q1) that a fan allows, shape (1 or 2, 2, 2); the identity is the first."""
     symmetric = np.allclose(bearings_rad, -bearings_rad[::-1], atol=1e-9)
     return np.array([np.eye(2), np.diag([1.0, -1.0])])[: 2 if symmetric else 1]
@@ -60,7 +59,7 @@ def fold_axes(ranges: AngleRanges) -> Folded:
     return _fold(settings, R_world_rot(*np.radians(settings.T))[:, :, 2], np.eye(3)[None])
 
 
-def fold_planes(ranges: AngleRanges, mirrors: Array) -> Folded:
+def fold_planes(ranges: AngleRanges, mirrors: Float[ndarray, "mirrors 2 2"]) -> Folded:
     """Scan planes of the grid up to the mirrors and the sign."""
     settings = _grid(ranges, "alpha_laser", "beta_laser")
     return _fold(settings, plane_key(np.radians(settings)), mirrors)
@@ -73,24 +72,26 @@ def unfolded(ranges: AngleRanges) -> tuple[Folded, Folded]:
     return _apart(axes, R_world_rot(*np.radians(axes.T))[:, :, 2]), _apart(planes, plane_key(np.radians(planes)))
 
 
-def plane_key(plane_rad: Array) -> Array:
+def plane_key(plane_rad: Float[ndarray, "*k 2"]) -> Float[ndarray, "*k 2"]:
     """(q0, q1) of scan planes (alpha_laser, beta_laser) (n, 2): beam polar angles are acos(q0 cos b + q1 sin b)."""
     alpha, beta = plane_rad.T
     return np.stack([-np.sin(beta), np.cos(beta) * np.sin(alpha)], axis=1)
 
 
-def _grid(ranges: AngleRanges, first: str, second: str) -> Array:
+def _grid(ranges: AngleRanges, first: str, second: str) -> Float[ndarray, "n 2"]:
     a, b = np.meshgrid(ranges.grid_deg(first), ranges.grid_deg(second), indexing="ij")
     return np.stack([a.ravel(), b.ravel()], axis=1)
 
 
-def _apart(settings: Array, points: Array) -> Folded:
+def _apart(settings: Float[ndarray, "n 2"], points: Float[ndarray, "n k"]) -> Folded:
     each = np.arange(len(settings))
     no = np.zeros(len(settings), dtype=bool)
     return Folded(settings, points, each, no, each, np.stack([~no, no]), no)
 
 
-def _fold(settings: Array, points: Array, mirrors: Array) -> Folded:
+def _fold(
+    settings: Float[ndarray, "n 2"], points: Float[ndarray, "n k"], mirrors: Float[ndarray, "mirrors k k"]
+) -> Folded:
     """Group points that are equal up to the mirrors (no flip), or up to the mirrors and the sign (flip)."""
     images = np.concatenate([points @ m for m in mirrors] + [-points @ m for m in mirrors])
     keys = np.round(images, 9) + 0.0  # -0.0 is 0.0

@@ -9,13 +9,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
 
 from design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
 from design.errors import TaskError
-from design.frames import Array
 from design.objective.problem import Problem
 from design.objective.score import Score
-from design.search.grid_classes import Folded, Mask
+from design.search.grid_classes import Folded
 from design.task.task import Limits
 
 
@@ -42,7 +43,7 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
     return _only(planes, keep)
 
 
-def planes_keep(problem: Problem, planes_rad: Array, limits: Limits) -> Mask:
+def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Limits) -> Bool[ndarray, " n"]:
     """Whether scan planes (n, 2) keep the limits on gaps and blind cones, shape (n,)."""
     keep = np.ones(len(planes_rad), dtype=bool)
     if limits.max_line_gap_deg is not None:
@@ -57,19 +58,19 @@ def keeps(score: Score, limits: Limits) -> bool:
     return score.least >= (limits.min_density or 0) and score.blind_weight <= (limits.max_blind_weight or 1.0)
 
 
-def blind_cones_deg(problem: Problem, planes_rad: Array) -> Array:
+def blind_cones_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
     """Half angle of the wider blind cone about the axis, of scan planes (n, 2), shape (n,)."""
     polar = polar_of_planes(problem.bearings_rad, planes_rad)
     return np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
 
 
-def line_gaps_deg(problem: Problem, planes_rad: Array) -> Array:
+def line_gaps_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
     """Widest distance between neighbouring scan lines of one family, across them, of scan planes (n, 2), shape (n,)."""
     spacings = [line_spacing(beam_directions_rot(problem.bearings_rad, *plane), plane) for plane in planes_rad]
     return np.degrees(problem.lines.step_rad * np.array(spacings))
 
 
-def _only(planes: Folded, keep: Mask) -> Folded:
+def _only(planes: Folded, keep: Bool[ndarray, " classes"]) -> Folded:
     """The classes that are kept, with their settings."""
     numbers = np.cumsum(keep) - 1
     kept = keep[planes.classes]

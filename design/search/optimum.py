@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from design.angles import AngleSet, standard_settings
-from design.frames import Array
+from design.arrays import Array
 from design.left_out import LeftOut
 from design.motion import Shortest
 from design.objective.problem import Problem, problem_of
@@ -110,7 +110,7 @@ class Optimum:
         return lines
 
 
-def optimum_of(loaded: LoadedTask, progress: Progress) -> Optimum:
+def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
     """Search a task, for the shortest period first if it asks for that.
 
     Raises:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Float
 from numba import njit
+from numpy import ndarray
 
+from design.arrays import Array, Mask
 from design.concurrency.parallel import in_chunks
-from design.frames import Array
-from design.objective.objectives import Moment, Objective
-from design.search.grid_classes import Mask
+from design.objective.named_objectives import Moment, Objective
 
 PIECE = 128  # planes per piece of the product
 
@@ -18,7 +19,7 @@ BothWays = Callable[[slice], tuple[Array, Array]]
 """A moment of a piece of planes about all axes, (planes, axes): straight, and with the planes turned round."""
 
 
-def gathered(moment: Moment, weights: Array, g: Array) -> Array:
+def gathered(moment: Moment, weights: Float[ndarray, "... axes nodes"], g: Float[ndarray, "planes nodes"]) -> Array:
     """A moment of one plane about each axis, from its g over the nodes, shape (axes,)."""
     return weights @ g if moment.gathered == "mean" else np.where(weights > 0, g, -np.inf).max(axis=1)
 

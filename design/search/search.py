@@ -6,15 +6,16 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from design.errors import TaskError
-from design.frames import Array
 from design.left_out import LeftOut
 from design.objective.problem import Problem
 from design.objective.score import score
-from design.search.coarse import Landscape, Progress, landscape_of
-from design.search.coarse_sweep import swept_landscape_of
-from design.search.families import Family, best_leader, families_of, leaders_of
+from design.search.coarse import Landscape, Progress, coarse_landscape
+from design.search.coarse_sweep import swept_landscape
+from design.search.families import Family, best_leader, find_leaders, refine_leaders
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.limits import allowed_planes, keeps, planes_keep
 from design.task.task import NAMES, AngleRanges, Limits
@@ -43,8 +44,8 @@ class SearchResult:
     evaluated: int
     seconds: float
     left_out: tuple[LeftOut, ...]
-    planes: Array
-    axes: Array
+    planes: Float[ndarray, "planes 5"]
+    axes: Float[ndarray, "axes 3"]
 
 
 def search(
@@ -63,21 +64,21 @@ def search(
     if problem.sweep is None:
         axes, planes = fold_axes(ranges), allowed_planes(problem, fold_planes(ranges, mirrors), limits)
         progress(f"{len(planes.first):,} different scan planes x {len(axes.first):,} axes, both ways round")
-        land, exact = landscape_of(problem, planes, axes, progress)
+        land, exact = coarse_landscape(problem, planes, axes, progress)
     else:
         mirrors, (axes, planes) = mirrors[:1], unfolded(ranges)
         planes = allowed_planes(problem, planes, limits)
         progress(f"{len(planes.first):,} scan planes x {len(axes.first):,} mountings of the servo")
-        land, exact = swept_landscape_of(problem, planes, axes, progress)
+        land, exact = swept_landscape(problem, planes, axes, progress)
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
-        leaders = leaders_of(land, planes, axes, mirrors)
+        leaders = find_leaders(land, planes, axes, mirrors)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG})
         coarse_axes, coarse_planes = fold_axes(coarse), allowed_planes(problem, fold_planes(coarse, mirrors), limits)
-        coarse_land, _ = landscape_of(problem, coarse_planes, coarse_axes, progress)
-        leaders = [best_leader(land, planes, axes), *leaders_of(coarse_land, coarse_planes, coarse_axes, mirrors)]
+        coarse_land, _ = coarse_landscape(problem, coarse_planes, coarse_axes, progress)
+        leaders = [best_leader(land, planes, axes), *find_leaders(coarse_land, coarse_planes, coarse_axes, mirrors)]
     progress("rescoring the leaders exactly, refining the minima")
-    families = _kept(families_of(problem, ranges, leaders), problem, limits)
+    families = _kept(refine_leaders(problem, ranges, leaders), problem, limits)
     covered = len(axes.settings_deg) * len(planes.settings_deg)
     different = _different(planes, axes)
     return SearchResult(
@@ -124,7 +125,7 @@ def _different(planes: Folded, axes: Folded) -> int:
     return 2 * len(planes.first) * len(axes.first) - one_way
 
 
-def _plane_table(planes: Folded, axes: Folded, land: Landscape) -> Array:
+def _plane_table(planes: Folded, axes: Folded, land: Landscape) -> Float[ndarray, "planes 5"]:
     """See `SearchResult.planes`."""
     flip = planes.flip.astype(int)
     J = land.by_plane[flip, planes.classes]

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.density.beams import Lines
+from design.arrays import Setting
+from design.density.beams import ScanLines
 from design.density.spin import zones
 from design.errors import TaskError
-from design.frames import Array
 from design.motion import Shortest, Spin
 from design.objective.problem import NODES, Problem, problem_of
-from design.objective.quadrature import rule_of
+from design.objective.quadrature import polar_rule
 from design.objective.score import score
 from design.search.coarse import Progress
 from design.search.families import Family
@@ -59,7 +59,7 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
 
 
 def shortest_period_s(
-    problem: Problem, angles_rad: Array, scan_rate_hz: float, least: int, nodes: int = NODES
+    problem: Problem, angles_rad: Setting, scan_rate_hz: float, least: int, nodes: int = NODES
 ) -> float:
     """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
 
@@ -71,11 +71,11 @@ def shortest_period_s(
     """
     if least < 1:
         raise TaskError(f"density {least}: ask for at least 1 beam per ball")
-    rule, beam_polar, beam_azimuth = rule_of(problem, angles_rad, nodes)
+    rule, beam_polar, beam_azimuth = polar_rule(problem, angles_rad, nodes)
     polar_rad = rule.polar_rad[rule.fine > 0]
 
     def enough(count: int) -> bool:
-        lines = Lines(count, 2 * np.pi / count)
+        lines = ScanLines(count, 2 * np.pi / count)
         flat = np.zeros(count * len(problem.bearings_rad) + 1)
         found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, flat)
         return bool(found.least.min() >= least)

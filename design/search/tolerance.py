@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.frames import Array
+from design.arrays import Setting
 from design.objective.problem import NODES, Problem
 from design.objective.score import quick_J
 from design.task.task import NAMES
 
 
-def sensitivity(problem: Problem, angles_rad: Array, off_rad: float, nodes: int = NODES) -> dict[str, float]:
+def sensitivity(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int = NODES) -> dict[str, float]:
     """What each mounting angle costs in J when it alone is off, either way: the worse of the two."""
     J = quick_J(problem, angles_rad, nodes)
     worse = [max(quick_J(problem, moved, nodes) for moved in pair) - J for pair in _moved(angles_rad, off_rad)]
     return dict(zip(NAMES, worse, strict=True))
 
 
-def worst_within(problem: Problem, angles_rad: Array, off_rad: float, nodes: int) -> float:
+def worst_within(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int) -> float:
     """Highest J of the setting and of those with one angle off, either way."""
     settings = [angles_rad, *(moved for pair in _moved(angles_rad, off_rad) for moved in pair)]
     return max(quick_J(problem, setting, nodes) for setting in settings)
@@ -33,5 +33,5 @@ def rise_words(rises: dict[str, float], J_error: float) -> str:
     return f"J rises by {rising}" + (f", by no more than its error ({still})" if still else "")
 
 
-def _moved(angles_rad: Array, off_rad: float) -> list[tuple[Array, Array]]:
+def _moved(angles_rad: Setting, off_rad: float) -> list[tuple[Setting, Setting]]:
     return [(angles_rad - off_rad * axis, angles_rad + off_rad * axis) for axis in np.eye(4)]

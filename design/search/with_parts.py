@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
 
+from design.arrays import Setting
 from design.density.ball_count import ball_count
 from design.density.beams import scan_at
 from design.errors import BuildError
-from design.frames import Array
 from design.objective.ball_search import start_phases
 from design.objective.problem import Problem
 from design.objective.score import Score, score
@@ -43,11 +45,11 @@ class Workshop(Protocol):
     Settings are (alpha_rot, beta_rot, alpha_laser, beta_laser) in radians.
     """
 
-    def bound(self, setting_rad: Array) -> Shadow | Refused:
+    def bound(self, setting_rad: Setting) -> Shadow | Refused:
         """What the parts hide at least, in closed form: `stator` is None, all of it holds at every axis angle."""
         ...
 
-    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+    def shadow(self, setting_rad: Setting) -> Shadow | Refused:
         """What the parts hide, from the parts themselves."""
         ...
 
@@ -88,7 +90,7 @@ class Chosen:
         return lines
 
 
-def choose(
+def choose_with_parts(
     problem: Problem,
     families: tuple[Family, ...],
     ranges: AngleRanges,
@@ -143,7 +145,7 @@ def choose(
     return replace(best, bounded=bounded, built=built, refused=tuple(refused))
 
 
-def score_with(problem: Problem, angles_rad: Array, shadow: Shadow) -> Score:
+def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
     """J of a setting whose parts hide beams.
 
     What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
@@ -186,7 +188,9 @@ def _without(problem: Problem, shadow: Shadow, angles_deg: tuple[float, ...]) ->
     return score(seen, np.radians(angles_deg))
 
 
-def _sampled(problem: Problem, angles_rad: Array, stator: Array, index: int) -> Array:
+def _sampled(
+    problem: Problem, angles_rad: Setting, stator: Bool[ndarray, "beams angles"], index: int
+) -> Float[ndarray, "2 moments"]:
     """Moments with and without what stands still, over one set of directions at one start phase, (2, moments)."""
     if problem.sweep is None:
         joint = problem.lines.angles_rad + start_phases(problem.lines.count, problem.lines.step_rad)[2 * index]

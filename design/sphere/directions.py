@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from design.errors import TaskError
-from design.frames import Array
 from design.sphere.regions import SPHERE, Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
@@ -19,11 +20,13 @@ EMPTY = "weight: the region is empty: no direction has a weight above 0 outside 
 class Samples:
     """Directions (n, 3) and what each adds to `int w dO`, shape (n,)."""
 
-    directions: Array
-    weights: Array
+    directions: Float[ndarray, "n 3"]
+    weights: Float[ndarray, " n"]
 
 
-def spiral(count: int, turn_rad: float = 0.0, cap_rad: float = np.pi, shift: float = 0.5) -> Array:
+def spiral(
+    count: int, turn_rad: float = 0.0, cap_rad: float = np.pi, shift: float = 0.5
+) -> Float[ndarray, "{count} 3"]:
     """Fibonacci spiral: `count` directions of equal solid angle within `cap_rad` of z, shape (count, 3).
 
     Each stands for a slice of the cap; `shift` is where in it, 0 to 1.
@@ -35,7 +38,7 @@ def spiral(count: int, turn_rad: float = 0.0, cap_rad: float = np.pi, shift: flo
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1)
 
 
-def equal_angle_grid(step_deg: float) -> Array:
+def equal_angle_grid(step_deg: float) -> Float[ndarray, "n 3"]:
     """The paper's grid: theta 0 .. 180, phi 0 .. 360 (excluded) in equal steps, row after row, shape (n, 3)."""
     theta = np.radians(np.arange(0, 180 + step_deg / 2, step_deg))
     phi = np.radians(np.arange(0, 360 - step_deg / 2, step_deg))
@@ -82,7 +85,9 @@ def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: in
     return weighted_samples(field, wanted + 17 * index, turn_rad=float(index), shift=(0.5 + index / GOLDEN) % 1)
 
 
-def _in_cap(field: Field, caps: Array, index: int, wanted: int, turn_rad: float, shift: float) -> Samples:
+def _in_cap(
+    field: Field, caps: Float[ndarray, "caps 4"], index: int, wanted: int, turn_rad: float, shift: float
+) -> Samples:
     """Weighted directions in one cap and in none before it; denser until there are enough, or it is given up."""
     centre, reach = caps[index, :3], float(caps[index, 3])
     to_centre = frames_about(centre[None])[0]

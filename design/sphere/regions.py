@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool, Float
 from numba import njit
+from numpy import ndarray
 
+from design.arrays import Array, Vector
 from design.concurrency.parallel import in_chunks
-from design.frames import Array
 from design.scene.surface import Surface
-from design.task.shapes import All, Band, Box, Cone, Map, MaskRegion, Region
+from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, MapRegion, MaskRegion, Region
 from design.task.task import LoadedTask
 
 ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
@@ -34,10 +36,10 @@ class Layers:
     `caps`: for each region with a value above 0 a cap that holds it, (direction, angular radius), shape (caps, 4).
     """
 
-    rows: Array
-    planes: Array
-    tables: Array
-    caps: Array
+    rows: Float[ndarray, "regions 8"]
+    planes: Float[ndarray, "edges 4"]
+    tables: Float[ndarray, "maps rows columns"]
+    caps: Float[ndarray, "caps 4"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +50,12 @@ class Field:
     mask: Layers
     background: float
 
-    def weight_at(self, directions: Array) -> Array:
+    def weight_at(self, directions: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
         """Weight of unit vectors (n, 3); masked directions weigh 0. Shape (n,)."""
         painted = _paint(self.weight, directions, self.background)
         return np.where(self.masked_at(directions), 0.0, painted)
 
-    def masked_at(self, directions: Array) -> Array:
+    def masked_at(self, directions: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
         """Whether unit vectors (n, 3) are hidden by the robot, shape (n,)."""
         return _paint(self.mask, directions, 0.0) > 0
 
@@ -62,14 +64,18 @@ class Field:
         """Number of edge planes: what a circle integral costs."""
         return len(self.weight.planes) + len(self.mask.planes)
 
-    def on_circles(self, axis: Array, polar_rad: Array) -> tuple[Array, Array]:
+    def on_circles(
+        self, axis: Vector, polar_rad: Float[ndarray, " n"]
+    ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
         numbers = self._numbers()
         frame = frames_about(axis[None])
         parts = in_chunks(lambda chunk: _circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
         return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
 
-    def on_circles_about(self, axes: Array, polar_rad: Array) -> Array:
+    def on_circles_about(
+        self, axes: Float[ndarray, "axes 3"], polar_rad: Float[ndarray, " n"]
+    ) -> Float[ndarray, "axes n"]:
         """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
         numbers = self._numbers()
         frames = frames_about(axes)
@@ -107,7 +113,7 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
     area = surface.area_per_sr()
     painted = np.full(shape, loaded.task.density.background)
     for region in loaded.task.weight:
-        if isinstance(region, Box):
+        if isinstance(region, BoxRegion):
             inside = ((surface.points_m >= region.min_m) & (surface.points_m <= region.max_m)).all(axis=2)
             painted = np.where(inside, weight_of(region) * area, painted)
             continue
@@ -117,7 +123,7 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
     robot = _paint(_layers(loaded.task.mask, maps, value_of), flat, 0.0).reshape(shape) > 0
     lidar = loaded.lidar
     seen = surface.within(lidar.range_min_mm / 1000, (lidar.range_practical_mm or lidar.range_max_mm) / 1000)
-    hidden = Map(shape="map", file="")
+    hidden = MapRegion(shape="map", file="")
     weight = _layers([hidden], [np.where(robot | ~seen, 0.0, painted)], value_of)
     return Field(weight, _layers([hidden], [(robot | ~seen).astype(float)], value_of), 0.0)
 
@@ -131,16 +137,16 @@ def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of
     for region in regions:
         value = weight_of(region)
         cap = SPHERE
-        if isinstance(region, All):
+        if isinstance(region, AllRegion):
             rows.append([ALL, 0, 0, 0, 0, 0, 0, value])
-        elif isinstance(region, Band):
+        elif isinstance(region, BandRegion):
             theta, phi = np.radians(region.theta_deg), np.radians(region.phi_deg)
             middle, half = (phi[0] + phi[1]) / 2, (phi[1] - phi[0]) / 2
             around = [np.cos(middle), np.sin(middle), np.cos(half)]
             rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, value])
             planes.append(_edges_of_band(theta, phi))
             cap = _cap_of_band(theta, middle, half)
-        elif isinstance(region, Cone):
+        elif isinstance(region, ConeRegion):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
             half_angle = np.radians(region.half_angle_deg)
             rows.append([CONE, *axis, np.cos(half_angle), 0, 0, value])
@@ -172,7 +178,7 @@ def _cap_of_band(theta: Array, middle: float, half: float) -> list[float]:
     return [*centre, float(min(np.pi, 1.05 * reach + 1e-9))]
 
 
-def _edges_of_band(theta: Array, phi: Array) -> Array:
+def _edges_of_band(theta: Array, phi: Array) -> Float[ndarray, "edges 4"]:
     inner = [t for t in theta if 0 < t < np.pi]
     edges = [[0.0, 0.0, 1.0, np.cos(t)] for t in inner]
     if phi[1] - phi[0] < 2 * np.pi:
@@ -180,7 +186,7 @@ def _edges_of_band(theta: Array, phi: Array) -> Array:
     return np.array(edges).reshape(-1, 4)
 
 
-def _edges_of_map(rows: int, columns: int) -> Array:
+def _edges_of_map(rows: int, columns: int) -> Float[ndarray, "edges 4"]:
     theta = np.pi * np.arange(1, rows) / rows
     phi = 2 * np.pi * np.arange(columns) / columns
     phi = phi[: columns // 2] if columns % 2 == 0 else phi  # a meridian plane serves phi and phi + 180 deg
@@ -189,7 +195,7 @@ def _edges_of_map(rows: int, columns: int) -> Array:
     return np.concatenate([across, along])
 
 
-def frames_about(axes: Array) -> Array:
+def frames_about(axes: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3 3"]:
     """Rows e1, e2, axis for each axis (n, 3): right-handed, orthonormal, shape (n, 3, 3)."""
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
     e1 = np.cross(axes, helper)
@@ -207,7 +213,7 @@ def _stack(tables: list[Array]) -> Array:
     return stacked
 
 
-def _paint(layers: Layers, directions: Array, background: float) -> Array:
+def _paint(layers: Layers, directions: Float[ndarray, "n 3"], background: float) -> Float[ndarray, " n"]:
     return _values(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables, background)
 
 

@@ -29,7 +29,7 @@ GridStep = Annotated[Number, Field(ge=0.25, le=10), AfterValidator(_divides_the_
 Required = Annotated[Number | None, Field(gt=0, description="beams per ball, for objective = 'required'")]
 
 
-class All(Record):
+class AllRegion(Record):
     """Every direction."""
 
     shape: Literal["all"]
@@ -37,7 +37,7 @@ class All(Record):
     required: Required = None
 
 
-class Band(Record):
+class BandRegion(Record):
     """theta from the world's z axis, phi from its x axis; edges inclusive, phi wraps."""
 
     shape: Literal["band"]
@@ -47,7 +47,7 @@ class Band(Record):
     required: Required = None
 
     @model_validator(mode="after")
-    def _edges_rise(self) -> Band:
+    def _edges_rise(self) -> BandRegion:
         if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
             raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
         if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
@@ -55,7 +55,7 @@ class Band(Record):
         return self
 
 
-class Cone(Record):
+class ConeRegion(Record):
     """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
 
     shape: Literal["cone"]
@@ -75,7 +75,7 @@ class Cone(Record):
         return axis
 
 
-class Map(Record):
+class MapRegion(Record):
     """A picture or table of weights: rows theta 0..180, columns phi 0..360, cell centres; PNG value / 255 (grey).
 
     A .npy or .csv table is taken as it is. `value` scales it.
@@ -97,14 +97,14 @@ class Placed(Record):
     step_deg: GridStep = Field(default=2.0, description="between the rays that are cast at it")
 
 
-class Mesh(Placed):
+class MeshRegion(Placed):
     """What a mesh hides, such as the robot: every direction in which it is hit."""
 
     shape: Literal["mesh"]
     value: Value = 1.0
 
 
-class Box(Record):
+class BoxRegion(Record):
     """Surfaces of the scene within a box of its frame. Every square metre of them counts the same."""
 
     shape: Literal["box"]
@@ -114,11 +114,11 @@ class Box(Record):
     required: Required = None
 
     @model_validator(mode="after")
-    def _edges_rise(self) -> Box:
+    def _edges_rise(self) -> BoxRegion:
         if not all(low < high for low, high in zip(self.min_m, self.max_m, strict=True)):
             raise ValueError(f"min_m = {list(self.min_m)} is not below max_m = {list(self.max_m)}")
         return self
 
 
-Region = Annotated[All | Band | Cone | Map | Box, Field(discriminator="shape")]
-MaskRegion = Annotated[All | Band | Cone | Map | Mesh, Field(discriminator="shape")]
+Region = Annotated[AllRegion | BandRegion | ConeRegion | MapRegion | BoxRegion, Field(discriminator="shape")]
+MaskRegion = Annotated[AllRegion | BandRegion | ConeRegion | MapRegion | MeshRegion, Field(discriminator="shape")]

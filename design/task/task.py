@@ -16,18 +16,30 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from design.angles import Angles, AngleSet
+from design.arrays import Array
 from design.camera import Camera
 from design.catalogue.catalogue import Catalogue, load_catalogue
 from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.deck_holes import DeckHoles
 from design.errors import TaskError
-from design.frames import Array
 from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
 from design.task.named_record import named_record, names_in, valid_record
-from design.task.shapes import Box, GridStep, Map, MaskRegion, Mesh, Number, Placed, Region, Required, Span, Value
+from design.task.shapes import (
+    BoxRegion,
+    GridStep,
+    MapRegion,
+    MaskRegion,
+    MeshRegion,
+    Number,
+    Placed,
+    Region,
+    Required,
+    Span,
+    Value,
+)
 
 SHIPPED = Path(__file__).parent / "shipped"
 
@@ -112,7 +124,7 @@ class Task(Record):
 
     @model_validator(mode="after")
     def _boxes_stand_in_a_scene(self) -> Task:
-        if self.scene is None and any(isinstance(region, Box) for region in self.weight):
+        if self.scene is None and any(isinstance(region, BoxRegion) for region in self.weight):
             raise ValueError("a weight of shape = 'box' needs a [scene] that it stands in")
         return self
 
@@ -231,7 +243,7 @@ def _load(task: Task, source: Path) -> LoadedTask:
             "limits.max_line_gap_deg"
         )
     regions = [*task.weight, *task.mask]
-    maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, Map | Mesh))
+    maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, MapRegion | MeshRegion))
     surface = None if task.scene is None else _surface(task.scene, source.parent)
     return LoadedTask(task=task, source=source, products=products, maps=maps, surface=surface)
 
@@ -275,9 +287,9 @@ def _surface(placed: Placed, folder: Path) -> Surface:
     return cast_surface(folder / placed.file, placed.unit_m, placed.sensor_m, placed.rpy_deg, placed.step_deg)
 
 
-def _table(region: Map | Mesh, folder: Path) -> Array:
+def _table(region: MapRegion | MeshRegion, folder: Path) -> Array:
     """Weights of a map, or 1 where a mesh is hit and 0 where not."""
-    if isinstance(region, Map):
+    if isinstance(region, MapRegion):
         return _read_map(folder / region.file)
     return np.isfinite(_surface(region, folder).range_m).astype(float)
 

@@ -112,21 +112,21 @@ def assemble_recording(
         curve, said = axis_curve(source.joint_log, held=source.held)
     else:
         curve, said = straight(source.joint_log), "axis angle: straight between samples, as asked"
-    cloud_of = _cloud_of(source, per, round(lag_s * 1e9))
+    cloud_from_rows = _cloud_of(source, per, round(lag_s * 1e9))
     fields = cloud_fields(source.has_intensity, columns)
     width = 0 if flat else int(source.beams.max())
     counts: Counter[int] = Counter()
     clouds: list[Path] = []
-    for which, tagged in groupby(zip(cloud_of.tolist(), source.scans(), strict=True), key=itemgetter(0)):
+    for which, tagged in groupby(zip(cloud_from_rows.tolist(), source.scans(), strict=True), key=itemgetter(0)):
         path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
-        comments = _comments(source, angles, width, int(np.sum(cloud_of == which)), lag_s, poses is not None)
+        comments = _comments(source, angles, width, int(np.sum(cloud_from_rows == which)), lag_s, poses is not None)
         before = counts[Verdict.POINT]
         with PlyWriter(path, fields, comments) as cloud:
             for block, placed in _placed(map(itemgetter(1), tagged), curve, angles, lag_s, poses, own_body, columns):
                 counts.update({verdict: int(np.sum(placed.verdict == verdict)) for verdict in Verdict})
                 rows = _rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
                 cloud.write(rows[placed.verdict == Verdict.POINT] if flat else rows)
-            if not counts[Verdict.POINT] and which == cloud_of[-1]:
+            if not counts[Verdict.POINT] and which == cloud_from_rows[-1]:
                 reasons = ", ".join(f"{count} {reason}" for reason, count in _left_out(counts).items())
                 raise RecordingError(f"{recording}: none of the {source.beams.sum()} beams becomes a point: {reasons}")
         if counts[Verdict.POINT] == before:

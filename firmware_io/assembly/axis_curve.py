@@ -16,10 +16,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 from scipy.linalg import solveh_banded
 
-from firmware_io.samples import AxisCurve, Floats, JointLog, straight
+from design.arrays import Floats
+from firmware_io.samples import AxisCurve, JointLog, straight
 
 _LEAST = 32  # samples; with fewer there is nothing to average
 _FINEST = 4  # samples to a knot
@@ -118,7 +121,7 @@ class _Fit:
     score: float
 
 
-def _fit(seconds: Floats, position: Floats, per_knot: float) -> _Fit:
+def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_knot: float) -> _Fit:
     count = seconds.size
     # knots at samples, evenly by number and not by time: none is left without samples in a gap
     inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
@@ -135,7 +138,7 @@ def _fit(seconds: Floats, position: Floats, per_knot: float) -> _Fit:
     return _Fit(spline, per_knot, unknowns, float(score))
 
 
-def _straight_score(seconds: Floats, position: Floats, step_rad: float) -> float:
+def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], step_rad: float) -> float:
     """Mean squared error of straight lines on a new sample: each sample is left out in turn."""
     part = (seconds[1:-1] - seconds[:-2]) / (seconds[2:] - seconds[:-2])
     missed = float(np.mean((position[:-2] + part * (position[2:] - position[:-2]) - position[1:-1]) ** 2))
@@ -143,7 +146,9 @@ def _straight_score(seconds: Floats, position: Floats, step_rad: float) -> float
     return max(missed, 1.5 * step_rad**2 / 12)
 
 
-def _error(seconds: Floats, position: Floats, best: _Fit, rms: float, correlated: float) -> float:
+def _error(
+    seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], best: _Fit, rms: float, correlated: float
+) -> float:
     """What noise and what missing knots do to the curve, both as rms.
 
     Noise keeps `unknowns / count` of its power, more where neighbouring samples share a step of the encoder. A curve
@@ -157,7 +162,7 @@ def _error(seconds: Floats, position: Floats, best: _Fit, rms: float, correlated
     return float(np.sqrt(noise + missed))
 
 
-def _encoder_step(position: Floats) -> float:
+def _encoder_step(position: Float64[ndarray, " n"]) -> float:
     """The step of which all positions within a turn are multiples, up to a common offset; 0 where there is none."""
     apart = np.diff(np.sort(position % (2 * np.pi)))
     apart = apart[apart > 1e-9]
@@ -167,7 +172,7 @@ def _encoder_step(position: Floats) -> float:
     return float(apart.min()) if np.abs(steps - np.rint(steps)).max() < 0.02 else 0.0
 
 
-def _samples_per_step(position: Floats, step_rad: float) -> float:
+def _samples_per_step(position: Float64[ndarray, " n"], step_rad: float) -> float:
     """How many samples the axis usually stays on one step of the encoder."""
     if not step_rad:
         return 0.0

@@ -5,12 +5,11 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Float64, UInt8
+from numpy import ndarray
 
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.samples import Floats, Scan
-
-Bytes = NDArray[np.uint8]
+from firmware_io.samples import Scan
 
 
 class Verdict(IntEnum):
@@ -25,7 +24,9 @@ class Verdict(IntEnum):
     OUTSIDE_POSES = 6
 
 
-def judge(scan: Scan, joint_rad: Floats, own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0) -> Bytes:
+def beam_verdicts(
+    scan: Scan, joint_rad: Float64[ndarray, " n"], own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0
+) -> UInt8[ndarray, " n"]:
     """A `Verdict` for each beam from its range and axis angle, shape (n,).
 
     `joint_rad` is NaN where nobody knows it; `gamma_rot_rad` is the axis angle at joint position 0, from where the

@@ -15,13 +15,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64, Int64, UInt8
+from numpy import ndarray
 
 from design import frames
 from design.angles import AngleSet
-from firmware_io.assembly.beam_outcome import Bytes, Verdict, judge
+from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.samples import AxisCurve, Floats, JointLog, Scan, Times
+from firmware_io.samples import AxisCurve, JointLog, Scan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,13 +39,13 @@ class PlacedScan:
     """
 
     scan: Scan
-    time_ns: Times
-    joint_rad: Floats
-    verdict: Bytes
-    points_m: Floats
+    time_ns: Int64[ndarray, " n"]
+    joint_rad: Float64[ndarray, " n"]
+    verdict: UInt8[ndarray, " n"]
+    points_m: Float64[ndarray, "n 3"]
 
 
-def deskew(scan: Scan, joint: JointLog | AxisCurve, angles: AngleSet, lag_s: float = 0.0) -> Floats:
+def deskew(scan: Scan, joint: JointLog | AxisCurve, angles: AngleSet, lag_s: float = 0.0) -> Float64[ndarray, "n 3"]:
     """Points of one scan in the world [m], shape (n, 3), NaN where a beam has no place.
 
     `lag_s` is how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
@@ -70,7 +72,7 @@ def place(
         time_ns = scan.time_ns
         joint_rad = joint.angle_at(time_ns + lag_ns)
         T_map_world = None if poses is None else poses.T_map_world(time_ns)
-        verdict = judge(scan, joint_rad, own_body, math.radians(angles.angles_deg.gamma_rot))
+        verdict = beam_verdicts(scan, joint_rad, own_body, math.radians(angles.angles_deg.gamma_rot))
         if T_map_world is not None:
             verdict[(verdict == Verdict.POINT) & np.isnan(T_map_world[:, 0, 3])] = Verdict.OUTSIDE_POSES
         bearing_rad = scan.bearing_rad

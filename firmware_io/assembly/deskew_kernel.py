@@ -13,19 +13,18 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float32, Float64, UInt8
 from numba import njit
-from numpy.typing import NDArray
+from numpy import ndarray
 
 from design.angles import AngleSet
+from design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
 from design.concurrency.parallel import in_chunks
 from design.errors import RecordingError
-from design.frames import Array
-from firmware_io.assembly.beam_outcome import Bytes, Verdict
+from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import PosePieces, Trajectory, at_rest
-from firmware_io.samples import AxisCurve, Block, Float32s, Floats, JointLog, Scan, Times, straight
-
-Bools = NDArray[np.bool_]
+from firmware_io.samples import AxisCurve, Block, JointLog, Scan, straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,9 +37,9 @@ class PlacedBlock:
         points_m: shape (s, n, 3), NaN where the verdict is not POINT.
     """
 
-    joint_rad: Floats
-    verdict: Bytes
-    points_m: Float32s
+    joint_rad: Float64[ndarray, "rows beams"]
+    verdict: UInt8[ndarray, "scans beams"]
+    points_m: Float32[ndarray, "scans beams 3"]
 
 
 def place_block(
@@ -107,7 +106,7 @@ class _Fan(NamedTuple):
     near_m: np.float32
     far_m: np.float32
     verdict: Bytes
-    stator: Bools
+    stator: Mask
     gamma_rot_rad: float
 
 

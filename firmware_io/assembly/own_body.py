@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
 
 from design.shadow import load_own_body
-from firmware_io.samples import Floats
 
 FILE_NAME = "own_body.npz"
 _TURN = 2 * np.pi
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +25,11 @@ class OwnBody:
         stator: hidden by what stands still, at the axis angles 2 pi j / g, shape (n, g); (n, 0) where nothing does.
     """
 
-    bearing_rad: Floats
-    beams: Bools
-    stator: Bools
+    bearing_rad: Float64[ndarray, " n"]
+    beams: Bool[ndarray, " n"]
+    stator: Bool[ndarray, "n angles"]
 
-    def hides(self, bearing_rad: Floats, gamma_rad: Floats) -> Bools:
+    def hides(self, bearing_rad: Float64[ndarray, " n"], gamma_rad: Float64[ndarray, " n"]) -> Bool[ndarray, " n"]:
         """Whether the beam of each bearing at each axis angle ends on the scanner, shape (n,)."""
         beams, stator = self.tables(bearing_rad)
         if not stator.shape[1]:
@@ -39,7 +38,7 @@ class OwnBody:
         step = np.rint(np.where(known, gamma_rad, 0.0) * (stator.shape[1] / _TURN)).astype(np.int64) % stator.shape[1]
         return beams | (known & stator[np.arange(bearing_rad.size), step])
 
-    def tables(self, bearing_rad: Floats) -> tuple[Bools, Bools]:
+    def tables(self, bearing_rad: Float64[ndarray, " n"]) -> tuple[Bool[ndarray, " n"], Bool[ndarray, "n angles"]]:
         """`beams` and `stator` for other bearings, shapes (n,) and (n, g).
 
         A beam is what the nearest known one is; one that is farther from all of them than they are apart is not hidden.
@@ -47,11 +46,11 @@ class OwnBody:
         nearest, known = self._match(bearing_rad)
         return self.beams[nearest] & known, self.stator[nearest] & known[:, None]
 
-    def unknown(self, bearing_rad: Floats) -> int:
+    def unknown(self, bearing_rad: Float64[ndarray, " n"]) -> int:
         """How many of these bearings were not looked at."""
         return int(np.sum(~self._match(bearing_rad)[1]))
 
-    def _match(self, bearing_rad: Floats) -> tuple[NDArray[np.int64], Bools]:
+    def _match(self, bearing_rad: Float64[ndarray, " n"]) -> tuple[Int64[ndarray, " n"], Bool[ndarray, " n"]]:
         """The nearest known beam of each bearing, and whether it is near enough."""
         # a bearing is compared within the turn that begins opposite the middle of the known ones
         begin = (self.bearing_rad[0] + self.bearing_rad[-1]) / 2 - np.pi

@@ -13,9 +13,9 @@ import numpy as np
 
 from design.errors import RecordingError, suggest
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.files import foreign
+from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
-from firmware_io.recording.mcap_chunks import read_messages, topics_of
+from firmware_io.recording.mcap_chunks import read_messages, read_topics
 
 _Row = tuple[int, Sequence[float]]  # time [ns]; x y z qx qy qz qw
 _UNITS = re.compile(r"\s*\[.*?\]\s*$")
@@ -48,7 +48,7 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
         rows = list(_csv(path) if path.suffix == ".csv" else _tum(path))
         return _trajectory(spec, rows)
     topic, *frames = spec.split(":")
-    found = topics_of(recording)
+    found = read_topics(recording)
     if topic not in found:
         known = {name for name, kind in found.items() if kind in _POSES}
         raise RecordingError(
@@ -152,7 +152,7 @@ _POSES: dict[str, Callable[[Any], Iterator[tuple[Any, str, Any, Any]]]] = {
 def _topic(recording: Path, topic: str, kind: str, frames: tuple[str, ...]) -> Iterator[_Row]:
     seen: set[tuple[str, str]] = set()
     for _, data in read_messages(recording, {topic}):
-        message = foreign(f"{recording}: a message of {topic}", ros_messages.decode, data, kind)
+        message = foreign(f"{recording}: a message of {topic}", ros_messages.decode_message, data, kind)
         for header, child, p, q in _POSES[kind](message):
             pair = (header.frame_id.lstrip("/"), child.lstrip("/"))
             seen.add(pair)

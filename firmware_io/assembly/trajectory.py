@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float64, Int64
+from numpy import ndarray
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from design import frames
+from design.arrays import Floats, Pose, Times
 from design.errors import RecordingError
-from firmware_io.samples import Floats, Times
 
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _EVER_NS = 2**62
@@ -51,9 +53,9 @@ class Trajectory:
         quaternion: x y z w, unit length, shape (n, 4).
     """
 
-    time_ns: Times
-    position_m: Floats
-    quaternion: Floats
+    time_ns: Int64[ndarray, " n"]
+    position_m: Float64[ndarray, "n 3"]
+    quaternion: Float64[ndarray, "n 4"]
 
     def __post_init__(self) -> None:
         count = self.time_ns.size
@@ -77,7 +79,7 @@ class Trajectory:
                 f"pose {int(np.argmax(np.diff(self.time_ns) <= 0)) + 2}: not later than the one before it"
             )
 
-    def T_map_world(self, time_ns: Times) -> Floats:
+    def T_map_world(self, time_ns: Int64[ndarray, " k"]) -> Float64[ndarray, "k 4 4"]:
         """Pose at each time, shape (n, 4, 4), NaN outside."""
         inside = (time_ns >= self.time_ns[0]) & (time_ns <= self.time_ns[-1])
         # epoch nanoseconds do not fit a float64, differences do
@@ -91,7 +93,7 @@ class Trajectory:
         T[~inside] = np.nan
         return T
 
-    def pieces(self, first_ns: int, last_ns: int, T_world_rot: Floats) -> PosePieces:
+    def pieces(self, first_ns: int, last_ns: int, T_world_rot: Pose) -> PosePieces:
         """The poses from one time to another, behind the constant `T_world_rot`."""
         begin, end = np.searchsorted(self.time_ns, [first_ns, last_ns], side="right")
         begin = min(max(int(begin) - 1, 0), self.time_ns.size - 2)
@@ -135,7 +137,7 @@ class Trajectory:
         return float(np.linalg.norm(miss_m, axis=1).max() / 4), float(miss.magnitude().max() / 4)
 
 
-def at_rest(T_world_rot: Floats) -> PosePieces:
+def at_rest(T_world_rot: Pose) -> PosePieces:
     """A platform that stands still for ever."""
     none = np.zeros((1, 3))
     return PosePieces(
@@ -150,7 +152,7 @@ def at_rest(T_world_rot: Floats) -> PosePieces:
     )
 
 
-def _turns(quaternion: Floats) -> tuple[Floats, Floats]:
+def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, " n"], Float64[ndarray, "n 3"]]:
     """Axis (z where there is none) and angle [rad] from each orientation to the next, the short way round."""
     v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
     vector = w0 * v1 - w1 * v0 - np.cross(v0, v1)

@@ -5,13 +5,15 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Int64
+from numpy import ndarray
 
-from firmware_io.samples import JointLog, Times
+from firmware_io.samples import JointLog
 
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
 
 
-def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Times:
+def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Int64[ndarray, " turns"]:
     """Times at which the axis has turned by a further `whole_rad`, or turns back, increasing.
 
     The first turn begins at `begin_ns`, and each way anew at its turning point.

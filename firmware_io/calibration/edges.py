@@ -9,13 +9,14 @@ does not. So beams are left out by geometry alone, which no noise moves: those f
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Bool, Float64
 from numba import njit
-from numpy.typing import NDArray
+from numpy import ndarray
 
-from firmware_io.calibration.model import Ints, Mount, rays
+from design.arrays import Floats, Ints
+from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping
-from firmware_io.calibration.tiles import Tiles
-from firmware_io.samples import Floats
+from firmware_io.calibration.tiles import FlatTiles
 
 _APART = 6.0
 _OUT = 4.0  # 2 % of the beams that are 6 off come this near, and 1 of 16,000 that belong go with them
@@ -23,13 +24,15 @@ _ACROSS = np.cos(np.radians(10.0))  # surfaces more alike than that are pieces o
 _REACH_M = 1.0  # from a tile's middle to the edge of its surface
 
 
-def clear_of_edges(mount: Mount, x: Floats, tiles: Tiles, grouping: Grouping, bulge_m: float) -> NDArray[np.bool_]:
+def clear_of_edges(
+    mount: Mount, x: Float64[ndarray, " parameters"], tiles: FlatTiles, grouping: Grouping, bulge_m: float
+) -> Bool[ndarray, " beams"]:
     """Whether each beam of the tiles surely met the surface of its tile, shape (n,); `False` where that has none."""
     tile = tiles.tile
     surface = grouping.surface[tile]
     on = np.flatnonzero(surface >= 0)
     tile, surface, beams = tile[on], surface[on], tiles.beams.taken(on).under(x)
-    origin, direction = rays(mount, x, beams)
+    origin, direction = beam_rays(mount, x, beams)
     length = np.linalg.norm(grouping.q, axis=1)
     slant = np.sum(grouping.q[surface] * direction, axis=1)
     met_m = (1 - np.sum(grouping.q[surface] * origin, axis=1)) / slant
@@ -44,11 +47,13 @@ def clear_of_edges(mount: Mount, x: Floats, tiles: Tiles, grouping: Grouping, bu
     return whole
 
 
-def _boxes(mount: Mount, x: Floats, tiles: Tiles, grouping: Grouping) -> tuple[Floats, Floats, Ints]:
+def _boxes(
+    mount: Mount, x: Float64[ndarray, " parameters"], tiles: FlatTiles, grouping: Grouping
+) -> tuple[Floats, Floats, Ints]:
     """Where each surface has been seen, shapes (s, 3) and (s, 3), and from which place, shape (s,)."""
     used = grouping.used
     middle = tiles.middle.taken(used).under(x)
-    origin, direction = rays(mount, x, middle)
+    origin, direction = beam_rays(mount, x, middle)
     point = origin + (middle.range_m + x[4])[:, None] * direction
     surface = grouping.surface[used]
     low_m, high_m = np.full(grouping.q.shape, np.inf), np.full(grouping.q.shape, -np.inf)

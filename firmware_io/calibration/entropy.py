@@ -12,11 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from firmware_io.calibration.model import MOUNT, PARAMETERS, Beams, Ints, Mount, rays
-from firmware_io.samples import Floats
+from design.arrays import Floats
+from firmware_io.calibration.model import MOUNT, PARAMETERS, Mount, ReturnedBeams, beam_rays
 
 _SAMPLE = 15_000  # points of each side
 _RADII = 10  # rings in which pairs are counted
@@ -41,7 +42,14 @@ class Witness:
     minima: dict[str, float | None]
 
 
-def witness(mount: Mount, beams: Beams, side: Ints, start: Floats, found: Floats, noise_m: float) -> Witness:
+def witness(
+    mount: Mount,
+    beams: ReturnedBeams,
+    side: Int64[ndarray, " beams"],
+    start: Float64[ndarray, " parameters"],
+    found: Float64[ndarray, " parameters"],
+    noise_m: float,
+) -> Witness:
     """Ask the entropy before, after, and around the result."""
     rng = np.random.default_rng(0)
     width_m = max(3 * noise_m, 0.03)
@@ -51,7 +59,7 @@ def witness(mount: Mount, beams: Beams, side: Ints, start: Floats, found: Floats
 
     def entropy(x: Floats) -> float:
         late = few.under(x)
-        origin, direction = rays(mount, x, late)
+        origin, direction = beam_rays(mount, x, late)
         point = origin + (late.range_m + x[4])[:, None] * direction
         return _between(point, late.range_m**2, one, width_m)
 
@@ -71,7 +79,9 @@ def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float)
     return 0.5 * step * (low - high) / bend if min(low, high) > here else None
 
 
-def _between(point: Floats, weight: Floats, one: NDArray[np.bool_], width_m: float) -> float:
+def _between(
+    point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
+) -> float:
     """Entropy of the pairs across: pairs are counted in rings, which for a Gaussian is as good as one by one."""
     edges = np.linspace(0, 4 * width_m, _RADII + 1)[1:]
     trees = [cKDTree(point[half]) for half in (one, ~one)]

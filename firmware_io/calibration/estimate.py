@@ -5,15 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Bool, Float64
+from numpy import ndarray
 from numpy.typing import NDArray
 
+from design.arrays import Floats, Ints
 from firmware_io.calibration.edges import clear_of_edges
-from firmware_io.calibration.model import BACKLASH, COUNT, LAG, MOUNT, WIDEST_BACKLASH_RAD, Beams, Ints, Mount, rays
-from firmware_io.calibration.observable import Choice, check_fan, choose, several_speeds, spectrum
+from firmware_io.calibration.model import (
+    BACKLASH,
+    COUNT,
+    LAG,
+    MOUNT,
+    WIDEST_BACKLASH_RAD,
+    Mount,
+    ReturnedBeams,
+    beam_rays,
+)
+from firmware_io.calibration.observable import Choice, check_fan, choose_observable, several_speeds, spectrum
 from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, moved_by_last, reduced, step, sums
 from firmware_io.calibration.surfaces import group, without_misfits
-from firmware_io.calibration.tiles import Tiles, flat_tiles
-from firmware_io.samples import Floats
+from firmware_io.calibration.tiles import FlatTiles, flat_tiles
 
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
@@ -42,18 +53,18 @@ class Estimate:
         bulge_m: standard deviation of the walls from planes; 0 where the noise hides it.
     """
 
-    x: Floats
+    x: Float64[ndarray, " parameters"]
     choice: Choice
-    covariance: Floats
-    spectrum: Floats
-    tiles: Tiles
+    covariance: Float64[ndarray, "free free"]
+    spectrum: Float64[ndarray, " free"]
+    tiles: FlatTiles
     grouping: Grouping
-    clear: NDArray[np.bool_]
+    clear: Bool[ndarray, " beams"]
     noise_m: float
     bulge_m: float
 
 
-def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
+def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " parameters"]) -> Estimate:
     """Find the scanner's errors.
 
     Raises:
@@ -67,12 +78,12 @@ def estimate(beams: Beams, mount: Mount, start: Floats) -> Estimate:
     for near_m, turn_deg in _WIDE:
         x, grouping, normal = _coarse(tiles, mount, x, free, near_m, turn_deg)
     x, grouping, normal = _coarse(tiles, mount, x, np.union1d(free, MOUNT), *_WIDE[-1])
-    choice = choose(beams, tiles, grouping, normal)
+    choice = choose_observable(beams, tiles, grouping, normal)
     for near_m, turn_deg in _NARROW:
         x, grouping, normal = _coarse(tiles, mount, x, choice.free, near_m, turn_deg)
     last_m = max(_LAST_NOISES * tiles.noise_m, _LAST_M)
     for _ in range(_ROUNDS):
-        choice = choose(beams, tiles, grouping, normal)
+        choice = choose_observable(beams, tiles, grouping, normal)
         held = np.setdiff1d(np.arange(COUNT), choice.free)
         x[held] = start[held]
         grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
@@ -107,7 +118,7 @@ def _of_held_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: flo
 class _Refined:
     """What some of the beams say: `count` of them in each tile."""
 
-    x: Floats
+    x: Float64[ndarray, " parameters"]
     grouping: Grouping
     normal: Floats
     count: Ints
@@ -115,7 +126,7 @@ class _Refined:
 
 
 def _refined(
-    tiles: Tiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
+    tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
 ) -> _Refined:
     """Solve with some beams of the tiles, one by one; tiles that none is left of, or that do not fit, drop out."""
     own, tile = tiles.beams.taken(which), tiles.tile[which]
@@ -131,14 +142,14 @@ def _refined(
 
 
 def _coarse(
-    tiles: Tiles, mount: Mount, x: Floats, free: Ints, near_m: float, turn_deg: float
+    tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, near_m: float, turn_deg: float
 ) -> tuple[Floats, Grouping, Floats]:
     """Group, then solve with one beam per tile; the sums that come back are those of all beams, nearly."""
     grouping = group(tiles, mount, x, near_m, *np.radians([turn_deg, _VAGUE_DEG]))
     on = grouping.surface >= 0
     variance = tiles.variance_m2 / tiles.count
     plane = _planes(grouping)
-    slant = np.sum(plane * rays(mount, x, tiles.middle.under(x))[1], axis=1) / np.linalg.norm(plane, axis=1)
+    slant = np.sum(plane * beam_rays(mount, x, tiles.middle.under(x))[1], axis=1) / np.linalg.norm(plane, axis=1)
     weight = 1 / (variance + (_TRUST * near_m / slant) ** 2)[on]
     own, tile = tiles.middle.taken(on), np.flatnonzero(on)
     for _ in range(_STEPS):
@@ -148,7 +159,14 @@ def _coarse(
 
 
 def _iterated(
-    mount: Mount, x: Floats, free: Ints, grouping: Grouping, beams: Beams, tile: Ints, weight: Floats, bulge: float
+    mount: Mount,
+    x: Floats,
+    free: Ints,
+    grouping: Grouping,
+    beams: ReturnedBeams,
+    tile: Ints,
+    weight: Floats,
+    bulge: float,
 ) -> tuple[Floats, Grouping, Floats]:
     """One Gauss-Newton step; the sums that come back are those it was made from."""
     normal = sums(mount, x, beams.under(x), tile, weight, _planes(grouping))

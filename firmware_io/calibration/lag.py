@@ -21,13 +21,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float64
+from numpy import ndarray
 
+from design.arrays import Floats, Mask
 from design.errors import RecordingError
 from firmware_io.recording.recording import Recording
-from firmware_io.samples import Floats, JointLog, Scan
-
-Mask = NDArray[np.bool_]
+from firmware_io.samples import JointLog, Scan
 
 _CAP_M = 0.05  # a few times the noise of 2D lidars (10 to 30 mm), far below the depth of edges
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash, not the way back
@@ -48,8 +48,8 @@ class LagCurve:
         sd_s: its standard deviation; infinite for a single beam.
     """
 
-    lag_s: Floats
-    cost_m: Floats
+    lag_s: Float64[ndarray, " lags"]
+    cost_m: Float64[ndarray, " lags"]
     best_s: float
     sd_s: float
 
@@ -69,7 +69,7 @@ class Lag:
     speed_rad_s: float
 
 
-def lag_of(recording: Recording) -> Lag:
+def find_lag(recording: Recording) -> Lag:
     """How late the angles of a recording are, by up to a second.
 
     Raises:
@@ -86,7 +86,7 @@ def lag_of(recording: Recording) -> Lag:
     return Lag(curve.best_s, sd_s, float(np.abs(np.diff(on_way)).sum()) / (last_ns - first_ns) * 1e9)
 
 
-def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Floats) -> LagCurve:
+def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray, " lags"]) -> LagCurve:
     """Compare the way there and the way back under each assumed lag.
 
     The scans of the sweep are held in memory (it needs both ways at once).
@@ -155,7 +155,12 @@ def _monotone(falling: Floats) -> int:
     return int(np.argmin(falling[:end]))
 
 
-def _differences(joint_rad: Floats, range_m: Floats, there: Mask, back: Mask) -> tuple[Floats, Floats]:
+def _differences(
+    joint_rad: Float64[ndarray, " scans"],
+    range_m: Float64[ndarray, "scans beams"],
+    there: Bool[ndarray, " scans"],
+    back: Bool[ndarray, " scans"],
+) -> tuple[Floats, Floats]:
     """Of two range images (beams x angle cells): sum of each beam's capped differences, and how many there are."""
     if not (there.any() and back.any()):
         return np.zeros(range_m.shape[1]), np.zeros(range_m.shape[1])
@@ -179,7 +184,7 @@ def _range_image(joint_rad: Floats, range_m: Floats, way: Mask, cells: Floats) -
     return image
 
 
-def _minimum(lag_s: Floats, cost: Floats) -> float:
+def _minimum(lag_s: Float64[ndarray, " lags"], cost: Float64[ndarray, " lags"]) -> float:
     k = int(np.argmin(cost))
     if k in (0, cost.size - 1):
         return float(lag_s[k])

@@ -15,18 +15,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float64, Int64
+from numpy import ndarray
 from numpy.typing import NDArray
 
 from design import frames
 from design.angles import AngleSet
+from design.arrays import Floats, Rotation
 from design.errors import RecordingError
 from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.beam_outcome import Verdict, judge
+from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.recording.recording import Recording
-from firmware_io.samples import AxisCurve, Floats, Times
+from firmware_io.samples import AxisCurve
 
-Ints = NDArray[np.int64]
 _SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
 STANDING_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step
 
@@ -72,7 +74,7 @@ WIDEST_BACKLASH_RAD = np.radians(20 / 60)  # the most that a maker in the catalo
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beams:
+class ReturnedBeams:
     """Every beam that returned, of all recordings, in the order they were fired.
 
     Attributes:
@@ -86,21 +88,21 @@ class Beams:
         curves: the joint's angle over time in each recording, as `assemble` takes it: the encoder's steps smoothed.
     """
 
-    range_m: Floats
-    bearing_rad: Floats
-    joint_rad: Floats
-    speed_rad_s: Floats
-    recording: Ints
-    place: Ints
-    time_ns: Times
+    range_m: Float64[ndarray, " n"]
+    bearing_rad: Float64[ndarray, " n"]
+    joint_rad: Float64[ndarray, " n"]
+    speed_rad_s: Float64[ndarray, " n"]
+    recording: Int64[ndarray, " n"]
+    place: Int64[ndarray, " n"]
+    time_ns: Int64[ndarray, " n"]
     curves: tuple[AxisCurve, ...]
 
-    def taken(self, which: NDArray[np.generic]) -> Beams:
+    def taken(self, which: NDArray[np.generic]) -> ReturnedBeams:
         """Some of the beams: a mask or indices."""
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
-        return Beams(**columns, curves=self.curves)
+        return ReturnedBeams(**columns, curves=self.curves)
 
-    def late_by(self, lag_s: float) -> Beams:
+    def late_by(self, lag_s: float) -> ReturnedBeams:
         """The same beams with the angles logged `lag_s` after them; beyond its ends a curve goes on at its speed."""
         joint_rad, speed_rad_s = np.empty(self.range_m.size), np.empty(self.range_m.size)
         for k, curve in enumerate(self.curves):
@@ -108,12 +110,12 @@ class Beams:
             joint_rad[mine], speed_rad_s[mine] = _joint(curve, self.time_ns[mine] + round(lag_s * 1e9))
         return replace(self, joint_rad=joint_rad, speed_rad_s=speed_rad_s)
 
-    def under(self, x: Floats) -> Beams:
+    def under(self, x: Float64[ndarray, " parameters"]) -> ReturnedBeams:
         """The same beams with the time offset of a parameter vector; `self` must be without."""
         return self.late_by(x[LAG[0]]) if x[LAG[0]] else self
 
     @property
-    def way(self) -> Floats:
+    def way(self) -> Float64[ndarray, " n"]:
         """+1, -1 or 0 (standing) for each beam."""
         return np.where(np.abs(self.speed_rad_s) > STANDING_RAD_S, np.sign(self.speed_rad_s), 0.0)
 
@@ -123,7 +125,7 @@ _COLUMNS = ("range_m", "bearing_rad", "joint_rad", "speed_rad_s", "recording", "
 
 def gather(
     recordings: Sequence[Recording], *, one_place: bool, own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0
-) -> tuple[Beams, dict[str, int]]:
+) -> tuple[ReturnedBeams, dict[str, int]]:
     """All beams that returned from the scene and have an angle, and how many were left out, reason by reason.
 
     Args:
@@ -139,7 +141,7 @@ def gather(
     for k, (recording, curve) in enumerate(zip(recordings, curves, strict=True)):
         for scan in recording.scans():
             time_ns = scan.time_ns
-            verdict = judge(scan, curve.angle_at(time_ns), own_body, gamma_rot_rad)
+            verdict = beam_verdicts(scan, curve.angle_at(time_ns), own_body, gamma_rot_rad)
             verdicts += np.bincount(verdict, minlength=len(Verdict))
             good = verdict == Verdict.POINT
             ranges.append(scan.range_m[good].astype(float))
@@ -150,7 +152,7 @@ def gather(
     if not verdicts[Verdict.POINT]:
         raise RecordingError(f"{recordings[0].path}: none of the {verdicts.sum()} beams becomes a point: {left_out}")
     number = np.concatenate(numbers)
-    beams = Beams(
+    beams = ReturnedBeams(
         range_m=np.concatenate(ranges),
         bearing_rad=np.concatenate(bearings),
         joint_rad=np.zeros(number.size),
@@ -163,7 +165,7 @@ def gather(
     return beams.late_by(0.0), left_out
 
 
-def _joint(curve: AxisCurve, time_ns: Times) -> tuple[Floats, Floats]:
+def _joint(curve: AxisCurve, time_ns: Int64[ndarray, " n"]) -> tuple[Float64[ndarray, " n"], Float64[ndarray, " n"]]:
     """Angle and speed of the joint; beyond its ends the curve goes on at its last speed."""
     first_ns, last_ns = int(curve.knot_ns[0]), int(curve.knot_ns[-1])
     half_ns = min(_SPEED_OVER_NS, (last_ns - first_ns) // 2)
@@ -175,7 +177,7 @@ def _joint(curve: AxisCurve, time_ns: Times) -> tuple[Floats, Floats]:
     return curve.angle_at(inside_ns) + (time_ns - inside_ns) / 1e9 * speed_rad_s, speed_rad_s
 
 
-def start_vector(angles: AngleSet) -> Floats:
+def start_vector(angles: AngleSet) -> Float64[ndarray, " parameters"]:
     """Parameters as the angle set has them, shape (COUNT,)."""
     x = np.zeros(COUNT)
     x[0:2] = np.radians(angles.delta_rotvec_rot_deg)
@@ -192,7 +194,7 @@ class Mount:
         along_m: translation along the axis, which no calibration changes.
     """
 
-    designed: Floats
+    designed: Rotation
     along_m: float
 
     @staticmethod
@@ -201,14 +203,14 @@ class Mount:
         bare = angles.model_copy(update={"delta_rotvec_rot_deg": (0.0, 0.0)})
         return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000)
 
-    def plane(self, x: Floats) -> Floats:
+    def plane(self, x: Float64[ndarray, " parameters"]) -> Floats:
         """First two columns of `exp(delta) R_designed`, and what 1 rad of each delta adds to them, shape (3, 3, 2)."""
         exact = frames.rotvec_to_matrix([x[0], x[1], 0.0]) @ self.designed
         turn = _left_jacobian(np.array([x[0], x[1], 0.0]))
         return np.stack([exact[:, :2], *(np.cross(turn[:, k], exact[:, :2], axisb=0, axisc=0) for k in (0, 1))])
 
 
-def _left_jacobian(rotvec_rad: Floats) -> Floats:
+def _left_jacobian(rotvec_rad: Float64[ndarray, " 3"]) -> Float64[ndarray, "3 3"]:
     """exp(v + dv) = exp(J dv) exp(v) for small dv, shape (3, 3)."""
     angle = float(np.linalg.norm(rotvec_rad))
     K = np.cross(rotvec_rad, np.eye(3), axisb=0, axisc=0)
@@ -217,14 +219,18 @@ def _left_jacobian(rotvec_rad: Floats) -> Floats:
     return np.eye(3) + one * K + two * (K @ K)
 
 
-def axis_angle(x: Floats, joint_rad: Floats, way: Floats) -> Floats:
+def axis_angle(
+    x: Float64[ndarray, " parameters"], joint_rad: Float64[ndarray, " n"], way: Float64[ndarray, " n"]
+) -> Float64[ndarray, " n"]:
     """Psi of each beam, shape (n,)."""
     one, two = joint_rad, 2 * joint_rad
     harmonics = x[5] * np.cos(one) + x[6] * np.sin(one) + x[7] * np.cos(two) + x[8] * np.sin(two)
     return joint_rad + harmonics - 0.5 * x[10] * way
 
 
-def rays(mount: Mount, x: Floats, beams: Beams) -> tuple[Floats, Floats]:
+def beam_rays(
+    mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams
+) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
     """Origin and direction of each beam, its lag already in `beams.joint_rad`, each shape (n, 3)."""
     psi = axis_angle(x, beams.joint_rad, beams.way)
     columns = mount.plane(x)[0]

@@ -9,14 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64, Int64
+from numpy import ndarray
 
+from design.arrays import Floats, Ints
 from design.errors import RecordingError
 from firmware_io.calibration import model
-from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, WIDEST_BACKLASH_RAD, Beams, Ints, Mount
+from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, WIDEST_BACKLASH_RAD, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
 from firmware_io.calibration.surfaces import seen_twice
-from firmware_io.calibration.tiles import Tiles
-from firmware_io.samples import Floats
+from firmware_io.calibration.tiles import FlatTiles
 
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
 FLATTEST_FAN_RAD = np.radians(3.0)
@@ -47,7 +49,7 @@ class Choice:
         notes: what a person should know though nothing had to be held for it.
     """
 
-    free: Ints
+    free: Int64[ndarray, " free"]
     held: tuple[Held, ...]
     notes: tuple[str, ...]
 
@@ -67,18 +69,20 @@ def check_fan(mount: Mount) -> None:
         )
 
 
-def several_speeds(beams: Beams) -> bool:
+def several_speeds(beams: ReturnedBeams) -> bool:
     """Whether the joint moved at speeds (with sign) that differ by a tenth or more."""
     low, high = np.percentile(beams.speed_rad_s, [2, 98])
     return not stood_still(beams) and bool(high - low > 0.1 * max(abs(low), abs(high)))
 
 
-def stood_still(beams: Beams) -> bool:
+def stood_still(beams: ReturnedBeams) -> bool:
     """Whether the axis moves between scans only."""
     return bool(np.median(np.abs(beams.speed_rad_s)) < STANDING_RAD_S)
 
 
-def choose(beams: Beams, tiles: Tiles, grouping: Grouping, normal: Floats) -> Choice:
+def choose_observable(
+    beams: ReturnedBeams, tiles: FlatTiles, grouping: Grouping, normal: Float64[ndarray, "tiles width width"]
+) -> Choice:
     """Decide which parameters the recordings (all their `beams`) show.
 
     Raises:
@@ -125,7 +129,7 @@ def choose(beams: Beams, tiles: Tiles, grouping: Grouping, normal: Floats) -> Ch
     return Choice(free, tuple(held), tuple(notes))
 
 
-def spectrum(part: Reduced, free: Ints) -> Floats:
+def spectrum(part: Reduced, free: Int64[ndarray, " free"]) -> Float64[ndarray, " free"]:
     """Singular values of the information in units of each parameter's limit, falling: below 1 is not shown."""
     unit = np.array([PARAMETERS[k].limit for k in free])
     return np.sqrt(np.maximum(np.linalg.eigvalsh(part.information * np.outer(unit, unit))[::-1], 0.0))
@@ -136,7 +140,7 @@ def _sd(part: Reduced, free: Ints) -> dict[int, float]:
     return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
 
 
-def _motion(beams: Beams, group: tuple[int, ...]) -> str:
+def _motion(beams: ReturnedBeams, group: tuple[int, ...]) -> str:
     """Why the motion of the axis cannot show a parameter, "" where it can."""
     if group not in (model.LAG, model.BACKLASH):
         return ""
@@ -154,7 +158,7 @@ def _motion(beams: Beams, group: tuple[int, ...]) -> str:
     return ""
 
 
-def _facing(tiles: Tiles, grouping: Grouping) -> tuple[Floats, Floats]:
+def _facing(tiles: FlatTiles, grouping: Grouping) -> tuple[Floats, Floats]:
     """Shares of the surface that face along three perpendicular directions, rising, and these (columns)."""
     used = grouping.used
     normal = grouping.q[grouping.surface[used]]
@@ -164,7 +168,7 @@ def _facing(tiles: Tiles, grouping: Grouping) -> tuple[Floats, Floats]:
     return share, directions
 
 
-def _geometry(tiles: Tiles, grouping: Grouping) -> str:
+def _geometry(tiles: FlatTiles, grouping: Grouping) -> str:
     """The scene in words: what all its surfaces have in common."""
     share, directions = _facing(tiles, grouping)
     facing = directions * np.sign(directions[np.abs(directions).argmax(axis=0), np.arange(3)])

@@ -7,18 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
+from design.arrays import Floats
 from firmware_io.calibration.entropy import Witness
 from firmware_io.calibration.estimate import Estimate
-from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Beams, Mount
+from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
-from firmware_io.samples import Floats
 
 _WALLS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class Agreement:
     """How well beams and planes agree under one vector of parameters.
 
     Attributes:
@@ -31,7 +33,7 @@ class Fit:
     walls_m: tuple[float, ...]
 
 
-def fit_of(found: Estimate, mount: Mount, x: Floats) -> Fit:
+def agreement(found: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
     """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
     tiles, grouping = found.tiles, found.grouping
     on = found.clear
@@ -39,7 +41,7 @@ def fit_of(found: Estimate, mount: Mount, x: Floats) -> Fit:
     weight = np.ones(tile.size)
     grouping = planes_alone(mount, x, beams, tile, weight / found.noise_m**2, grouping)
     normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)], kink=np.inf)
-    return Fit(rms(normal, float(tile.size)), _straightness(found, normal, grouping))
+    return Agreement(rms(normal, float(tile.size)), _straightness(found, normal, grouping))
 
 
 def _straightness(found: Estimate, normal: Floats, grouping: Grouping) -> tuple[float, ...]:
@@ -57,14 +59,16 @@ def _straightness(found: Estimate, normal: Floats, grouping: Grouping) -> tuple[
     return tuple(walls)
 
 
-def report(found: Estimate, start: Floats, mount: Mount, beams: Beams, witness: Witness) -> dict[str, Any]:
+def calibration_report(
+    found: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
+) -> dict[str, Any]:
     """The record that is written beside the calibrated angle set."""
     sd = np.full(COUNT, np.nan)
     sd[found.choice.free] = np.sqrt(np.diag(found.covariance))
     applied = start.copy()
     applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
     fits = {"before": start, "after": found.x, "as_assembled": applied}
-    fit = {name: fit_of(found, mount, x) for name, x in fits.items()}
+    fit = {name: agreement(found, mount, x) for name, x in fits.items()}
     return {
         "schema": "scanwright/calibration/1",
         "beams": int(beams.range_m.size),

@@ -15,10 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float64, Int64
 from numba import njit
+from numpy import ndarray
 
-from firmware_io.calibration.model import COUNT, Beams, Ints, Mount, axis_angle
-from firmware_io.samples import Floats
+from design.arrays import Floats, Ints
+from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams, axis_angle
 
 _Q = COUNT
 _U = COUNT + 3
@@ -39,9 +41,9 @@ class Grouping:
         q: plane of each surface, q . p = 1, shape (s, 3).
     """
 
-    surface: Ints
-    spot: Ints
-    q: Floats
+    surface: Int64[ndarray, " tiles"]
+    spot: Int64[ndarray, " tiles"]
+    q: Float64[ndarray, "surfaces 3"]
 
     @property
     def used(self) -> Ints:
@@ -59,12 +61,20 @@ class Reduced:
         plane_rows: for each surface, dq = plane_rows @ [dx, 1], shape (s, 3, k + 1).
     """
 
-    information: Floats
-    right: Floats
+    information: Float64[ndarray, "free free"]
+    right: Float64[ndarray, " free"]
     plane_rows: Floats
 
 
-def sums(mount: Mount, x: Floats, beams: Beams, tile: Ints, weight: Floats, q: Floats, kink: float = KINK) -> Floats:
+def sums(
+    mount: Mount,
+    x: Float64[ndarray, " parameters"],
+    beams: ReturnedBeams,
+    tile: Int64[ndarray, " beams"],
+    weight: Float64[ndarray, " beams"],
+    q: Float64[ndarray, "tiles 3"],
+    kink: float = KINK,
+) -> Float64[ndarray, "tiles width width"]:
     """Normal equations of every tile, shape (m, WIDTH, WIDTH).
 
     Args:
@@ -140,7 +150,9 @@ def _sums(plane, along_m, x, psi, joint, speed, way, bearing, range_m, tile, wei
     return out
 
 
-def reduced(normal: Floats, grouping: Grouping, free: Ints, bulge_m: float) -> Reduced:
+def reduced(
+    normal: Float64[ndarray, "tiles width width"], grouping: Grouping, free: Int64[ndarray, " free"], bulge_m: float
+) -> Reduced:
     """Eliminate every spot's bulge (standard deviation `bulge_m`; 0 for perfect planes) and every surface's plane.
 
     Args:
@@ -187,7 +199,7 @@ def step(part: Reduced) -> tuple[Floats, Floats]:
     return dx, part.plane_rows @ np.append(dx, 1.0)
 
 
-def covariance(part: Reduced) -> Floats:
+def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
     """Of the free parameters, shape (k, k); infinite where the information is singular."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
@@ -230,7 +242,9 @@ def misfits(normal: Floats, beams: Ints) -> Floats:
     return normal[:, _E, _E] / np.maximum(beams, 1)
 
 
-def planes_alone(mount: Mount, x: Floats, beams: Beams, tile: Ints, weight: Floats, grouping: Grouping) -> Grouping:
+def planes_alone(
+    mount: Mount, x: Floats, beams: ReturnedBeams, tile: Ints, weight: Floats, grouping: Grouping
+) -> Grouping:
     """The same surfaces with the planes that fit best when the parameters stay as they are."""
     none = np.array([], np.int64)
     for _ in range(_REFITS):

@@ -9,12 +9,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
+from design.arrays import Floats, Ints
 from design.errors import RecordingError
-from firmware_io.calibration.model import Ints, Mount, rays
+from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping
-from firmware_io.calibration.tiles import Tiles, normals
-from firmware_io.samples import Floats
+from firmware_io.calibration.tiles import FlatTiles, normals
 
 _SEEDS = 24
 _REFITS = 15  # a plane grows from its seed to the ends of its wall
@@ -25,7 +27,9 @@ _NEAREST_M = 0.1  # a plane this near the axis has no usable form q . p = 1
 _FEWEST = 3  # tiles: two looks at one place and one more, or three places
 
 
-def group(tiles: Tiles, mount: Mount, x: Floats, near_m: float, turn_rad: float, vague_rad: float) -> Grouping:
+def group(
+    tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"], near_m: float, turn_rad: float, vague_rad: float
+) -> Grouping:
     """Put tiles together that are within `near_m` and `turn_rad` (beyond their own noise) of one plane.
 
     Tiles that know their normal worse than `vague_rad` are left alone: they would join any plane that they touch.
@@ -33,7 +37,7 @@ def group(tiles: Tiles, mount: Mount, x: Floats, near_m: float, turn_rad: float,
     Raises:
         RecordingError: no tiles share a plane.
     """
-    origin, direction = rays(mount, x, tiles.middle.under(x))
+    origin, direction = beam_rays(mount, x, tiles.middle.under(x))
     point = origin + (tiles.middle.range_m + x[4])[:, None] * direction
     normal = normals(tiles, mount, x)
     weight = tiles.count.astype(float)
@@ -77,7 +81,9 @@ def group(tiles: Tiles, mount: Mount, x: Floats, near_m: float, turn_rad: float,
     return Grouping(surface, spot.ravel(), np.array(planes))
 
 
-def _plane(point: Floats, normal: Floats, weight: Floats) -> tuple[Floats, float]:
+def _plane(
+    point: Float64[ndarray, "n 3"], normal: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"]
+) -> tuple[Floats, float]:
     """Plane through weighted points; few of them lean on their normals."""
     mean = weight @ point / weight.sum()
     spread = point - mean
@@ -102,7 +108,7 @@ def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping
     return replace(grouping, surface=np.where(misfit < chance, grouping.surface, -1))
 
 
-def seen_twice(tiles: Tiles, grouping: Grouping) -> Ints:
+def seen_twice(tiles: FlatTiles, grouping: Grouping) -> Ints:
     """Tiles whose spot both sides of the fan see."""
     used = grouping.used
     spots, inverse = np.unique(grouping.spot[used], return_inverse=True)

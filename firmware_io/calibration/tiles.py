@@ -10,11 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
 
+from design.arrays import Floats, Ints
 from design.errors import RecordingError
-from firmware_io.calibration.model import Beams, Ints, Mount, axis_angle, rays
-from firmware_io.samples import AxisCurve, Floats
+from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
+from firmware_io.samples import AxisCurve
 
 _WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
 _LEAST = 12  # beams in a tile: three make a plane, the rest say whether it is one
@@ -25,7 +27,7 @@ _STEEPEST = np.cos(np.radians(84.0))  # flatter looks along a surface are all ro
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tiles:
+class FlatTiles:
     """Flat looks, and the beams in them sorted by tile.
 
     Attributes:
@@ -40,29 +42,29 @@ class Tiles:
         dropped: beams in no tile.
     """
 
-    beams: Beams
-    start: Ints
-    middle: Beams
-    normal_laser: Floats
-    normal_sd_rad: Floats
-    rms_m: Floats
-    side: Ints
+    beams: ReturnedBeams
+    start: Int64[ndarray, " bounds"]
+    middle: ReturnedBeams
+    normal_laser: Float64[ndarray, "tiles 3"]
+    normal_sd_rad: Float64[ndarray, " tiles"]
+    rms_m: Float64[ndarray, " tiles"]
+    side: Int64[ndarray, " tiles"]
     noise_m: float
     dropped: int
 
     @property
-    def count(self) -> Ints:
+    def count(self) -> Int64[ndarray, " tiles"]:
         """Beams in each tile, shape (m,)."""
         return np.diff(self.start)
 
     @property
-    def variance_m2(self) -> Floats:
+    def variance_m2(self) -> Float64[ndarray, " tiles"]:
         """Of one range in each tile, shape (m,): the common noise, more where a tile is rough beyond chance."""
         chance = 1 + 3 * np.sqrt(2 / np.maximum(self.count - 3, 1))
         return self.noise_m**2 + np.maximum(self.rms_m**2 - chance * self.noise_m**2, 0.0)
 
     @property
-    def tile(self) -> Ints:
+    def tile(self) -> Int64[ndarray, " beams"]:
         """Tile of each beam, shape (n,)."""
         return np.repeat(np.arange(self.count.size), self.count)
 
@@ -78,7 +80,7 @@ class _Flat:
     slant: Floats
 
 
-def flat_tiles(beams: Beams, mount: Mount, x: Floats) -> Tiles:
+def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " parameters"]) -> FlatTiles:
     """Cut all beams into flat tiles.
 
     Raises:
@@ -108,24 +110,24 @@ def flat_tiles(beams: Beams, mount: Mount, x: Floats) -> Tiles:
     normal = -_turned(q / length[:, None], -axis_angle(x, middle.joint_rad, middle.way))
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
-    return Tiles(own, start, middle, normal @ R, sd, rms_m, side[index][start[:-1]], noise_m, left.size)
+    return FlatTiles(own, start, middle, normal @ R, sd, rms_m, side[index][start[:-1]], noise_m, left.size)
 
 
-def normals(tiles: Tiles, mount: Mount, x: Floats) -> Floats:
+def normals(tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"]) -> Float64[ndarray, "tiles 3"]:
     """Normal of each tile where the axis stands still, shape (m, 3)."""
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
     return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.way))
 
 
-def fan_side(beams: Beams, mount: Mount) -> Ints:
+def fan_side(beams: ReturnedBeams, mount: Mount) -> Int64[ndarray, " beams"]:
     """0 or 1: on which side of the bearing that comes closest to the axis a beam lies, shape (n,)."""
     toward = mount.designed[2, :2]
     bearing_rad = np.arctan2(toward[1], toward[0])
     return (np.sin(beams.bearing_rad - bearing_rad) > 0).astype(np.int64)
 
 
-def _windows(beams: Beams, side: Ints, turned_back: Ints, which: Ints, window_rad: float) -> tuple[Ints, Ints]:
+def _windows(beams: ReturnedBeams, side: Ints, turned_back: Ints, which: Ints, window_rad: float) -> tuple[Ints, Ints]:
     """Beams sorted by window, and the first one of each window that holds enough beams; others are kept behind."""
     mine = beams.taken(which)
     keys = (
@@ -143,7 +145,7 @@ def _windows(beams: Beams, side: Ints, turned_back: Ints, which: Ints, window_ra
     return which[order], np.append(np.flatnonzero(np.diff(key[order], prepend=-1)), which.size)
 
 
-def _turned_back(beams: Beams) -> Ints:
+def _turned_back(beams: ReturnedBeams) -> Int64[ndarray, " beams"]:
     """How often the axis has turned back before each beam, shape (n,)."""
     back = np.zeros(beams.time_ns.size, np.int64)
     for k, curve in enumerate(beams.curves):
@@ -166,9 +168,9 @@ def _reversals_ns(curve: AxisCurve) -> list[int]:
     return found
 
 
-def _fit(beams: Beams, start: Ints, mount: Mount, x: Floats) -> _Flat:
+def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
     """The plane q of each window: 1/r is linear in it, so one weighted least squares finds it."""
-    origin, direction = rays(mount, x, beams)
+    origin, direction = beam_rays(mount, x, beams)
     range_m = beams.range_m + x[4]
     regressor = direction + origin / range_m[:, None]
     first = start[:-1]
@@ -193,7 +195,7 @@ def _fit(beams: Beams, start: Ints, mount: Mount, x: Floats) -> _Flat:
     return _Flat(start, q, information, np.where(enough, np.sqrt(square), np.inf), cosine)
 
 
-def _noise(beams: Beams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
+def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
     """Median of the roughness of the smallest windows that hold enough beams."""
     everything = np.arange(beams.range_m.size)
     for window_rad in reversed(_WINDOWS_RAD):
@@ -209,19 +211,19 @@ def _noise(beams: Beams, side: Ints, turned_back: Ints, mount: Mount, x: Floats)
     )
 
 
-def _is_flat(flat: _Flat, noise_m: float) -> NDArray[np.bool_]:
+def _is_flat(flat: _Flat, noise_m: float) -> Bool[ndarray, " windows"]:
     freedom = np.maximum(np.diff(flat.start) - 3, 1)
     with np.errstate(invalid="ignore"):
         return (flat.rms_m < noise_m * (_ROUGHEST + 2.5 / np.sqrt(2 * freedom))) & (flat.slant > _STEEPEST)
 
 
-def _only(flat: _Flat, which: NDArray[np.bool_]) -> _Flat:
+def _only(flat: _Flat, which: Bool[ndarray, " windows"]) -> _Flat:
     count = np.diff(flat.start)[which]
     start = np.append(0, np.cumsum(count))
     return _Flat(start, flat.q[which], flat.information[which], flat.rms_m[which], flat.slant[which])
 
 
-def _middle(beams: Beams, start: Ints, mount: Mount, x: Floats, q: Floats) -> Beams:
+def _middle(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats, q: Floats) -> ReturnedBeams:
     """One beam through the middle of each tile."""
     first, count = start[:-1], np.diff(start)
 
@@ -229,7 +231,7 @@ def _middle(beams: Beams, start: Ints, mount: Mount, x: Floats, q: Floats) -> Be
         return np.add.reduceat(column, first) / count
 
     origin_ns = int(beams.time_ns[0])
-    middle = Beams(
+    middle = ReturnedBeams(
         range_m=mean(beams.range_m),
         bearing_rad=mean(beams.bearing_rad),
         joint_rad=mean(beams.joint_rad),
@@ -239,12 +241,12 @@ def _middle(beams: Beams, start: Ints, mount: Mount, x: Floats, q: Floats) -> Be
         time_ns=origin_ns + mean((beams.time_ns - origin_ns).astype(float)).astype(np.int64),
         curves=beams.curves,
     )
-    origin, direction = rays(mount, x, middle)
+    origin, direction = beam_rays(mount, x, middle)
     range_m = (1 - np.sum(q * origin, axis=1)) / np.sum(q * direction, axis=1) - x[4]
     return replace(middle, range_m=range_m)
 
 
-def _turned(vectors: Floats, angle_rad: Floats) -> Floats:
+def _turned(vectors: Float64[ndarray, "n 3"], angle_rad: Float64[ndarray, " n"]) -> Float64[ndarray, "n 3"]:
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
     a, b = vectors[:, 0], vectors[:, 1]
     return np.column_stack([cos * a - sin * b, sin * a + cos * b, vectors[:, 2]])

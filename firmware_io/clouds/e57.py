@@ -15,8 +15,9 @@ import numpy as np
 import pye57
 from pye57 import libe57
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import (
+from firmware_io.clouds.cloud import (
     COLUMN_TYPES,
     Cloud,
     Column,
@@ -26,7 +27,7 @@ from firmware_io.clouds.record import (
     pose_numbers,
     told,
 )
-from firmware_io.files import foreign, whole_file
+from firmware_io.foreign import foreign
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
@@ -47,7 +48,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with whole_file(path) as part, pye57.E57(str(part), mode="w") as e57:
+    with whole_file(path, RecordingError) as part, pye57.E57(str(part), mode="w") as e57:
         e57.image_file.extensionsAdd(_PREFIX, _URI)
         for number, cloud in enumerate(clouds, 1):
             _write_scan(e57, cloud, f"{path.stem} {number}")

@@ -12,9 +12,10 @@ import laspy
 import numpy as np
 
 from design import frames
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
-from firmware_io.files import foreign, whole_file
+from firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
+from firmware_io.foreign import foreign
 
 _STEP_M = 1e-4
 _OURS = "scanwright"
@@ -94,7 +95,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     las.x, las.y, las.z = world.T
     for name, column in columns.items():
         las[_OWN_FIELD.get(name, name)] = column
-    with whole_file(path) as part, part.open("wb") as stream:
+    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
         las.write(stream, do_compress=path.suffix.lower() == ".laz")
     return said
 

@@ -7,9 +7,10 @@ from zipfile import is_zipfile
 
 import numpy as np
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import Cloud
-from firmware_io.files import foreign, whole_file
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.foreign import foreign
 
 _COLUMN = "column."
 
@@ -34,7 +35,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud."""
     start = {} if cloud.start_ns is None else {"start_ns": np.int64(cloud.start_ns)}
     columns = {_COLUMN + name: column for name, column in cloud.columns.items()}
-    with whole_file(path) as part, part.open("wb") as stream:
+    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
         np.savez(
             stream,
             allow_pickle=False,

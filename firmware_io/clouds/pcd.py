@@ -10,9 +10,10 @@ from numpy.lib import recfunctions
 from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, PointCloud
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import Cloud, cloud_of, headlines, pose_matrix, pose_numbers, rows_of
-from firmware_io.files import foreign, whole_file
+from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
+from firmware_io.foreign import foreign
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
@@ -25,14 +26,14 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(f"{path}: the fields are {' '.join(rows.dtype.names or ())}; a cloud has x y z")
     x, y, z, w, i, j, k = pcd.metadata.viewpoint
     comments = [line[1:].decode("ascii", "replace").strip() for line in data[:4096].splitlines() if line[:1] == b"#"]
-    cloud = cloud_of(_unpacked(rows), comments)
+    cloud = cloud_from_rows(_unpacked(rows), comments)
     shape = (pcd.metadata.height, pcd.metadata.width)
     return [Cloud(cloud.points_m, cloud.columns, shape, pose_matrix([x, y, z, i, j, k, w]), cloud.start_ns)], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud, binary."""
-    rows = _packed(rows_of(cloud))
+    rows = _packed(cloud_rows(cloud))
     names = list(rows.dtype.names or ())
     pcd = PointCloud.from_points([rows[name] for name in names], names, [rows.dtype[name].type for name in names])
     x, y, z, i, j, k, w = (float(value) for value in pose_numbers(cloud.T_world_cloud))
@@ -41,7 +42,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     data = io.BytesIO()
     pcd.save(data, Encoding.BINARY)
     comments = [f"# {line}\n" for line in headlines(cloud) if line.startswith("time_s")]
-    with whole_file(path) as part:
+    with whole_file(path, RecordingError) as part:
         part.write_bytes("".join(comments).encode() + data.getvalue())
     return []
 

@@ -12,10 +12,10 @@ from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 
 from design import frames
+from design.arrays import Floats
+from design.atomic_file import whole_file
 from design.errors import RecordingError
 from firmware_io.clouds.ply import read_ply
-from firmware_io.files import whole_file
-from firmware_io.samples import Floats
 
 _WIDTH_IN = 11.0
 _CELLS = 700  # along the widest view; finer than a screen shows
@@ -71,7 +71,7 @@ def cloud_picture(ply: Path, png: Path) -> None:
     panels[0, 1].set(title="the middle, from behind and above", xticks=[], yticks=[])
     panels[0, 1].set_frame_on(False)
     figure.suptitle(f"{ply.name}: {total:,} points, the cross is the world's origin, colour is height", fontsize=11)
-    with whole_file(png) as part:
+    with whole_file(png, RecordingError) as part:
         figure.savefig(part, format="png", metadata={"Software": None})
 
 

@@ -13,11 +13,14 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 from numpy.typing import NDArray
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import Cloud, cloud_of, headlines, rows_of
-from firmware_io.files import foreign, whole_file
+from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
+from firmware_io.foreign import foreign
 
 _WORDS = {
     "|i1": "char",
@@ -52,7 +55,7 @@ class PlyWriter:
 
     def __enter__(self) -> PlyWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path))
+            part = stack.enter_context(whole_file(self._path, RecordingError))
             self._stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._stream.write(self._header())
             stack.push(self._finish)
@@ -94,7 +97,7 @@ class PlyWriter:
         return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
-def write_points(path: Path, points_m: NDArray[np.float64], comments: Iterable[str] = ()) -> None:
+def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterable[str] = ()) -> None:
     """Write bare points (n, 3) as a cloud of x y z.
 
     Raises:
@@ -159,12 +162,12 @@ def read_ply(path: Path) -> NDArray[np.void]:
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file."""
-    return [cloud_of(read_ply(path), ply_comments(path))], []
+    return [cloud_from_rows(read_ply(path), ply_comments(path))], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud; lines about what the file does not hold."""
-    rows = rows_of(cloud)
+    rows = cloud_rows(cloud)
     wide = [name for name in rows.dtype.names or () if rows.dtype[name].kind in "iu" and rows.dtype[name].itemsize == 8]
     kinds = [(name, "<f8" if name in wide else rows.dtype[name].str) for name in rows.dtype.names or ()]
     with PlyWriter(path, np.dtype(kinds), [*headlines(cloud), "x y z in m"]) as stream:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import Cloud, cloud_of, headlines, rows_of
-from firmware_io.files import foreign, whole_file
+from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
+from firmware_io.foreign import foreign
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
 
@@ -34,15 +35,17 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     rows = np.empty(len(values), kinds)
     for k, name in enumerate(names):
         rows[name] = values[:, k]
-    return [cloud_of(rows, comments)], [] if named or count == 3 else [f"columns 4 to {count} have no name in {path}"]
+    return [cloud_from_rows(rows, comments)], [] if named or count == 3 else [
+        f"columns 4 to {count} have no name in {path}"
+    ]
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud."""
-    rows = rows_of(cloud)
+    rows = cloud_rows(cloud)
     names = rows.dtype.names or ()
     kinds = [rows.dtype[name].str for name in names]
     header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
-    with whole_file(path) as part:
+    with whole_file(path, RecordingError) as part:
         np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
     return []

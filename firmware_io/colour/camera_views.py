@@ -12,16 +12,17 @@ import numpy as np
 from PIL import Image
 
 from design.angles import AngleSet
+from design.arrays import Pose
 from design.camera import Camera
 from design.errors import RecordingError
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.recording.recording import Recording
-from firmware_io.samples import AxisCurve, Floats, straight
+from firmware_io.samples import AxisCurve, straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class CameraView:
     """One image and where it was taken from.
 
     Attributes:
@@ -30,17 +31,17 @@ class View:
     """
 
     file: Path
-    T_cloud_camera: Floats
+    T_cloud_camera: Pose
 
 
-def views_of(
+def load_views(
     camera: Camera,
     folder: Path,
     angles: AngleSet,
     recording: Recording,
     poses: Trajectory | None = None,
     lag_s: float = 0.0,
-) -> list[View]:
+) -> list[CameraView]:
     """The images of a camera with their poses.
 
     Args:
@@ -72,7 +73,7 @@ def views_of(
         T = T_cloud_world @ _T_world_frame(camera, angles, shot, curve, lag_s) @ camera.T_frame_camera()
         if not np.isfinite(T).all():
             raise RecordingError(f"{listed}: {shot.file.name}: its time_ns lies outside of the recording")
-        found.append(View(shot.file, T))
+        found.append(CameraView(shot.file, T))
     return found
 
 
@@ -103,7 +104,7 @@ def _listed(path: Path) -> Iterator[_Shot]:
         raise RecordingError(f"{path}: not a number: {error}; time_ns is whole nanoseconds since 1970") from error
 
 
-def _T_world_frame(camera: Camera, angles: AngleSet, shot: _Shot, curve: AxisCurve, lag_s: float) -> Floats:
+def _T_world_frame(camera: Camera, angles: AngleSet, shot: _Shot, curve: AxisCurve, lag_s: float) -> Pose:
     if camera.frame == "world":
         return np.eye(4)
     joint_rad = shot.joint_rad

@@ -16,19 +16,21 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int64, UInt8
 from numba import njit
+from numpy import ndarray
 from numpy.typing import NDArray
 
 from design import frames
 from design.angles import AngleSet
+from design.arrays import Floats, Times
 from design.camera import Camera
 from design.errors import TaskError
 from design.task.task import LoadedTask
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.ply import PlyWriter, ply_comments, read_ply
-from firmware_io.colour.camera_views import View, opened, views_of
+from firmware_io.colour.camera_views import CameraView, load_views, opened
 from firmware_io.recording.recording import Recording, open_recording
-from firmware_io.samples import Floats, Times
 
 COLOURS = ("red", "green", "blue", "alpha")
 """Columns of a coloured cloud, bytes; alpha is 255 where there is a colour and 0 where not."""
@@ -38,7 +40,6 @@ _SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: at lea
 _BASE_RAD = np.radians(2.0)  # between the points that tell how a surface lies: noise must not decide it
 _STEEP = 6.0  # times as far apart as at normal incidence; beyond it they lie on two surfaces
 _WIDEST_PX = 50
-Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +72,14 @@ def painter(
     camera, source = loaded.task.camera, open_recording(recording)
     if camera is None:
         raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
-    views = views_of(camera, loaded.source.parent, angles, source, poses, lag_s)
+    views = load_views(camera, loaded.source.parent, angles, source, poses, lag_s)
     spacing, from_m = spacing_of(source), stands_m(source, angles, poses)
     return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m)
 
 
-def colour_cloud(path: Path, camera: Camera, views: list[View], spacing: Spacing, from_m: Floats) -> ColourSummary:
+def colour_cloud(
+    path: Path, camera: Camera, views: list[CameraView], spacing: Spacing, from_m: Floats
+) -> ColourSummary:
     """Colour a PLY cloud in place, in constant memory but for seven bytes a point and one depth image.
 
     Args:
@@ -129,7 +132,7 @@ def spacing_of(recording: Recording) -> Spacing:
     return Spacing(abs(scan.angle_increment_rad), float(np.median(turned)) if turned.size else 0.0)
 
 
-def _picture(path: Path, camera: Camera) -> Bytes:
+def _picture(path: Path, camera: Camera) -> UInt8[ndarray, "rows columns 3"]:
     with opened(path, camera) as image:
         return np.array(image.convert("RGB"))
 
@@ -138,17 +141,17 @@ def _picture(path: Path, camera: Camera) -> Bytes:
 class _Seen:
     """Points inside an image, all of shape (k,)."""
 
-    which: NDArray[np.int64]
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
-    depth_m: NDArray[np.float32]
-    recedes_m: Floats
-    radius_px: NDArray[np.int64]
-    aside_rad: NDArray[np.float32]
+    which: Int64[ndarray, " n"]
+    row: Int64[ndarray, " n"]
+    column: Int64[ndarray, " n"]
+    depth_m: Float32[ndarray, " n"]
+    recedes_m: Float64[ndarray, " n"]
+    radius_px: Int64[ndarray, " n"]
+    aside_rad: Float32[ndarray, " n"]
 
 
 def _seen(
-    rows: NDArray[np.void], width: int, camera: Camera, view: View, spacing: Spacing, from_m: Floats
+    rows: NDArray[np.void], width: int, camera: Camera, view: CameraView, spacing: Spacing, from_m: Floats
 ) -> Iterator[tuple[int, _Seen]]:
     """The points that lie in an image, hidden or not, some at a time, and where their rows begin."""
     T_camera_cloud = np.linalg.inv(view.T_cloud_camera)
@@ -235,7 +238,7 @@ def _draw(
                     depth[v, u] = depth_m[i]
 
 
-def _write(path: Path, rows: NDArray[np.void], rgb: Bytes, coloured: NDArray[np.bool_]) -> None:
+def _write(path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], coloured: Bool[ndarray, " n"]) -> None:
     kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
     fields = np.dtype([*kept, *((name, "|u1") for name in COLOURS)])
     with PlyWriter(path, fields, ply_comments(path)) as cloud:
@@ -250,7 +253,7 @@ def _write(path: Path, rows: NDArray[np.void], rgb: Bytes, coloured: NDArray[np.
             cloud.write(out)
 
 
-def stands_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Floats:
+def stands_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Float64[ndarray, " 3"]:
     """Where the scanner stood in its cloud [m], in the middle of the recording, shape (3,)."""
     stood = np.array(angles.t_world_rot_mm) / 1000
     if poses is None:

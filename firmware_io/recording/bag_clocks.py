@@ -11,8 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64, Int64
+from numpy import ndarray
 
-from firmware_io.samples import Floats, JointLog, Times
+from design.arrays import Times
+from firmware_io.samples import JointLog
 
 _SAME_CLOCK_NS = (
     1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock
@@ -23,8 +26,8 @@ _SAME_CLOCK_NS = (
 class Stamps:
     """Times of the messages of one source, both shape (n,); a stamp is 0 where the message has none."""
 
-    stamp_ns: Times
-    receive_ns: Times
+    stamp_ns: Int64[ndarray, " n"]
+    receive_ns: Int64[ndarray, " n"]
 
     def complete(self) -> bool:
         """Whether every message has a stamp."""
@@ -40,8 +43,8 @@ class Stamps:
 class OneClock:
     """Scan and angle times on one clock; `said` is "" where both are header stamps, else what a person must know."""
 
-    scan_ns: Times
-    angle_ns: Times
+    scan_ns: Int64[ndarray, " scans"]
+    angle_ns: Int64[ndarray, " angles"]
     said: str
 
 
@@ -66,13 +69,15 @@ def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
     return OneClock(scans.receive_ns, angles.receive_ns, said)
 
 
-def unwrapped_log(time_ns: Times, angle_rad: Floats) -> JointLog:
+def unwrapped_log(time_ns: Int64[ndarray, " n"], angle_rad: Float64[ndarray, " n"]) -> JointLog:
     """A log sorted by time, one sample per time (the first one), turns counted."""
     one_per_time, first = np.unique(time_ns, return_index=True)
     return JointLog(one_per_time, np.unwrap(angle_rad[first]))
 
 
-def held_log(log: JointLog, begin_ns: Times, arc_ns: Times) -> tuple[JointLog, int]:
+def held_log(
+    log: JointLog, begin_ns: Int64[ndarray, " scans"], arc_ns: Int64[ndarray, " scans"]
+) -> tuple[JointLog, int]:
     """A log that stands still during each scan: two samples, at its first and at its last beam, with one angle.
 
     The angle is the last one of `log` at or before the first beam. A scan that begins outside `log` gets no sample.
@@ -95,7 +100,7 @@ def held_log(log: JointLog, begin_ns: Times, arc_ns: Times) -> tuple[JointLog, i
     return JointLog(both_ns[kept], np.repeat(angle_rad, 2)[kept]), int(np.sum(end_ns > latest_ns))
 
 
-def times(values: Sequence[int]) -> Times:
+def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
     """Integer nanoseconds as an array."""
     return np.array(values, dtype=np.int64)
 

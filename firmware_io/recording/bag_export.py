@@ -17,9 +17,9 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from design.atomic_file import check_place
+from design.atomic_file import check_place, whole_file
 from design.errors import RecordingError
-from firmware_io.files import foreign, whole_file
+from firmware_io.foreign import foreign
 from firmware_io.recording.bags import Bag, Message, open_bag
 from firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
 
@@ -62,7 +62,7 @@ def export_bag(recording: Path, out: Path) -> Exported:
             f"a folder ({out.stem})"
         )
     if out.suffix == ".bag":
-        with whole_file(out) as part:
+        with whole_file(out, RecordingError) as part:
             return _ros1(recording, part)
     if out.exists():
         raise RecordingError(f"{out}: exists; a ROS 2 bag is a new folder")

@@ -20,7 +20,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from design.errors import RecordingError, suggest
-from firmware_io.files import foreign, foreign_items
+from firmware_io.foreign import foreign, foreign_items
 from firmware_io.recording import ros_messages
 
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")

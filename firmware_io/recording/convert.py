@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_io.clouds.files import check_target, read_clouds, write_clouds
+from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from firmware_io.recording.bag_export import export_bag
 
 

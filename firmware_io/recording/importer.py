@@ -15,13 +15,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from design.arrays import Floats, Times
 from design.errors import RecordingError
 from firmware_io.recording import ros_messages
 from firmware_io.recording.bag_clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
 from firmware_io.recording.bags import Bag, Source, laser_scan_at, number_at, open_bag, parse_source
 from firmware_io.recording.metadata import held_by, note_in
 from firmware_io.recording.recording import MessageWriter, RecordingWriter
-from firmware_io.samples import Floats, JointLog, Times
+from firmware_io.samples import JointLog
 
 AngleUnit = Literal["deg", "rad"]
 _LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
@@ -240,7 +241,7 @@ def _write(bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: Mes
         laser_scan, _ = laser_scan_at(message.body, source, bag.path)
         if _fault(laser_scan):
             continue
-        scan = ros_messages.scan_of(laser_scan, next(scan_times))
+        scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
         if _endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         while written < len(samples) and samples[written][0] <= scan.stamp_ns:

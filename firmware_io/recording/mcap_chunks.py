@@ -19,7 +19,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from design.errors import RecordingError
-from firmware_io.files import foreign
+from firmware_io.foreign import foreign
 
 _MAGIC = b"\x89MCAP"
 _MESSAGE = 0x05
@@ -29,7 +29,7 @@ _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish t
 _Timed = tuple[int, int, str, bytes]  # log time [ns], place of the chunk, topic, bytes
 
 
-def topics_of(path: Path) -> dict[str, str]:
+def read_topics(path: Path) -> dict[str, str]:
     """Message type of each topic in a file.
 
     Raises:
@@ -40,7 +40,7 @@ def topics_of(path: Path) -> dict[str, str]:
     return {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
 
 
-def note_of(path: Path, name: str) -> dict[str, str]:
+def read_note(path: Path, name: str) -> dict[str, str]:
     """The metadata record of a name; empty where the file has none."""
     with _opened(path) as stream:
         records = foreign(f"{path}: damaged", lambda: list(SeekingReader(stream).iter_metadata()))

@@ -10,9 +10,9 @@ import json
 from typing import Final
 
 from design.errors import RecordingError
-from firmware_io.files import foreign
+from firmware_io.foreign import foreign
 from firmware_io.recording.bags import Bag
-from firmware_io.recording.mcap_chunks import note_of
+from firmware_io.recording.mcap_chunks import read_note
 
 NOTE: Final = "scanwright"
 NOTE_TOPIC: Final = "/scanwright/note"
@@ -30,7 +30,7 @@ def note_in(bag: Bag) -> dict[str, str]:
     Raises:
         RecordingError: the bag has our topic, and what is in it is no note.
     """
-    if bag.path.suffix == ".mcap" and bag.path.is_file() and (note := note_of(bag.path, NOTE)):
+    if bag.path.suffix == ".mcap" and bag.path.is_file() and (note := read_note(bag.path, NOTE)):
         return note
     if bag.topics.get(NOTE_TOPIC) != NOTE_TYPE:
         return {}

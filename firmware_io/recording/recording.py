@@ -16,16 +16,18 @@ from types import TracebackType
 from typing import Any, Protocol, cast
 
 import numpy as np
+from jaxtyping import Int64
 from mcap.writer import Writer
-from numpy.typing import NDArray
+from numpy import ndarray
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError, suggest
-from firmware_io.files import foreign, whole_file
+from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.arrays import RecordingArrays, arrays_of
-from firmware_io.recording.mcap_chunks import note_of, read_messages, topics_of
+from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
 from firmware_io.recording.metadata import NOTE, held_by
-from firmware_io.samples import JointLog, Scan, Times
+from firmware_io.samples import JointLog, Scan
 
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"
@@ -106,7 +108,7 @@ class RecordingWriter:
 
     def __enter__(self) -> MessageWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path))
+            part = stack.enter_context(whole_file(self._path, RecordingError))
             stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._messages = MessageWriter(stream, self._path, self._note, {})
             stack.push(self._finish)
@@ -140,8 +142,8 @@ class Recording:
 
     path: Path
     joint_log: JointLog
-    beams: NDArray[np.int64]
-    stamp_ns: Times
+    beams: Int64[ndarray, " scans"]
+    stamp_ns: Int64[ndarray, " scans"]
     has_intensity: bool
     held: bool
 
@@ -196,7 +198,7 @@ def open_recording(path: Path) -> Recording:
         beams=np.array(beams),
         stamp_ns=np.array(stamps, np.int64),
         has_intensity=has_intensity,
-        held=held_by(note_of(path, NOTE)),
+        held=held_by(read_note(path, NOTE)),
     )
 
 
@@ -209,7 +211,7 @@ def _sorted_log(path: Path, times: list[int], positions: list[float]) -> JointLo
 
 
 def _check_topics(path: Path) -> None:
-    found = topics_of(path)
+    found = read_topics(path)
     for topic, message_type in _TYPES.items():
         if topic not in found:
             raise RecordingError(f"{path}: no topic {topic}{suggest(topic, found)} (`scanwright import` converts bags)")

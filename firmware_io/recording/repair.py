@@ -15,8 +15,9 @@ from mcap.records import Attachment, Channel, Chunk, Footer, Header, McapRecord,
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
 
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.files import foreign, whole_file
+from firmware_io.foreign import foreign
 
 
 @dataclass(slots=True)
@@ -71,7 +72,7 @@ def repair(path: Path, out: Path) -> RepairSummary:
     if not summary.messages:
         raise RecordingError(f"{path}: no whole message in it, there is nothing to save (is it an MCAP recording?)")
     if not summary.whole:
-        with whole_file(out) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
+        with whole_file(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
             copy = _Copy(Writer(stream))
             for record in _whole_records(path, RepairSummary()):
                 copy.add(record)

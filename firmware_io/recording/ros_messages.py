@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from firmware_io.samples import Float32s, Scan
+from design.arrays import Float32s
+from firmware_io.samples import Scan
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -70,7 +71,7 @@ def decode_scan(data: bytes) -> Scan:
     )
 
 
-def scan_of(message: Any, first_beam_ns: int) -> Scan:
+def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
     """The scan inside a decoded LaserScan of any ROS version.
 
     Intensities that do not match the ranges one by one say nothing about a beam and are not taken.
@@ -119,7 +120,7 @@ def decode_joint(data: bytes) -> tuple[int, float]:
     return time_ns, struct.unpack_from(f"{order}d", data, at + 8 * names.index(_SPIN_JOINT_BYTES))[0]
 
 
-def decode(data: bytes, message_type: str) -> Any:
+def decode_message(data: bytes, message_type: str) -> Any:
     """Any message of a type that comes with ROS 2, from CDR."""
     return _store().deserialize_cdr(data, message_type)
 

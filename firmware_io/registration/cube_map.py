@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64
 from numba import njit
+from numpy import ndarray
 from numpy.typing import NDArray
 
-from firmware_io.samples import Floats
+from design.arrays import Floats
 
 
 @njit(cache=True)
@@ -33,7 +35,7 @@ def cells_of(points_m: Floats, side: int) -> NDArray[np.int32]:
     return cells
 
 
-def solid_angles_sr(side: int) -> Floats:
+def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
     """Solid angle of every cell, shape (6 * side * side,): exact, from the four corners."""
     edge = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))
     u, v = np.meshgrid(edge, edge)
@@ -53,11 +55,11 @@ class DepthMap:
     """
 
     side: int
-    near_m: Floats
-    far_m: Floats
+    near_m: Float64[ndarray, " cells"]
+    far_m: Float64[ndarray, " cells"]
 
 
-def depth_map(points_m: Floats, side: int) -> DepthMap:
+def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:
     """What the scanner at the origin saw of points of shape (n, 3)."""
     near, far = _extremes(points_m, cells_of(points_m, side), 6 * side * side)
     return DepthMap(side, near, far)

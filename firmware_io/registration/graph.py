@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
 from design import frames
-from firmware_io.samples import Floats
+from design.arrays import Pose
 
 _MAX_STEPS = 30
 _SETTLED = 1e-9
@@ -28,8 +30,8 @@ class Edge:
 
     i: int
     j: int
-    T_i_j: Floats
-    covariance: Floats
+    T_i_j: Pose
+    covariance: Float64[ndarray, "6 6"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,13 +45,13 @@ class Graph:
         scale: by how much the stated sigmas of the edges had to grow, at least 1.
     """
 
-    T_world: Floats
-    covariance: Floats
+    T_world: Float64[ndarray, "n 4 4"]
+    covariance: Float64[ndarray, "n 6 6"]
     left_out: tuple[Edge, ...]
     scale: float
 
 
-def solve(T_world: Floats, edges: Sequence[Edge]) -> Graph:
+def solve_graph(T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]) -> Graph:
     """Least squares from a start of shape (n, 4, 4); the first pose is held.
 
     Raises:
@@ -80,7 +82,9 @@ def connected(count: int, edges: Sequence[Edge]) -> bool:
     return bool((label == label[0]).all())
 
 
-def _least_squares(T_world: Floats, edges: Sequence[Edge]) -> tuple[Floats, Floats, Floats]:
+def _least_squares(
+    T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]
+) -> tuple[Float64[ndarray, "n 4 4"], Float64[ndarray, "n 6 6"], Float64[ndarray, " edges"]]:
     """Gauss-Newton; poses, their covariances, and the squared residual of each edge in sigmas."""
     poses, n = T_world.copy(), len(T_world)
     information = [np.linalg.inv(edge.covariance) for edge in edges]
@@ -108,7 +112,9 @@ def _least_squares(T_world: Floats, edges: Sequence[Edge]) -> tuple[Floats, Floa
     return poses, covariance, chi2
 
 
-def _residual(T_i: Floats, T_j: Floats, T_i_j: Floats) -> tuple[Floats, Floats, Floats]:
+def _residual(
+    T_i: Pose, T_j: Pose, T_i_j: Pose
+) -> tuple[Float64[ndarray, " 6"], Float64[ndarray, "6 6"], Float64[ndarray, "6 6"]]:
     """What edge and poses differ by, shape (6,), and its derivatives by small motions of both poses, shape (6, 6)."""
     seen = np.linalg.inv(T_i) @ T_j
     R, u = T_i_j[:3, :3].T, seen[:3, 3]
@@ -123,9 +129,9 @@ def _residual(T_i: Floats, T_j: Floats, T_i_j: Floats) -> tuple[Floats, Floats, 
     return residual, J_i, J_j
 
 
-def _moved(T: Floats, step: Floats) -> Floats:
+def _moved(T: Pose, step: Float64[ndarray, " 6"]) -> Pose:
     return T @ frames.rigid(frames.rotvec_to_matrix(step[:3]), step[3:])
 
 
-def _cross(u: Floats) -> Floats:
+def _cross(u: Float64[ndarray, " 3"]) -> Float64[ndarray, "3 3"]:
     return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])

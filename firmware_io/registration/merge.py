@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
 from design import frames
-from firmware_io.clouds.record import Cloud
+from firmware_io.clouds.cloud import Cloud
 from firmware_io.registration.thin import joined_means, voxel_means
-from firmware_io.samples import Floats
 
 _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 
 
-def merge(clouds: Sequence[Cloud], T_world: Floats, spacing_m: float) -> Cloud:
+def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m: float) -> Cloud:
     """The map in the world.
 
     Its columns: `count`, how many points a row stands for, and the mean `intensity` where every cloud has one.

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import small_gicp
-from numpy.typing import NDArray
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
 
 from design import frames
+from design.arrays import Floats, Pose
 from firmware_io.registration.cube_map import cells_of
-from firmware_io.registration.sensor_view import THREADS, Level, View, level_of
-from firmware_io.samples import Floats
+from firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
 
 _COARSE_REACH_M = 1.0
 _COARSE_NEAR = 3  # times the spacing
@@ -53,8 +54,8 @@ class Pair:
 
     a: str
     b: str
-    T_a_b: Floats
-    covariance: Floats
+    T_a_b: Pose
+    covariance: Float64[ndarray, "6 6"]
     overlap: float
     contradiction: float
     why_not: tuple[str, ...]
@@ -65,11 +66,11 @@ class Pair:
         return _merit(self.overlap, self.contradiction)
 
 
-def align(a: View, b: View, T_a_b: Floats) -> Pair:
+def align(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     """Register b to a from a start that is right to about a metre and ten degrees."""
     near = align_coarsely(a, b, T_a_b)
     T, converged = _gicp(a.fine, b.fine, near, _FINE_REACH * a.spacing_m, THREADS)
-    return judge(a, b, T, converged)
+    return judge_pair(a, b, T, converged)
 
 
 def refused(pair: Pair, why: str) -> Pair:
@@ -77,12 +78,12 @@ def refused(pair: Pair, why: str) -> Pair:
     return replace(pair, why_not=(*pair.why_not, why))
 
 
-def align_coarsely(a: View, b: View, T_a_b: Floats) -> Floats:
+def align_coarsely(a: SensorView, b: SensorView, T_a_b: Pose) -> Pose:
     """The first half of `align`, to compare many starts."""
     return _gicp(a.coarse, b.coarse, T_a_b, _COARSE_REACH_M, 1)[0]
 
 
-def judge(a: View, b: View, T_a_b: Floats, converged: bool) -> Pair:
+def judge_pair(a: SensorView, b: SensorView, T_a_b: Pose, converged: bool) -> Pair:
     """Weigh a pose by what both scanners saw."""
     near_m = _FINE_REACH * a.spacing_m
     T_b_a = np.linalg.inv(T_a_b)
@@ -116,7 +117,7 @@ def judge(a: View, b: View, T_a_b: Floats, converged: bool) -> Pair:
     return Pair(a.name, b.name, T_a_b, covariance, overlap, contradiction, (*why_not, *loose))
 
 
-def _gicp(target: Level, source: Level, T_target_source: Floats, reach_m: float, threads: int) -> tuple[Floats, bool]:
+def _gicp(target: Level, source: Level, T_target_source: Pose, reach_m: float, threads: int) -> tuple[Pose, bool]:
     """Align what faces both scanners: the two sides of a thin wall would settle on each other."""
     target = _facing(target, T_target_source[:3, 3])
     source = _facing(source, np.asarray(np.linalg.inv(T_target_source)[:3, 3], float))
@@ -136,13 +137,13 @@ def _gicp(target: Level, source: Level, T_target_source: Floats, reach_m: float,
     return result.T_target_source, bool(result.converged and result.num_inliers > 0)
 
 
-def _facing(level: Level, other_m: Floats) -> Level:
+def _facing(level: Level, other_m: Float64[ndarray, " 3"]) -> Level:
     """The part of a level that shows its face to another scanner as well; all of it if that is nearly all."""
     faces = np.einsum("ij,ij->i", level.normals, other_m - level.points_m) >= 0
-    return level if faces.mean() > _NEARLY_ALL or faces.sum() < _FEW else level_of(level.points_m[faces])
+    return level if faces.mean() > _NEARLY_ALL or faces.sum() < _FEW else make_level(level.points_m[faces])
 
 
-def coarse_merit(a: View, b: View, T_a_b: Floats) -> float:
+def coarse_merit(a: SensorView, b: SensorView, T_a_b: Pose) -> float:
     """`Pair.merit` by the coarse points alone: a hundredth of the work."""
     there = frames.apply(T_a_b, b.coarse.points_m)
     here = frames.apply(np.linalg.inv(T_a_b), a.coarse.points_m)
@@ -151,12 +152,12 @@ def coarse_merit(a: View, b: View, T_a_b: Floats) -> float:
     return _merit(max(_coarse_shares(a, b, T_a_b, _COARSE_NEAR * a.spacing_m)), contradiction)
 
 
-def near_share(a: View, b: View, T_a_b: Floats) -> float:
+def near_share(a: SensorView, b: SensorView, T_a_b: Pose) -> float:
     """Overlap as far as a pose that may be off by decimetres can tell it."""
     return max(_coarse_shares(a, b, T_a_b, _COARSE_REACH_M))
 
 
-def _coarse_shares(a: View, b: View, T_a_b: Floats, reach_m: float) -> tuple[float, float]:
+def _coarse_shares(a: SensorView, b: SensorView, T_a_b: Floats, reach_m: float) -> tuple[float, float]:
     """Which share of b's coarse points touches a, and of a's b."""
     T_b_a = np.linalg.inv(T_a_b)
     on_a, _ = _touching(a.coarse, frames.apply(T_a_b, b.coarse.points_m), b.coarse.normals @ T_b_a[:3, :3], reach_m)
@@ -168,15 +169,15 @@ def _merit(overlap: float, contradiction: float) -> float:
     return overlap * max(0.0, 1 - contradiction / MAX_CONTRADICTION) + 1e-3 * overlap
 
 
-def _some(level: Level) -> tuple[Floats, Floats]:
+def _some(level: Level) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
     """Points and normals, as many as a verdict needs."""
     step = max(1, len(level.points_m) // _JUDGED)
     return level.points_m[::step], level.normals[::step]
 
 
 def _touching(
-    level: Level, points_m: Floats, normals: Floats, reach_m: float
-) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    level: Level, points_m: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], reach_m: float
+) -> tuple[Bool[ndarray, " n"], Int64[ndarray, " n"]]:
     """Which points have a neighbour within reach that faces the same way, and its index."""
     index, square_m2 = level.tree.batch_knn_search(np.ascontiguousarray(points_m), 1, 1)
     nearest = index[:, 0].astype(np.int64)
@@ -184,7 +185,7 @@ def _touching(
     return (square_m2[:, 0] < reach_m**2) & alike, nearest
 
 
-def _contradiction(seer: View, points_m: Floats, margin_m: float) -> float:
+def _contradiction(seer: SensorView, points_m: Float64[ndarray, "n 3"], margin_m: float) -> float:
     """Share of points, of those that the seer must have seen, that stand clearly before what it did see there."""
     cells = cells_of(points_m, seer.depth.side)
     range_m = np.linalg.norm(points_m, axis=1)
@@ -195,14 +196,18 @@ def _contradiction(seer: View, points_m: Floats, margin_m: float) -> float:
     return float(before.sum()) / max(int(seen.sum()), 1)
 
 
-def _jacobian(normals: Floats, points_a: Floats, T_a_b: Floats) -> Floats:
+def _jacobian(
+    normals: Float64[ndarray, "n 3"], points_a: Float64[ndarray, "n 3"], T_a_b: Pose
+) -> Float64[ndarray, "n 6"]:
     """Point-to-plane residuals by a small motion on the right of `T_a_b`, shape (n, 6)."""
     points_b = frames.apply(np.linalg.inv(T_a_b), points_a)
     normals_b = normals @ T_a_b[:3, :3]
     return np.hstack([np.cross(points_b, normals_b), normals_b])
 
 
-def _loose(points_m: Floats, normals: Floats, others: Floats, frame: str) -> list[str]:
+def _loose(
+    points_m: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], others: Floats, frame: str
+) -> list[str]:
     """Name the motions that no surface in common resists: along a corridor, over a floor, about a tank.
 
     The smallest eigenvalue cannot tell, for noise tilts every normal a little and thousands of them add up. So those
@@ -233,6 +238,6 @@ def _weakest(rows: Floats) -> Floats:
     return np.linalg.eigh(rows.T @ rows)[1][:, 0]
 
 
-def _axis(direction: Floats) -> str:
+def _axis(direction: Float64[ndarray, " 3"]) -> str:
     x, y, z = direction * np.sign(direction[np.argmax(np.abs(direction))]) + 0.0
     return f"({x:.2f}, {y:.2f}, {z:.2f})"

@@ -6,26 +6,29 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
+from design.arrays import Pose
+from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.record import Cloud, pose_matrix, pose_numbers
-from firmware_io.files import foreign, whole_file
-from firmware_io.samples import Floats
+from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
+from firmware_io.foreign import foreign
 
 _AXES = ("rx", "ry", "rz", "x", "y", "z")
 
 
-def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_world: Floats) -> None:
+def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"]) -> None:
     """One line for each cloud, in their order; the time is the cloud's start, or its number where that is unknown."""
     lines = ["# time x y z qx qy qz qw"]
     for number, (name, cloud, T) in enumerate(zip(names, clouds, T_world, strict=True)):
         time = str(number) if cloud.start_ns is None else f"{cloud.start_ns // 10**9}.{cloud.start_ns % 10**9:09d}"
         lines += [f"# {name}", f"{time} " + " ".join(f"{value:.9f}" for value in pose_numbers(T))]
-    with whole_file(path) as part:
+    with whole_file(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def write_covariances(path: Path, names: Sequence[str], covariance: Floats) -> None:
+def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndarray, "n 6 6"]) -> None:
     """One row for each cloud: the upper triangle for a small motion (rotation vector w [rad], translation v [m]).
 
     It is in the frame of the cloud, on the right of its pose: T + (w, v) = (R exp(w), t + R v).
@@ -34,11 +37,11 @@ def write_covariances(path: Path, names: Sequence[str], covariance: Floats) -> N
     lines = [",".join(["cloud", *(f"{_AXES[i]}_{_AXES[j]}" for i, j in upper)])]
     for name, matrix in zip(names, covariance, strict=True):
         lines.append(",".join([name, *(f"{matrix[i, j]:.6e}" for i, j in upper)]))
-    with whole_file(path) as part:
+    with whole_file(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def read_poses(path: Path, count: int) -> list[Floats]:
+def read_poses(path: Path, count: int) -> list[Pose]:
     """Poses of `count` clouds, one TUM line for each in their order.
 
     Raises:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
-from firmware_io.registration.graph import Edge, Graph, solve
+from design.arrays import Floats, Pose
+from firmware_io.registration.graph import Edge, Graph, solve_graph
 from firmware_io.registration.pairwise import Pair, align, near_share, refused
-from firmware_io.registration.sensor_view import View
-from firmware_io.registration.start import find
-from firmware_io.samples import Floats
+from firmware_io.registration.sensor_view import SensorView
+from firmware_io.registration.start import find_start
 
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
@@ -29,8 +31,8 @@ class Registration:
         scale: by how much the stated sigmas of the pairs had to grow for them to agree, at least 1.
     """
 
-    T_world: Floats
-    covariance: Floats
+    T_world: Float64[ndarray, "n 4 4"]
+    covariance: Float64[ndarray, "n 6 6"]
     pairs: tuple[Pair, ...]
     scale: float
 
@@ -40,7 +42,7 @@ class Registration:
         return bool(np.isfinite(self.T_world).all())
 
 
-def register(views: Sequence[View], given: Sequence[Floats], say: Callable[[str], None]) -> Registration:
+def register(views: Sequence[SensorView], given: Sequence[Pose], say: Callable[[str], None]) -> Registration:
     """Find all poses.
 
     Args:
@@ -71,7 +73,7 @@ def register(views: Sequence[View], given: Sequence[Floats], say: Callable[[str]
 
 
 def _chain(
-    views: Sequence[View],
+    views: Sequence[SensorView],
     given: Sequence[Floats],
     pairs: dict[tuple[int, int], Pair],
     say: Callable[[str], None],
@@ -84,7 +86,7 @@ def _chain(
 
 
 def _next_joined(
-    views: Sequence[View],
+    views: Sequence[SensorView],
     given: Sequence[Floats],
     poses: dict[int, Floats],
     pairs: dict[tuple[int, int], Pair],
@@ -103,16 +105,16 @@ def _next_joined(
     return {}
 
 
-def _pair(a: View, b: View, given: Sequence[Floats]) -> Pair:
+def _pair(a: SensorView, b: SensorView, given: Sequence[Floats]) -> Pair:
     """From the given poses if they lead anywhere, else from none."""
     if given:
         pair = align(a, b, np.linalg.inv(given[0]) @ given[1])
         if not pair.why_not:
             return pair
-    return find(a, b)
+    return find_start(a, b)
 
 
-def _in_reach(views: Sequence[View], poses: dict[int, Floats], i: int, j: int) -> bool:
+def _in_reach(views: Sequence[SensorView], poses: dict[int, Floats], i: int, j: int) -> bool:
     """Whether enough of both clouds may lie on each other to be worth a try."""
     return near_share(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j]) > _WORTH
 
@@ -121,7 +123,7 @@ def _solve(order: Sequence[int], poses: dict[int, Floats], pairs: dict[tuple[int
     """Solve the graph of the believed pairs; those that it throws out are marked in `pairs`."""
     row = {k: position for position, k in enumerate(order)}
     edges = [Edge(row[i], row[j], pair.T_a_b, pair.covariance) for (i, j), pair in pairs.items() if not pair.why_not]
-    graph = solve(np.array([poses[k] for k in order]), edges)
+    graph = solve_graph(np.array([poses[k] for k in order]), edges)
     for edge in graph.left_out:
         i, j = order[edge.i], order[edge.j]
         pairs[i, j] = refused(pairs[i, j], "it contradicts what all other pairs say")

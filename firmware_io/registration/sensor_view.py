@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import small_gicp
+from jaxtyping import Float64
+from numpy import ndarray
 
 from design.errors import RecordingError
 from firmware_io.registration.cube_map import DepthMap, depth_map
 from firmware_io.registration.thin import thin, voxel_means
-from firmware_io.samples import Floats
 
 THREADS = os.cpu_count() or 1
 _NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py
@@ -31,14 +32,14 @@ class Level:
         tree: nearest-neighbour search in it.
     """
 
-    points_m: Floats
-    normals: Floats
+    points_m: Float64[ndarray, "n 3"]
+    normals: Float64[ndarray, "n 3"]
     cloud: small_gicp.PointCloud
     tree: small_gicp.KdTree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class SensorView:
     """What one stand saw, in the frame of its scanner, whose optical centre is the origin.
 
     Attributes:
@@ -56,7 +57,7 @@ class View:
     depth: DepthMap
 
 
-def view_of(name: str, points_m: Floats, spacing_m: float) -> View:
+def make_view(name: str, points_m: Float64[ndarray, "n 3"], spacing_m: float) -> SensorView:
     """Make a cloud ready.
 
     Args:
@@ -76,10 +77,10 @@ def view_of(name: str, points_m: Floats, spacing_m: float) -> View:
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m, np.zeros(len(thinned), np.uint8))
-    return View(name, spacing_m, level_of(thinned), level_of(coarse), depth_map(thinned, _DEPTH_SIDE))
+    return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE))
 
 
-def level_of(points_m: Floats) -> Level:
+def make_level(points_m: Float64[ndarray, "n 3"]) -> Level:
     """Points of one view with their normals."""
     cloud = small_gicp.PointCloud(points_m)
     tree = small_gicp.KdTree(cloud, num_threads=THREADS)

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
+from jaxtyping import Float64
+from numpy import ndarray
 from numpy.typing import NDArray
 
 from design import frames
+from design.arrays import Floats, Pose
 from firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
-from firmware_io.registration.sensor_view import View
-from firmware_io.samples import Floats
+from firmware_io.registration.sensor_view import SensorView
 
 _CELL_M = 0.25
 _HEADINGS = 120  # 3 deg apart: within a cell of the truth up to 10 m
@@ -49,19 +51,19 @@ class Start:
         score: cosine of the angle between the two plans as vectors: 1 where they are the same.
     """
 
-    T_a_b: Floats
+    T_a_b: Pose
     score: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
-    T_level_view: Floats
-    points_m: Floats
+    T_level_view: Pose
+    points_m: Float64[ndarray, "n 3"]
     arrows: Complexes
     floors: Floats
 
 
-def starts(a: View, b: View, count: int) -> list[Start]:
+def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
     """The best distinct guesses of where b is in the frame of a, best first; none without an upright surface."""
     plans = _plan(a), _plan(b)
     if not all(len(plan.points_m) for plan in plans):
@@ -92,7 +94,7 @@ def starts(a: View, b: View, count: int) -> list[Start]:
     return [Start(down @ lift @ start.T_a_b @ plans[1].T_level_view, start.score) for start in found]
 
 
-def find(a: View, b: View) -> Pair:
+def find_start(a: SensorView, b: SensorView) -> Pair:
     """Register b to a from no start at all: the best of several guesses, refused where two of them are as good."""
     guesses = sorted(starts(a, b, _STARTS), key=lambda start: coarse_merit(a, b, start.T_a_b), reverse=True)
     if not guesses:
@@ -113,7 +115,7 @@ def find(a: View, b: View) -> Pair:
     return best
 
 
-def _plan(view: View) -> _Plan:
+def _plan(view: SensorView) -> _Plan:
     step = max(1, len(view.fine.points_m) // _POINTS)
     points_m, normals = view.fine.points_m[::step], view.fine.normals[::step]
     T = _level(normals)
@@ -125,7 +127,7 @@ def _plan(view: View) -> _Plan:
     return _Plan(T, points_m[wall, :2], normals[wall, 0] + 1j * normals[wall, 1], floors)
 
 
-def _level(normals: Floats) -> Floats:
+def _level(normals: Float64[ndarray, "n 3"]) -> Pose:
     """Transform that makes the floors horizontal: the direction most normals share, if it is within 30 deg of up."""
     up = np.array([0.0, 0.0, 1.0])
     for cosine in _FLOOR:
@@ -161,6 +163,6 @@ def _height_m(a: _Plan, b: _Plan) -> float:
     return float((np.argmax(match) - (_HEIGHTS - 1)) * _HEIGHT_M)
 
 
-def _distinct(T: Floats, other: Floats) -> bool:
+def _distinct(T: Pose, other: Pose) -> bool:
     angle = np.angle((T[0, 0] + 1j * T[1, 0]) * (other[0, 0] - 1j * other[1, 0]))
     return bool(abs(angle) > _APART_RAD or np.linalg.norm(T[:2, 3] - other[:2, 3]) > _APART_M)

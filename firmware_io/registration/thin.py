@@ -12,17 +12,19 @@ the gap between the lines there, and a voxel is taken no finer than that gap on 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float64, Int64
 from numba import njit
+from numpy import ndarray
 from numpy.typing import NDArray
 
+from design.arrays import Floats
 from firmware_io.registration.cube_map import cells_of, solid_angles_sr
-from firmware_io.samples import Floats
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
 _LEVELS = 3  # voxels grow up to 2**3 times; where lines are still farther apart nothing is known between them
 
 
-def thin(points_m: Floats, spacing_m: float) -> Floats:
+def thin(points_m: Float64[ndarray, "n 3"], spacing_m: float) -> Float64[ndarray, "kept 3"]:
     """Mean points of voxels, shape (m, 3), evenly spread over the surfaces that the scanner at the origin saw.
 
     Args:
@@ -36,7 +38,9 @@ def thin(points_m: Floats, spacing_m: float) -> Floats:
     return joined_means(means, means, counts, spacing_m, level)[0]
 
 
-def line_gaps_rad(points_m: Floats, counts: NDArray[np.int64], step_rad: float) -> Floats:
+def line_gaps_rad(
+    points_m: Float64[ndarray, "n 3"], counts: Int64[ndarray, " n"], step_rad: float
+) -> Float64[ndarray, " n"]:
     """Angle between neighbouring scan lines in the direction of each point, shape (n,).
 
     In a cloud without lines (of another scanner, or shuffled) it is the mean distance of neighbours.
@@ -53,7 +57,7 @@ def line_gaps_rad(points_m: Floats, counts: NDArray[np.int64], step_rad: float) 
     return gap[cells]
 
 
-def beam_step_rad(points_m: Floats) -> float:
+def beam_step_rad(points_m: Float64[ndarray, "n 3"]) -> float:
     """Angle between beams that were measured one after the other: the median, as the rest are gaps and line ends."""
     some = np.unique(np.linspace(0, len(points_m) - 2, min(len(points_m) - 1, 20_011)).astype(int))
     here, there = points_m[some], points_m[some + 1]

@@ -23,14 +23,14 @@ import numpy as np
 from design.angles import AngleSet
 from design.errors import DeviceError
 from design.motion import Motion, Spin, StopAndGo
-from firmware_io.lidar.scip.driver import Lidar, clock_of, open_lidar
+from firmware_io.lidar.scip.driver import ScipLidar, new_clock, open_lidar
 from firmware_io.lidar.scip.parameters import StampAt
-from firmware_io.lidar.scip.raw_scan import RawScan, scan_of
+from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 from firmware_io.recording import ros_messages
 from firmware_io.samples import Scan
-from firmware_io.scan.axis_thread import Axis, turning_servo
+from firmware_io.scan.axis_thread import AxisThread, turning_servo
 from firmware_io.scan.live_feed import NOBODY, Watch
-from firmware_io.scan.plan import Plan
+from firmware_io.scan.plan import ScanPlan
 from firmware_io.scan.recorder import Recorder
 from firmware_io.servo.dynamixel.driver import ServoState, open_servo
 
@@ -85,7 +85,7 @@ class ScanSummary:
         ]
 
 
-def acquire(plan: Plan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
+def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     """Do it. Both devices are stopped and the recording is closed on every way out.
 
     Raises:
@@ -103,7 +103,7 @@ def acquire(plan: Plan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     with ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar))
         servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo))
-        check(plan.angles, lidar)
+        check_model(plan.angles, lidar)
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
             tell(f"warning: {servo.model}: {warning}")
@@ -116,7 +116,7 @@ def acquire(plan: Plan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
         return _record(plan, scans, axis, tell, watch)
 
 
-def check(angles: AngleSet, lidar: Lidar) -> None:
+def check_model(angles: AngleSet, lidar: ScipLidar) -> None:
     """Refuse a lidar that is not the one of the angle set.
 
     Raises:
@@ -135,13 +135,13 @@ class _Scans:
         away: how often the sensor was.
     """
 
-    def __init__(self, lidar: Lidar, stamp_at: StampAt, say: Say) -> None:
+    def __init__(self, lidar: ScipLidar, stamp_at: StampAt, say: Say) -> None:
         self.lidar = lidar
-        self.axis: Axis | None = None
+        self.axis: AxisThread | None = None
         self.clock_ns = 0
         self.away = 0
         self._stamp_at = stamp_at
-        self._clock = clock_of(lidar, stamp_at)
+        self._clock = new_clock(lidar, stamp_at)
         self._say = say
 
     def next(self) -> Scan:
@@ -157,13 +157,13 @@ class _Scans:
                 self.axis.go()
         moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
         self.clock_ns = moment.uncertainty_ns
-        return scan_of(raw, self.lidar.parameters, moment.time_ns)
+        return to_laser_scan(raw, self.lidar.parameters, moment.time_ns)
 
     def _found_again(self) -> RawScan:
         deadline_s = time.monotonic() + _AWAY_S
         while True:
             self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
-            self._clock = clock_of(self.lidar, self._stamp_at)
+            self._clock = new_clock(self.lidar, self._stamp_at)
             try:
                 return self.lidar.read()
             except DeviceError:  # a sensor that just got its power answers before it measures
@@ -183,7 +183,7 @@ def _settle_clock(scans: _Scans, say: Say) -> None:
 
 
 def _wait_until_steady(
-    scans: _Scans, axis: Axis, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
+    scans: _Scans, axis: AxisThread, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
 ) -> int:
     """Read scans until the servo is where the motion begins, and a spin turns evenly at its speed; how many it read.
 
@@ -223,7 +223,7 @@ def _wait_until_steady(
     return read
 
 
-def _record(plan: Plan, scans: _Scans, axis: Axis, say: Say, watch: Watch) -> ScanSummary:
+def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Watch) -> ScanSummary:
     """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
     say(f"recording {plan.duration_s:g} s")
     lidar, dropped, bad = scans.lidar, scans.lidar.dropped, scans.lidar.bad_packets

@@ -22,7 +22,7 @@ from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from design.motion import Motion
 from firmware_io.samples import Scan
 from firmware_io.scan.setpoints import Move, course
-from firmware_io.servo.dynamixel.driver import Servo, ServoState
+from firmware_io.servo.dynamixel.driver import DynamixelServo, ServoState
 
 SERVO_HZ = 100.0
 
@@ -33,7 +33,7 @@ _DOUBT_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is abo
 _GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
 
 
-class Axis:
+class AxisThread:
     """What the servo's thread is told and tells, and what is made of it here.
 
     Attributes:
@@ -118,7 +118,7 @@ class Axis:
 
 
 @contextmanager
-def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
+def turning_servo(servo: DynamixelServo, motion: Motion) -> Iterator[AxisThread]:
     """The servo makes its motion, and is asked where it is, while the body runs.
 
     Raises:
@@ -129,7 +129,7 @@ def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
         raise DeviceError(
             f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
         )
-    axis, done = Axis(motion, stands_rad, servo.step_rad), Event()
+    axis, done = AxisThread(motion, stands_rad, servo.step_rad), Event()
     thread = Thread(target=_follow, args=(servo, axis.orders, axis.told, done), name="servo", daemon=True)
     thread.start()
     try:
@@ -140,7 +140,7 @@ def turning_servo(servo: Servo, motion: Motion) -> Iterator[Axis]:
 
 
 def _follow(
-    servo: Servo,
+    servo: DynamixelServo,
     orders: SimpleQueue[Iterator[Move] | None],
     told: SimpleQueue[ServoState | Exception],
     done: Event,

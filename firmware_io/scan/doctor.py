@@ -17,9 +17,9 @@ import numpy as np
 
 from design.angles import AngleSet, load_angles
 from design.errors import DeviceError
-from firmware_io.lidar.scip.driver import clock_of, open_lidar
-from firmware_io.ports import emulated, lidar_ports, servo_ports
-from firmware_io.scan.acquire import CLOCK_GOOD_NS, check
+from firmware_io.device_ports import emulated, lidar_ports, servo_ports
+from firmware_io.lidar.scip.driver import new_clock, open_lidar
+from firmware_io.scan.acquire import CLOCK_GOOD_NS, check_model
 from firmware_io.scan.axis_thread import SERVO_HZ
 from firmware_io.servo.dynamixel.driver import open_servo
 
@@ -29,51 +29,53 @@ _BOUND_MS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class DeviceFinding:
     """One line of the diagnosis; `says` ends with the remedy where something is wrong."""
 
     verdict: Literal["ok", "warning", "wrong"]
     says: str
 
 
-def examine(out: Path | None, lidar: str | None, servo: str | None) -> Iterator[Finding]:
+def examine(out: Path | None, lidar: str | None, servo: str | None) -> Iterator[DeviceFinding]:
     """Examine the named ports, else the emulated scanner of the build folder, else whatever is plugged in."""
-    yield Finding("ok", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
+    yield DeviceFinding("ok", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
     angles = None if out is None else load_angles(out / "angles.json")
     twins = None if out is None else emulated(out)
     lidars, servos = [lidar] if lidar else lidar_ports(), [servo] if servo else servo_ports()
     if twins is not None and lidar is None and servo is None:
-        yield Finding("ok", f"the scanner of {out} is emulated by process {twins.pid}")
+        yield DeviceFinding("ok", f"the scanner of {out} is emulated by process {twins.pid}")
         lidars, servos = [twins.lidar], [twins.servo]
     for port in lidars:
         yield from _guarded(_examine_lidar(port, angles))
     for port in servos:
         yield from _guarded(_examine_servo(port, angles.servo if angles else None))
     if not lidars:
-        yield Finding(
+        yield DeviceFinding(
             "wrong",
             "no Hokuyo sensor on USB: plug it in (12 V and USB), or give an Ethernet one as --lidar 192.168.0.10:10940",
         )
     if not servos:
-        yield Finding(
+        yield DeviceFinding(
             "wrong", "no serial adapter on USB: plug in the servo's U2D2 or USB2Dynamixel, or give --servo PORT"
         )
 
 
-def _guarded(examination: Iterator[Finding]) -> Iterator[Finding]:
+def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
     """A device that fails ends its own examination only."""
     try:
         yield from examination
     except DeviceError as error:
-        yield Finding("wrong", str(error))
+        yield DeviceFinding("wrong", str(error))
 
 
-def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
+def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding]:
     with open_lidar(port) as lidar:
-        yield Finding("ok", f"{port}: {lidar.model}, serial number {lidar.serial_number}, firmware {lidar.firmware}")
+        yield DeviceFinding(
+            "ok", f"{port}: {lidar.model}, serial number {lidar.serial_number}, firmware {lidar.firmware}"
+        )
         if angles is not None:
-            check(angles, lidar)
-        clock, expected_hz = clock_of(lidar), 1 / lidar.parameters.scan_period_s
+            check_model(angles, lidar)
+        clock, expected_hz = new_clock(lidar), 1 / lidar.parameters.scan_period_s
         lidar.start()
         began_ns = lidar.read().arrival_ns
         late_ns: list[int] = []
@@ -105,16 +107,16 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
     yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
 
 
-def _examine_servo(port: str, model: str | None) -> Iterator[Finding]:
+def _examine_servo(port: str, model: str | None) -> Iterator[DeviceFinding]:
     with open_servo(port, model) as servo:
-        yield Finding("ok", f"{servo}, protocol {servo.protocol:.1f} at {servo.baud} baud")
+        yield DeviceFinding("ok", f"{servo}, protocol {servo.protocol:.1f} at {servo.baud} baud")
         for warning in servo.warnings():
-            yield Finding("warning", f"{port}: {warning}")
+            yield DeviceFinding("warning", f"{port}: {warning}")
         began_s = time.monotonic()
         states = [servo.read() for _ in range(_SERVO_READS)]
         rate_hz = _SERVO_READS / (time.monotonic() - began_s)
     last = states[-1]
-    yield Finding("ok", f"{port}: {last.voltage_V:.1f} V, {last.temperature_degC:.0f} deg C")
+    yield DeviceFinding("ok", f"{port}: {last.voltage_V:.1f} V, {last.temperature_degC:.0f} deg C")
     yield _judged(
         rate_hz > 1.2 * SERVO_HZ,
         f"{port}: {rate_hz:.0f} reads/s, {SERVO_HZ:.0f} are needed",
@@ -128,5 +130,5 @@ def _examine_servo(port: str, model: str | None) -> Iterator[Finding]:
     )
 
 
-def _judged(good: bool, says: str, remedy: str) -> Finding:
-    return Finding("ok", says) if good else Finding("warning", f"{says}: {remedy}")
+def _judged(good: bool, says: str, remedy: str) -> DeviceFinding:
+    return DeviceFinding("ok", says) if good else DeviceFinding("warning", f"{says}: {remedy}")

@@ -15,11 +15,13 @@ from threading import Event, Lock, Thread
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Float32, Float64, Int64
+from numpy import ndarray
 
 from design.angles import AngleSet
 from firmware_io.assembly.deskew_kernel import place_block
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.samples import Float32s, Floats, JointLog, Scan, Times, blocks, straight
+from firmware_io.samples import JointLog, Scan, blocks, straight
 
 MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
 MOST_ANGLES = 2000
@@ -66,8 +68,8 @@ NOBODY = Nobody()
 class Batch:
     """What came since the last one; `lost` counts the scans that the view left out so far."""
 
-    time_ns: Times
-    position_rad: Floats
+    time_ns: Int64[ndarray, " n"]
+    position_rad: Float64[ndarray, " n"]
     scans: tuple[Scan, ...]
     lines: tuple[str, ...]
     lost: int
@@ -128,7 +130,7 @@ class Feed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Growth:
+class CloudGrowth:
     """By what a cloud has grown.
 
     Attributes:
@@ -139,9 +141,9 @@ class Growth:
         lost: scans that the view left out so far.
     """
 
-    points_m: Float32s
-    intensity: Float32s
-    time_s: Float32s
+    points_m: Float32[ndarray, "n 3"]
+    intensity: Float32[ndarray, " n"]
+    time_s: Float32[ndarray, " n"]
     lines: tuple[str, ...]
     lost: int
 
@@ -154,7 +156,7 @@ class Placing:
         self._time_ns, self._position_rad = np.empty(0, np.int64), np.empty(0)
         self._first_ns: int | None = None
 
-    def place(self, batch: Batch) -> Growth:
+    def place(self, batch: Batch) -> CloudGrowth:
         """Points of the scans of a batch; beams without a place are left out of the view."""
         time_ns = np.concatenate([self._time_ns, batch.time_ns])
         position_rad = np.concatenate([self._position_rad, batch.position_rad])
@@ -168,7 +170,7 @@ class Placing:
             [np.empty(0, np.float32)],
         )
         if time_ns.size < 2:
-            return Growth(points[0], intensity[0], seconds[0], batch.lines, batch.lost)
+            return CloudGrowth(points[0], intensity[0], seconds[0], batch.lines, batch.lost)
         curve = straight(JointLog(time_ns, position_rad))
         for block in blocks(batch.scans):
             if self._first_ns is None:
@@ -180,12 +182,12 @@ class Placing:
             intensity.append(told[there])
             after_s = ((block.stamp_ns - self._first_ns) / 1e9).astype(np.float32)
             seconds.append(np.broadcast_to(after_s[:, None], there.shape)[there])
-        return Growth(
+        return CloudGrowth(
             np.concatenate(points), np.concatenate(intensity), np.concatenate(seconds), batch.lines, batch.lost
         )
 
 
-def growing(receiving: Connection, placing: Placing) -> Iterator[Growth]:
+def growing(receiving: Connection, placing: Placing) -> Iterator[CloudGrowth]:
     """What comes through the pipe, placed, until the other end is closed."""
     while True:
         try:

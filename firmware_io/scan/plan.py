@@ -11,12 +11,12 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
 from design.motion import Motion, Spin
+from firmware_io.device_ports import Ports, find_ports
 from firmware_io.lidar.scip.parameters import StampAt
-from firmware_io.ports import Ports, find_ports
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ScanPlan:
     """What one scan is going to do.
 
     Attributes:
@@ -64,7 +64,7 @@ def plan_scan(
     recording: Path | None = None,
     intensity: bool = False,
     stamp_at: StampAt = "step_0",
-) -> Plan:
+) -> ScanPlan:
     """What a scan with the scanner of a build folder will do; touches no device and writes nothing.
 
     Args:
@@ -93,7 +93,7 @@ def plan_scan(
     if recording is not None:
         _check_name(recording)
     kept = [path for name in ("angles.json", "task.toml") if (path := out / name).is_file()]
-    return Plan(
+    return ScanPlan(
         angles=angles,
         motion=angles.motion,
         turns=turns,

@@ -26,10 +26,11 @@ from threading import Lock
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Float64, Int64
+from numpy import ndarray
 from scipy.integrate import BDF, LSODA, Radau
 
-from firmware_io.samples import Floats
+from design.arrays import Floats
 from firmware_io.servo.dynamixel.registers import motor_of
 
 Mode = Literal["off", "share", "velocity", "position"]
@@ -115,7 +116,7 @@ def plant_of(model: str) -> Plant:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class Actuation:
     """What acts on the plant from one moment on.
 
     Attributes:
@@ -153,7 +154,7 @@ class Solver:
     rtol: float = 1e-6
 
 
-class Axis:
+class HornMotion:
     """The horn's motion under a history of drives, integrated lazily and kept for `history_s`.
 
     Times are integer nanoseconds of whatever clock the caller uses. Thread-safe.
@@ -174,12 +175,12 @@ class Axis:
         self._history_s = history_s
         self._origin_ns = time_ns
         self._lock = Lock()
-        self._drives: list[tuple[float, Drive, float, float]] = []  # start, drive, where the walk starts, block
+        self._drives: list[tuple[float, Actuation, float, float]] = []  # start, drive, where the walk starts, block
         self._ends: list[float] = []  # of the steps, increasing
         self._steps: list[Callable[[Floats], Floats]] = []
-        self._begin(0.0, np.array([angle_rad, 0.0, angle_rad, 0.0, 0.0, angle_rad]), Drive(), angle_rad)
+        self._begin(0.0, np.array([angle_rad, 0.0, angle_rad, 0.0, 0.0, angle_rad]), Actuation(), angle_rad)
 
-    def drive(self, time_ns: int, drive: Drive) -> None:
+    def drive(self, time_ns: int, drive: Actuation) -> None:
         """From `time_ns` on, `drive` acts; what was integrated beyond is forgotten."""
         with self._lock:
             t = max((time_ns - self._origin_ns) / 1e9, self._drives[-1][0])
@@ -199,12 +200,12 @@ class Axis:
         """From `time_ns` on, these fields of the present drive are others."""
         self.drive(time_ns, replace(self._drives[-1][1], **values))  # type: ignore[arg-type]
 
-    def drive_at(self, time_ns: int) -> Drive:
+    def drive_at(self, time_ns: int) -> Actuation:
         """The drive that acts at one time."""
         with self._lock:
             return self._drives[self._index((time_ns - self._origin_ns) / 1e9)][1]
 
-    def angle_rad(self, time_ns: NDArray[np.int64]) -> Floats:
+    def angle_rad(self, time_ns: Int64[ndarray, " n"]) -> Float64[ndarray, " n"]:
         """True angle of the horn at given times, in the shape given.
 
         Raises:
@@ -229,7 +230,7 @@ class Axis:
         """Of the drive that acts at `t`."""
         return max(0, bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1)
 
-    def _begin(self, t: float, state: Floats, drive: Drive, setpoint: float) -> None:
+    def _begin(self, t: float, state: Floats, drive: Actuation, setpoint: float) -> None:
         held = self._drives[-1][3] if self._drives and self._drives[-1][1].blocked else float(state[2])
         self._drives.append((t, drive, setpoint, held))
         rhs = _equations(self._plant, self._load, drive, t, setpoint, held)
@@ -277,7 +278,15 @@ def _walk(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -> flo
 
 
 def _effort(
-    plant: Plant, drive: Drive, setpoint: float, m: float, m_rate: float, h: float, h_rate: float, i: float, seen: float
+    plant: Plant,
+    drive: Actuation,
+    setpoint: float,
+    m: float,
+    m_rate: float,
+    h: float,
+    h_rate: float,
+    i: float,
+    seen: float,
 ) -> tuple[float, float]:
     """Duty of the loop, and torque of the motor as a fraction of the stall torque."""
     del m, h_rate
@@ -288,7 +297,7 @@ def _effort(
     return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
 
 
-def _asked(plant: Plant, drive: Drive, setpoint: float, h: float, i: float, seen: float) -> float:
+def _asked(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
     """Duty that the loop asks for, whatever the limit."""
     if drive.mode == "share":
         return drive.goal
@@ -300,7 +309,7 @@ def _asked(plant: Plant, drive: Drive, setpoint: float, h: float, i: float, seen
 
 
 def _equations(
-    plant: Plant, load: Load, drive: Drive, start_s: float, setpoint: float, held: float
+    plant: Plant, load: Load, drive: Actuation, start_s: float, setpoint: float, held: float
 ) -> Callable[[float, Floats], list[float]]:
     """Right-hand side for one drive; states: motor angle and rate, horn angle and rate, integral, angle seen."""
     half = plant.backlash_rad / 2

@@ -10,13 +10,14 @@ import numpy as np
 
 from design import frames
 from design.angles import AngleSet
+from design.arrays import Rotation, Vector
 from design.errors import DeviceError
 from firmware_io.twins.dynamics import Load
 
 _GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 
 
-def load_of(out: Path, angles: AngleSet) -> Load:
+def read_load(out: Path, angles: AngleSet) -> Load:
     """Inertia and gravity of the links `rot` and `laser` about the axis; a light, balanced head before the build.
 
     Raises:
@@ -47,7 +48,7 @@ def load_of(out: Path, angles: AngleSet) -> Load:
     )
 
 
-def _inertial(link: ElementTree.Element) -> tuple[float, frames.Array, frames.Array]:
+def _inertial(link: ElementTree.Element) -> tuple[float, Vector, Rotation]:
     """Mass [kg], centre [m] and inertia about it [kg m2], in the frame of the link."""
     inertial = link.find("inertial")
     mass_kg = float(inertial.find("mass").get("value"))  # type: ignore[union-attr, arg-type]

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from design.arrays import Floats, Times
 from firmware_io.lidar.scip import protocol
 from firmware_io.lidar.scip.parameters import Parameters, StampAt
-from firmware_io.samples import Floats, Times
 
 Look = Callable[[Times], tuple[Floats, Floats]]
 

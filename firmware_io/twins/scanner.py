@@ -15,8 +15,8 @@ from design.angles import AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import SceneError
-from design.scene.ray_caster import Scene, cast, load_scene, scene_of
-from firmware_io.ports import Ports
+from design.scene.ray_caster import Scene, build_scene, cast, load_scene
+from firmware_io.device_ports import Ports
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.lidar import LidarTwin
 from firmware_io.twins.servo import ServoTwin
@@ -39,7 +39,7 @@ def room(mesh: Path | None, unit_m: float = 1.0, at_m: tuple[float, float, float
         SceneError: the mesh cannot be used.
     """
     if mesh is None:
-        return scene_of(furnished_room() - np.array(at_m))
+        return build_scene(furnished_room() - np.array(at_m))
     return load_scene(mesh, unit_m, frames.rigid(np.eye(3), -np.array(at_m)))
 
 

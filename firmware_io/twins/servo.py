@@ -186,7 +186,7 @@ class ServoTwin:
 
     def _understands(self) -> bool:
         """Whether the client's baud rate is the servo's, within 3 %."""
-        return abs(_baud_of(self._master) / self._servo.baud - 1) < 0.03
+        return abs(_client_baud(self._master) / self._servo.baud - 1) < 0.03
 
     def _serve(self, buffer: bytearray, begin_ns: int) -> None:
         """Answer the requests in the buffer, the first byte of which came at `begin_ns`."""
@@ -211,7 +211,7 @@ class ServoTwin:
         return bytes(byte ^ flip for byte, flip in zip(answer, flips, strict=True))
 
 
-def _baud_of(master: int) -> float:
+def _client_baud(master: int) -> float:
     """Baud rate that the client has set on its end."""
     if sys.platform == "linux":  # TCGETS2: the only way to see rates beyond the standard ones
         return float(struct.unpack("=36x2I", fcntl.ioctl(master, 0x802C542A, bytes(44)))[1])

@@ -10,7 +10,7 @@ import math
 
 from design.errors import DeviceError
 from firmware_io.servo.dynamixel.registers import TABLES, ControlTable
-from firmware_io.twins.dynamics import Axis, Drive, Load, plant_of
+from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
 from firmware_io.twins.servo_memory import ACCESS, ITEMS, RANGE, Memory
 from firmware_io.twins.servo_packets import BROADCAST, Request
 
@@ -35,7 +35,7 @@ class ServoMachine:
     def __init__(self, model: str, protocol: float | None, load: Load, time_ns: int, angle_rad: float) -> None:
         self.table = _table(model, protocol)
         self.memory = Memory({item.address: item for item in ITEMS[self.table.number]}, self.table.ram)
-        self.axis = Axis(plant_of(model), load, time_ns, angle_rad=angle_rad)
+        self.axis = HornMotion(plant_of(model), load, time_ns, angle_rad=angle_rad)
         self._turns = 0  # of the axis, when the servo last began to count
         self._latched = 0
         self._hot_degC = 30
@@ -290,15 +290,15 @@ class ServoMachine:
         """Make the motor do what the control table says."""
         drive = self._wanted()
         now = self.axis.drive_at(now_ns)
-        if drive != Drive(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
+        if drive != Actuation(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
             self.axis.change(
                 now_ns, mode=drive.mode, goal=drive.goal, rate_rad_s=drive.rate_rad_s, torque_limit=drive.torque_limit
             )
 
-    def _wanted(self) -> Drive:
+    def _wanted(self) -> Actuation:
         table, memory = self.table, self.memory
         if not memory[table.torque.address]:
-            return Drive()
+            return Actuation()
         speed, goal = memory[table.wheel_speed.address], memory[table.goal.address]
         goal_rad = (goal - table.centre) * table.goal.unit + 2 * math.pi * self._turns
         if not self._two:
@@ -306,17 +306,17 @@ class ServoMachine:
             if memory[6] == memory[8] == 0:
                 signed = (speed & 1023) * (-1 if speed & 1024 else 1)
                 if not table.speed_loop:
-                    return Drive("share", signed / 1023, torque_limit=limit)
-                return Drive("velocity", signed * table.wheel_speed.unit, torque_limit=limit)
+                    return Actuation("share", signed / 1023, torque_limit=limit)
+                return Actuation("velocity", signed * table.wheel_speed.unit, torque_limit=limit)
             rate = (speed & 1023) * table.joint_speed.unit or math.inf
-            return Drive("position", goal_rad, rate, torque_limit=limit)
+            return Actuation("position", goal_rad, rate, torque_limit=limit)
         limit, mode = memory[36] / 885, memory[11]
         if mode == 1:
-            return Drive("velocity", speed * table.wheel_speed.unit, torque_limit=limit)
+            return Actuation("velocity", speed * table.wheel_speed.unit, torque_limit=limit)
         if mode in (3, 4):
             goal_rad -= memory[20] * table.goal.unit
-            return Drive("position", goal_rad, memory[112] * table.joint_speed.unit or math.inf, torque_limit=limit)
-        return Drive("share", memory[100] / 885, torque_limit=limit) if mode == 16 else Drive()
+            return Actuation("position", goal_rad, memory[112] * table.joint_speed.unit or math.inf, torque_limit=limit)
+        return Actuation("share", memory[100] / 885, torque_limit=limit) if mode == 16 else Actuation()
 
     def _conditions(self) -> int:
         """The fault bits that go with each answer."""

@@ -9,7 +9,7 @@ RANGE, LENGTH, ACCESS = 4, 5, 7
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class TableItem:
     """One entry; a writable one takes counts from `low` to `high`."""
 
     address: int
@@ -20,19 +20,21 @@ class Item:
     writable: bool = False
 
 
-def _rw(address: int, size: int, value: int, high: int | None = None, low: int = 0) -> Item:
-    return Item(address, size, value, low, (1 << 8 * size) - 1 if high is None else high, True)
+def _rw(address: int, size: int, value: int, high: int | None = None, low: int = 0) -> TableItem:
+    return TableItem(address, size, value, low, (1 << 8 * size) - 1 if high is None else high, True)
 
 
-def _ro(address: int, size: int, value: int = 0) -> Item:
-    return Item(address, size, value)
+def _ro(address: int, size: int, value: int = 0) -> TableItem:
+    return TableItem(address, size, value)
 
 
-def _signed(address: int, size: int, bound: int) -> Item:
-    return Item(address, size, 0, -bound, bound, True)
+def _signed(address: int, size: int, bound: int) -> TableItem:
+    return TableItem(address, size, 0, -bound, bound, True)
 
 
-def _protocol_1(number: int, *, baud: int, last: int, hot: int, volts: tuple[int, int], firmware: int) -> list[Item]:
+def _protocol_1(
+    number: int, *, baud: int, last: int, hot: int, volts: tuple[int, int], firmware: int
+) -> list[TableItem]:
     return [
         *(_ro(0, 2, number), _ro(2, 1, firmware), _rw(3, 1, 1, 253), _rw(4, 1, baud, 254), _rw(5, 1, 250, 254)),
         *(_rw(6, 2, 0, last), _rw(8, 2, last, last), _rw(11, 1, hot, 99), _rw(12, 1, volts[0], 250, 50)),
@@ -42,7 +44,7 @@ def _protocol_1(number: int, *, baud: int, last: int, hot: int, volts: tuple[int
     ]
 
 
-def _mx(number: int, firmware: int) -> list[Item]:
+def _mx(number: int, firmware: int) -> list[TableItem]:
     return [
         *_protocol_1(number, baud=34, last=4095, hot=80, volts=(60, 240), firmware=firmware),
         *(_rw(20, 2, 0), _rw(22, 1, 1, 4, 1), _rw(26, 1, 0, 254), _rw(27, 1, 0, 254), _rw(28, 1, 32, 254)),
@@ -50,7 +52,7 @@ def _mx(number: int, firmware: int) -> list[Item]:
     ]
 
 
-def _protocol_2(number: int, *, current: int, speed: int, position_p: int, firmware: int) -> list[Item]:
+def _protocol_2(number: int, *, current: int, speed: int, position_p: int, firmware: int) -> list[TableItem]:
     addresses = [*range(168, 224, 2), *range(578, 634, 2)]
     targets = [*range(224, 252), *range(634, 662)]
     return [
@@ -74,7 +76,7 @@ _AX = [
     *_protocol_1(12, baud=1, last=1023, hot=70, volts=(60, 140), firmware=24),
     *(_rw(26, 1, 1), _rw(27, 1, 1), _rw(28, 1, 32, 254), _rw(29, 1, 32, 254), _rw(48, 2, 32, 1023)),
 ]
-ITEMS: dict[int, list[Item]] = {  # by model number
+ITEMS: dict[int, list[TableItem]] = {  # by model number
     12: _AX,
     29: _mx(29, 36),
     310: [*_mx(310, 36), _rw(68, 2, 2048, 4095), _rw(70, 1, 0, 1), _rw(71, 2, 0, 2047)],
@@ -87,7 +89,7 @@ ITEMS: dict[int, list[Item]] = {  # by model number
 class Memory:
     """The bytes of a control table; `ram` is its first address that a restart resets."""
 
-    items: dict[int, Item]
+    items: dict[int, TableItem]
     ram: int
     data: bytearray = field(init=False)
 

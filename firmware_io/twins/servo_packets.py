@@ -30,7 +30,7 @@ class Request:
     intact: bool
 
 
-def checksum(body: bytes) -> int:
+def packet_checksum(body: bytes) -> int:
     """Protocol 1.0: of everything between header and checksum."""
     return ~sum(body) & 0xFF
 
@@ -55,7 +55,7 @@ def status(protocol: float, servo_id: int, error: int, data: bytes) -> bytes:
     if protocol == 2.0:
         return packet_2(servo_id, 0x55, bytes([error]) + data)
     body = bytes([servo_id, len(data) + 2, error]) + data
-    return b"\xff\xff" + body + bytes([checksum(body)])
+    return b"\xff\xff" + body + bytes([packet_checksum(body)])
 
 
 def packet_2(servo_id: int, instruction: int, parameters: bytes) -> bytes:
@@ -78,7 +78,7 @@ def _take_1(buffer: bytearray) -> Request | None:
             return None
         wire = bytes(buffer[:end])
         del buffer[:end]
-        return Request(wire[2], wire[4], wire[5:-1], wire, wire[-1] == checksum(wire[2:-1]))
+        return Request(wire[2], wire[4], wire[5:-1], wire, wire[-1] == packet_checksum(wire[2:-1]))
     del buffer[: max(0, len(buffer) - 1)]
     return None
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from design.angles import AngleSet
+from design.arrays import Floats
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError
 from design.motion import Motion, Spin, Sweep
 from design.scene.ray_caster import Scene
 from firmware_io.recording.arrays import RecordingArrays
-from firmware_io.samples import Floats, JointLog
-from firmware_io.twins.world import measure, range_model, see
+from firmware_io.samples import JointLog
+from firmware_io.twins.world import measure_ranges, range_model, see
 
 JOINT_HZ = 200.0
 
@@ -45,7 +46,7 @@ def simulated_recording(
     within_s = (bearing_rad - bearing_rad[0]) / (2 * np.pi * lidar.scan_rate_hz)
     time_s = np.arange(scans)[:, None] / lidar.scan_rate_hz + within_s
     joint_rad = _commanded_rad(angles.motion, time_s)
-    rows = [measure(see(scene, angles, bearing_rad, row), model, rng) for row in joint_rad]
+    rows = [measure_ranges(see(scene, angles, bearing_rad, row), model, rng) for row in joint_rad]
     log_s = np.arange(0.0, time_s[-1, -1] + 1 / JOINT_HZ, 1 / JOINT_HZ)
     return RecordingArrays(
         time_ns=np.rint(time_s * 1e9).astype(np.int64),

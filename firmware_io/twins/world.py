@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from jaxtyping import Float64
+from numpy import ndarray
 
 from design.angles import AngleSet
+from design.arrays import Floats, Times
 from design.catalogue.products import Lidar
-from design.frames import Array
 from design.scene.ray_caster import Hits, Scene, cast
-from firmware_io.samples import Floats, Times
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +48,8 @@ class Measured:
         intensity: shape (n,), 0 where there is no range.
     """
 
-    range_m: Floats
-    intensity: Floats
+    range_m: Float64[ndarray, " n"]
+    intensity: Float64[ndarray, " n"]
 
 
 def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
@@ -65,19 +66,21 @@ def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
     )
 
 
-def rays(angles: AngleSet, bearing_rad: Floats, joint_rad: Floats) -> tuple[Array, Array]:
+def rays(
+    angles: AngleSet, bearing_rad: Float64[ndarray, " n"], joint_rad: Float64[ndarray, " n"]
+) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
     """Origins and unit directions in the world of beams, each at its own joint position; all shapes (n, ...)."""
     T_world_laser = angles.T_world_laser(joint_rad)
     in_plane = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
     return T_world_laser[:, :3, 3], np.einsum("nij,nj->ni", T_world_laser[:, :3, :2], in_plane)
 
 
-def see(scene: Scene, angles: AngleSet, bearing_rad: Floats, joint_rad: Floats) -> Hits:
+def see(scene: Scene, angles: AngleSet, bearing_rad: Float64[ndarray, " n"], joint_rad: Float64[ndarray, " n"]) -> Hits:
     """True ranges of beams of one sensor in a scene (world frame), each at its own joint position."""
     return cast(scene, *rays(angles, bearing_rad, joint_rad))
 
 
-def measure(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured:
+def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured:
     """Ranges with noise, in whole quanta, and intensities; draws one number per beam, hit or not.
 
     The intensity falls with the cosine of incidence and with range: plausible, but no model of a certain sensor.
@@ -96,7 +99,7 @@ def measure(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured
 def looking(
     scene: Scene,
     angles: AngleSet,
-    bearing_rad: Floats,
+    bearing_rad: Float64[ndarray, " n"],
     angle_at: Callable[[Times], Floats],
     model: RangeModel,
     seed: int = 0,
@@ -108,13 +111,13 @@ def looking(
     rng = np.random.default_rng(seed)
 
     def look(time_ns: Times) -> tuple[Floats, Floats]:
-        measured = measure(see(scene, angles, bearing_rad, angle_at(time_ns)), model, rng)
+        measured = measure_ranges(see(scene, angles, bearing_rad, angle_at(time_ns)), model, rng)
         return measured.range_m, measured.intensity
 
     return look
 
 
-def furnished_room() -> Array:
+def furnished_room() -> Float64[ndarray, "triangles 3 3"]:
     """Triangles of the room of the tour, 7.2 x 5.6 x 2.8 m, its floor 0.9 m below the world's origin: (t, 3, 3)."""
     room = [[-3.2, -2.4, -0.9], [4.0, 3.2, 1.9]]
     furniture = [

@@ -37,8 +37,8 @@ def emulate(
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
     from design.angles import load_angles
-    from firmware_io.ports import announced
-    from firmware_io.twins.head import load_of
+    from firmware_io.device_ports import announced
+    from firmware_io.twins.head import read_load
     from firmware_io.twins.scanner import emulated_scanner, room
 
     angles = load_angles(out / "angles.json")
@@ -46,7 +46,7 @@ def emulate(
     with (
         suppress(KeyboardInterrupt),
         on_duty(),
-        emulated_scanner(angles, place, load=load_of(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
+        emulated_scanner(angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
         announced(out, twins.ports),
     ):
         print(f"lidar {angles.sensor} at {twins.ports.lidar} and {twins.lidar.address}")

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 import viser
 
-from firmware_io.samples import Float32s
-from firmware_io.scan.live_feed import Growth
+from design.arrays import Float32s
+from firmware_io.scan.live_feed import CloudGrowth
 from scanwright.serving.style import Colours, note_html, ramp
 
 ColourBy = Literal["height", "intensity", "time"]
@@ -49,7 +49,7 @@ class CloudView:
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
 
-    def add(self, growth: Growth) -> None:
+    def add(self, growth: CloudGrowth) -> None:
         """Show what is new, and say what the scan said."""
         if len(growth.points_m):
             values: dict[ColourBy, Float32s] = {

@@ -107,13 +107,13 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from design.evaluation.density_picture import density_picture
-    from design.search.optimum import angle_set, optimum_of
-    from design.search.with_parts import choose
+    from design.search.optimum import angle_set, find_optimum
+    from design.search.with_parts import choose_with_parts
     from scanwright.pipeline import records
 
     with fresh_folder(target) as work, second_process() as begin:
         begin(import_module, "cadquery")  # it loads while the search runs
-        optimum = optimum_of(asked, say)
+        optimum = find_optimum(asked, say)
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from cad.assembly.shadow import PartsWorkshop
@@ -121,7 +121,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         from cad.files.workshop_files import export_scanner
 
         workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-        chosen = choose(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)
+        chosen = choose_with_parts(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)
         best = chosen.family
         angles = angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
         angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(loaded.scanner(angles))})

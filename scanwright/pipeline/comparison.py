@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.evaluation.comparison import Row, compare, notes, table, write_csv
+from design.evaluation.comparison import ComparisonRow, compare, notes, table, write_csv
 from design.evaluation.comparison_picture import compare_picture
-from design.search.optimum import Optimum, optimum_of
+from design.search.optimum import Optimum, find_optimum
 from design.task.task import LoadedTask
 from scanwright.pipeline.folder import report_folder
 
@@ -18,7 +18,7 @@ class Comparison:
     """The rows of a comparison, and the folder that it was written to."""
 
     optimum: Optimum
-    rows: list[Row]
+    rows: list[ComparisonRow]
     folder: Path
 
     def lines(self) -> list[str]:
@@ -34,7 +34,7 @@ def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None
         BuildError: the folder is a build folder, or cannot be written.
     """
     with report_folder(target) as folder:
-        optimum = optimum_of(loaded, say)
+        optimum = find_optimum(loaded, say)
         rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
         write_csv(folder / "compare.csv", rows)
         compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")

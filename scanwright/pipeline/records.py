@@ -12,7 +12,7 @@ import tomli_w
 
 from design.left_out import LeftOut
 from design.search.search import SearchResult
-from design.task.shapes import Map, Mesh
+from design.task.shapes import MapRegion, MeshRegion
 from design.task.task import LoadedTask, Task
 from scanwright.pipeline.manifest import enter, write_json
 
@@ -28,7 +28,7 @@ def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], s
     """Give every file that a task names another name in its table; `name` gets the present one and what the file is."""
     for key in ("weight", "mask"):
         for i, region in enumerate(getattr(task, key)):
-            if isinstance(region, Map | Mesh):
+            if isinstance(region, MapRegion | MeshRegion):
                 table[key][i]["file"] = name(region.file, f"{key}-{i}")
     if task.scene is not None:
         table["scene"]["file"] = name(task.scene.file, "scene")

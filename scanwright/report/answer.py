@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from design.angles import AngleSet, standard_settings
+from design.arrays import Array
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
-from design.frames import Array
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.optimum import rounded_to_error

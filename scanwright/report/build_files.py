@@ -11,8 +11,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from design.arrays import Array
 from design.errors import BuildError
-from design.frames import Array
 from scanwright.report.data_uri import data_uri
 
 T = TypeVar("T")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from design.frames import Array
+from design.arrays import Array
 from design.scene import ray_caster
 from scanwright.report.data_uri import png_uri
 
@@ -94,7 +94,7 @@ class CheckPictures:
         """Distance along each ray to the first of some bodies, inf where there is none, and its brightness 0 to 1."""
         triangles = np.concatenate([self._bodies[name].triangles_m for name in names])
         hits = ray_caster.cast(
-            ray_caster.scene_of(triangles), self._origins, np.broadcast_to(self._direction, self._origins.shape)
+            ray_caster.build_scene(triangles), self._origins, np.broadcast_to(self._direction, self._origins.shape)
         )
         return hits.range_m, 0.35 + 0.65 * np.nan_to_num(np.cos(hits.incidence_rad))
 

@@ -17,8 +17,9 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from design.angles import AngleSet, standard_settings
+from design.arrays import Array
 from design.evaluation.coverage import mean_density_at
-from design.frames import Array, R_world_rot
+from design.frames import R_world_rot
 from design.objective.problem import Problem
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri

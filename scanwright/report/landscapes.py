@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from design.angles import AngleSet, standard_settings
+from design.arrays import Array
 from design.evaluation.landscape_picture import draw_landscape
-from design.frames import Array
 from scanwright.report.data_uri import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")

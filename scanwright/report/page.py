@@ -12,8 +12,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from design.angles import AngleSet, load_angles
+from design.arrays import Array
 from design.errors import BuildError
-from design.frames import Array
 from design.shadow import load_own_body
 from design.task.task import LoadedTask, load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, problem_as_built

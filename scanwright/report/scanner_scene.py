@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from design.angles import AngleSet
-from design.frames import Array, apply
+from design.arrays import Array
+from design.frames import apply
 from design.motion import Sweep
 from design.shadow import AXIS_STEPS, Shadow
 from scanwright.report.check_pictures import PlacedBody

@@ -19,7 +19,7 @@ import viser
 
 from design.angles import STANDARD_DEG, standard_settings
 from design.errors import ScanwrightError, TaskError
-from design.search.optimum import optimum_of
+from design.search.optimum import find_optimum
 from design.task.task import LoadedTask, load_task, shipped_tasks
 from scanwright.serving.style import note_html
 from scanwright.studio.panel import panel_html
@@ -268,7 +268,7 @@ class Studio:
 
         def run() -> None:
             try:
-                optimum = optimum_of(painted(canvas.base, canvas.dabs), told)
+                optimum = find_optimum(painted(canvas.base, canvas.dabs), told)
                 if canvas == self._canvas:
                     self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
                     self.kept.rejudge(self.judge)  # with the period that was found

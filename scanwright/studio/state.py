@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 from pydantic import ValidationError
 
+from design.arrays import Array
 from design.errors import TaskError
-from design.frames import Array
 from design.record import explain
-from design.task.shapes import Cone, MaskRegion, Region
+from design.task.shapes import ConeRegion, MaskRegion, Region
 from design.task.task import LoadedTask
 
 BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
@@ -75,11 +75,11 @@ class Dab:
     brush: Brush
     value: float = 1.0
 
-    def cone(self) -> Cone:
+    def cone(self) -> ConeRegion:
         """The region of a task file that says the same."""
         axis = tuple(round(float(x), DECIMALS) + 0.0 for x in self.direction)
         value = {"matters": self.value, "does not matter": 0.0, "hidden": 1.0}[self.brush]
-        return Cone(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
+        return ConeRegion(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
 
 
 def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
@@ -97,6 +97,6 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         weights: tuple[Region, ...] = tuple(dab.cone() for dab in dabs if dab.brush != "hidden")
         masks: tuple[MaskRegion, ...] = tuple(dab.cone() for dab in dabs if dab.brush == "hidden")
     except ValidationError as error:
-        raise TaskError(explain(error, "paint", Cone)) from error
+        raise TaskError(explain(error, "paint", ConeRegion)) from error
     changed = task.model_copy(update={"weight": (*task.weight, *weights), "mask": (*task.mask, *masks)})
     return replace(loaded, task=changed)

@@ -14,17 +14,17 @@ import numpy as np
 
 from cad.assembly.shadow import PartsWorkshop, at_setting
 from cad.kernel import require_kernel
+from design.arrays import Array
 from design.errors import BuildError, ScanwrightError, TaskError
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
-from design.frames import Array
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
 from design.scanner import Scanner
 from design.search.families import Family
 from design.search.optimum import angle_set
 from design.search.shortest_period import shortest_period_s
-from design.search.with_parts import Refused, choose
+from design.search.with_parts import Refused, choose_with_parts
 from design.shadow import Shadow
 from design.task.task import LoadedTask
 from scanwright.study.candidate import density_gain, price_usd, why, with_motion
@@ -94,7 +94,7 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     try:
         problem = problem_of(loaded)
         bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
-        chosen = choose(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
+        chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
     except ScanwrightError as error:
         return {"status": "refused", "reason": why(error, loaded)}
     setting, score = chosen.family.angles_rad, chosen.family.score

@@ -18,7 +18,7 @@ from design.errors import ScanwrightError, TaskError
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
 from design.objective.problem import Problem
-from design.search.optimum import Optimum, optimum_of
+from design.search.optimum import Optimum, find_optimum
 from design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result, address
@@ -55,7 +55,7 @@ def addresses(loaded: LoadedTask) -> tuple[str, str]:
 def search_candidate(loaded: LoadedTask) -> Result:
     """Families of settings of a search record, its period, and what no setting with parts can be better than."""
     try:
-        optimum = optimum_of(loaded, lambda _: None)
+        optimum = find_optimum(loaded, lambda _: None)
     except TaskError as error:
         return {"status": "refused", "reason": why(error, loaded)}
     standard_J = min(score.J for score in optimum.standard.values())

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from design.accuracy.front import dominators
-from design.frames import Array
+from design.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cad.kernel import require_kernel
-from design.frames import Array
+from design.arrays import Array
 from design.task.task import NAMES, LoadedTask
 from scanwright.pipeline.build import build_task
 from scanwright.study.bench import judge_candidate

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from design.accuracy.trials import Trial
+from design.arrays import Floats
 from firmware_io.assembly.axis_curve import interpolation_orders
-from firmware_io.samples import Floats, JointLog
+from firmware_io.samples import JointLog
 
 SECONDS = 36.0  # two turns at 20 deg/s
 RATE_HZ = 100.0  # of the encoder

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from design.accuracy.trials import best_trials, trials_picture, write_trials
-from design.search.optimum import optimum_of
+from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 from firmware_io.twins.dynamics import plant_of
 from scanwright.trials.axis import axis_trials
@@ -23,7 +23,7 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
     from cad.assembly.make import make_parts
     from cad.geometry.mesh_trials import mesh_trials
 
-    optimum = optimum_of(loaded, say)
+    optimum = find_optimum(loaded, say)
     solids = make_parts(loaded.scanner(optimum.angle_set())).made
     trials = [*mesh_trials(solids, say), *solver_trials(plant_of(loaded.task.servo), say), *axis_trials(say)]
     folder.mkdir(parents=True, exist_ok=True)

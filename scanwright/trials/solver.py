@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from design.accuracy.trials import Trial, timed
-from firmware_io.samples import Floats
-from firmware_io.twins.dynamics import Axis, Drive, Load, Plant, Solver
+from design.arrays import Floats
+from firmware_io.twins.dynamics import Actuation, HornMotion, Load, Plant, Solver
 
 METHODS: tuple[Literal["LSODA", "Radau", "BDF"], ...] = ("LSODA", "Radau", "BDF")
 TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
@@ -26,8 +26,8 @@ def solver_trials(plant: Plant, progress: Callable[[str], None]) -> Iterator[Tri
     asked_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
 
     def run(solver: Solver) -> Floats:
-        axis = Axis(plant, HEAD, 0, solver=solver)
-        axis.drive(0, Drive("velocity", RATE_RAD_S))
+        axis = HornMotion(plant, HEAD, 0, solver=solver)
+        axis.drive(0, Actuation("velocity", RATE_RAD_S))
         return axis.angle_rad(asked_ns)
 
     progress("motion of the servo, reference")

@@ -18,7 +18,7 @@ from design.evaluation.gaps import empty_cap, gaps
 from design.frames import R_world_rot
 from design.motion import StopAndGo, Sweep
 from design.objective.ball_search import ball_score
-from design.objective.problem import lines_of, problem_of
+from design.objective.problem import motion_lines, problem_of
 from design.objective.score import score
 from design.sphere.directions import spiral
 from design.task.task import load_task
@@ -137,11 +137,13 @@ def test_what_a_sweep_leaves_blind(indoor):
 
 
 def test_stop_and_go_measures_each_line_again_and_again():
-    lines = lines_of(StopAndGo(stops=180, dwell_s=0.1), 40.0)
+    lines = motion_lines(StopAndGo(stops=180, dwell_s=0.1), 40.0)
     assert (lines.count, lines.repeats, lines.step_rad) == (180, 4, pytest.approx(np.radians(2)))
     problem = problem_of(load_task(Path("uniform")))
     setting = np.radians([0, 90, 0, -90])  # nothing blind
-    once = score(problem.with_beams(problem.bearings_rad, lines_of(StopAndGo(stops=180, dwell_s=0.025), 40.0)), setting)
+    once = score(
+        problem.with_beams(problem.bearings_rad, motion_lines(StopAndGo(stops=180, dwell_s=0.025), 40.0)), setting
+    )
     again = problem.with_beams(problem.bearings_rad, lines)
     four, ball = score(again, setting), ball_score(again, setting, 2000)
     assert four.least == 4 * once.least

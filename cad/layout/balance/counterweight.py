@@ -26,7 +26,7 @@ from cad.layout.linkage import CLAMP_DRIVER, AlignmentLinkage, Ear, neck_corners
 from cad.layout.loads import STEEL_G_CM3, tilt_sine
 from cad.layout.names import COUNTERWEIGHT
 from cad.screws import SCREWS
-from design.frames import Array
+from design.arrays import Array
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

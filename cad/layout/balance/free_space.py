@@ -8,16 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from cad.layout.envelope import PLATE_THICKNESS, Box
 from cad.layout.linkage import AlignmentLinkage
-from design.frames import Array
+from design.arrays import Array, Mask
 
 FAR_ABOVE = 1e3
-
-Mask = NDArray[np.bool_]
 
 
 def in_box(points: Array, box: Box, gap: float) -> Mask:

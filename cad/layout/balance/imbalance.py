@@ -10,7 +10,7 @@ from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull
 from cad.layout.envelope import PLATE_THICKNESS
 from cad.layout.linkage import AlignmentLinkage, neck_corners
 from cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
-from design.frames import Array
+from design.arrays import Array
 from design.motion import Sweep
 from design.scanner import Scanner
 

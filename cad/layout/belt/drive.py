@@ -8,7 +8,7 @@ from cad.layout import names
 from cad.layout.belt.sizing import belt_stack
 from cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
 from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
-from design.frames import Array
+from design.arrays import Array
 from design.left_out import LeftOut
 from design.scanner import Scanner
 

@@ -28,8 +28,8 @@ import numpy as np
 
 from cad.layout.hub import BEARING_STEP, Hub
 from cad.screws import SCREWS
+from design.arrays import Array
 from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
-from design.frames import Array
 
 GRUB = SCREWS["M3"]  # of pulley and ring on the shaft
 GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat

@@ -24,11 +24,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Int64
+from numpy import ndarray
 
 from design.errors import DeviceError
 from firmware_io.lidar.scip.protocol import STAMP_WRAP_MS
-from firmware_io.lidar.scip.tick_line import Point, StampLine, hull
-from firmware_io.samples import Times
+from firmware_io.lidar.scip.tick_line import Point, StampLine, half_hull
 
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _RATE_USUAL = 5e-5
@@ -39,7 +40,7 @@ _GRAIN_NS = 1e6 / math.sqrt(12)  # standard deviation of a tick, which may stay 
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class ScanMoment:
     """A sensor time on the host's clock.
 
     Attributes:
@@ -161,7 +162,7 @@ class DeviceClock:
         """Keep the results within what a time synchronisation in this life of the sensor's clock allows."""
         self._sync = sync
 
-    def update(self, stamp_ms: int, arrival_ns: int, restarts: int = 0) -> Moment:
+    def update(self, stamp_ms: int, arrival_ns: int, restarts: int = 0) -> ScanMoment:
         """Host time of a scan's first beam.
 
         Args:
@@ -192,7 +193,7 @@ class DeviceClock:
             told_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
             time_ns = min(max(time_ns, told_ns - half_ns), told_ns + half_ns)
             uncertainty_ns = min(uncertainty_ns, half_ns)
-        return Moment(time_ns + self._first_beam_ns, round(uncertainty_ns))
+        return ScanMoment(time_ns + self._first_beam_ns, round(uncertainty_ns))
 
     def _begin_anew(self) -> None:
         self._count = 0
@@ -222,7 +223,7 @@ class DeviceClock:
             self._earliest.append(here)
         elif here.above(self._slope) < self._earliest[-1].above(self._slope):
             self._earliest[-1] = here
-        slope = _middle_slope(hull([(early.turn_ms, early.late_ns) for early in self._earliest], 1))
+        slope = _middle_slope(half_hull([(early.turn_ms, early.late_ns) for early in self._earliest], 1))
         # Few arrivals tell the rate less well than the usual quality of quartzes does. Two of them hold the line, some
         # half of the span apart, each late by the mean over half of all: that is their rate's uncertainty.
         span_ms = max(turn_ms - self._earliest[0].turn_ms, self._period_ms)
@@ -250,7 +251,9 @@ class DeviceClock:
         return sync.host_ns + round(since_ms * 1e6), round(half_ns)
 
 
-def host_times(clock: DeviceClock, stamp_ms: Times, arrival_ns: Times) -> tuple[Times, Times]:
+def host_times(
+    clock: DeviceClock, stamp_ms: Int64[ndarray, " n"], arrival_ns: Int64[ndarray, " n"]
+) -> tuple[Int64[ndarray, " n"], Int64[ndarray, " n"]]:
     """Host times of the first beams [ns] and their uncertainty [ns], as a stream of scans would get them.
 
     Args:

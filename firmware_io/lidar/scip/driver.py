@@ -16,12 +16,12 @@ from dataclasses import replace
 from types import TracebackType
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from firmware_io.device_ports import lidar_ports
+from firmware_io.lidar.byte_stream import FIRST_BAUD, Gone, SerialStream, open_stream
 from firmware_io.lidar.scip import parameters, protocol
 from firmware_io.lidar.scip.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.scip.parameters import StampAt
 from firmware_io.lidar.scip.raw_scan import RawScan
-from firmware_io.lidar.streams import FIRST_BAUD, Gone, SerialStream, open_stream
-from firmware_io.ports import lidar_ports
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
 _TRIES = 3  # a first request may be glued to what a client before us left half said
@@ -29,7 +29,7 @@ _BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p.
 _EXCHANGES = 60
 
 
-class Lidar:
+class ScipLidar:
     """A SCIP lidar, opened, its laser off. `with` leaves it with the laser off and the port closed.
 
     Attributes:
@@ -68,7 +68,7 @@ class Lidar:
             self._stream.close()
             raise
 
-    def __enter__(self) -> Lidar:
+    def __enter__(self) -> ScipLidar:
         return self
 
     def __exit__(
@@ -277,16 +277,16 @@ class Lidar:
         return f"{self.address}: lidar"
 
 
-def open_lidar(address: str) -> Lidar:
+def open_lidar(address: str) -> ScipLidar:
     """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing.
 
     Raises:
         DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
     """
-    return Lidar(address)
+    return ScipLidar(address)
 
 
-def clock_of(lidar: Lidar, stamp_at: StampAt = "step_0", transport_s: float = 0.0) -> DeviceClock:
+def new_clock(lidar: ScipLidar, stamp_at: StampAt = "step_0", transport_s: float = 0.0) -> DeviceClock:
     """A fresh clock for the scans of a lidar, which gives the times of their first beams.
 
     Args:

@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from design.arrays import Float32s
 from design.errors import ProtocolError
 from firmware_io.lidar.scip.protocol import Integers, Window
-from firmware_io.samples import Float32s
 
 StampAt = Literal["step_0", "rear"]
 

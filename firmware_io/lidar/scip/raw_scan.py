@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from jaxtyping import Float32
+from numpy import ndarray
+
 from firmware_io.lidar.scip.parameters import Parameters
-from firmware_io.samples import Float32s, Scan
+from firmware_io.samples import Scan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,12 +32,12 @@ class RawScan:
     arrival_ns: int
     first_step: int
     cluster: int
-    range_m: Float32s
-    intensity: Float32s
+    range_m: Float32[ndarray, " n"]
+    intensity: Float32[ndarray, " m"]
     codes: Mapping[int, int]
 
 
-def scan_of(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
+def to_laser_scan(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
     """The LaserScan of a raw one.
 
     Args:

@@ -89,7 +89,7 @@ class StampLine:
         self._slope_ms, self._start_ms = float(slope_ms), float(low_ms + high_ms) / 2 + 0.5
 
 
-def hull(points: Sequence[Point], side: int) -> list[Point]:
+def half_hull(points: Sequence[Point], side: int) -> list[Point]:
     """Convex hull from below (side 1) or above (-1) of points that are sorted by their first number."""
     found: list[Point] = []
     for x, y in points:
@@ -104,12 +104,12 @@ def hull(points: Sequence[Point], side: int) -> list[Point]:
 
 def _outermost(points: list[Point]) -> list[Point]:
     """Those that bound a line above or below."""
-    return sorted({*hull(points, 1), *hull(points, -1)})
+    return sorted({*half_hull(points, 1), *half_hull(points, -1)})
 
 
 def _narrowest(points: list[Point]) -> tuple[float, float, float]:
     """Slope of the strip of the least height that holds all points, and where its edges pass 0: an edge is a hull's."""
-    below, above = np.array(hull(points, 1)), np.array(hull(points, -1))
+    below, above = np.array(half_hull(points, 1)), np.array(half_hull(points, -1))
     slopes = np.concatenate([np.diff(side[:, 1]) / np.diff(side[:, 0]) for side in (below, above)])
     low = (below[:, 1] - slopes[:, None] * below[:, 0]).min(axis=1)
     high = (above[:, 1] - slopes[:, None] * above[:, 0]).max(axis=1)

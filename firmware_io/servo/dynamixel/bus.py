@@ -3,7 +3,7 @@
 The SDK packs requests and unpacks answers, and nothing else, because of its faults (measured with version 4.1.0):
 
 - its readers index past the end of a short status, and give 0 for no data: here the length must be the one asked for;
-- it waits by the wall clock, at full load, and for ever while garbage flows: `Line` waits on the monotonic clock,
+- it waits by the wall clock, at full load, and for ever while garbage flows: `SerialLine` waits on the monotonic clock,
   asleep, and past the deadline gives nothing more;
 - it leaves the port "in use" after an exception: it never sends;
 - it takes the echo of a protocol 1.0 request for the answer: an adapter that echoes is found on opening, and exactly
@@ -26,8 +26,8 @@ from pathlib import Path
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.dynamixel.port import Line, Tape
 from firmware_io.servo.dynamixel.registers import Register
+from firmware_io.servo.dynamixel.serial_line import SerialLine, Tape
 
 PING, READ, WRITE, REBOOT = 1, 2, 3, 8
 BROADCAST = 254
@@ -53,7 +53,7 @@ _REFUSALS_2 = {
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ServoAnswer:
     """One status packet.
 
     Attributes:
@@ -83,7 +83,7 @@ class ServoBus:
         self.port = port
         self.protocol = protocol
         self.return_delay_ns = 0.0
-        self._line = Line(port, baud)
+        self._line = SerialLine(port, baud)
         try:
             with self._port_errors():
                 self._line.find_echo()
@@ -127,7 +127,7 @@ class ServoBus:
         except (OSError, ValueError):
             return None
 
-    def read(self, servo_id: int, register: Register) -> Answer:
+    def read(self, servo_id: int, register: Register) -> ServoAnswer:
         """The bytes of a register or a block.
 
         Raises:
@@ -137,7 +137,7 @@ class ServoBus:
         """
         return self._ask(servo_id, READ, self._number(register.address) + self._number(register.size), register.size)
 
-    def write(self, servo_id: int, register: Register, data: bytes) -> Answer:
+    def write(self, servo_id: int, register: Register, data: bytes) -> ServoAnswer:
         """Write the bytes of a register; raises as `read` does."""
         return self._ask(servo_id, WRITE, self._number(register.address) + data, 0)
 
@@ -179,7 +179,7 @@ class ServoBus:
             Protocol1PacketHandler().txPacket(tape, [0, 0, servo_id, *length, instruction, *parameters, 0])
         return tape.packet
 
-    def _ask(self, servo_id: int, instruction: int, parameters: bytes, expected: int) -> Answer:
+    def _ask(self, servo_id: int, instruction: int, parameters: bytes, expected: int) -> ServoAnswer:
         request = self._packet(servo_id, instruction, parameters)
         with self._port_errors():
             for again in range(_TRIES - 1, -1, -1):
@@ -226,7 +226,7 @@ class ServoBus:
             if servo_id in (None, status.id):
                 return status
 
-    def _checked(self, status: _Status, instruction: int, expected: int) -> Answer:
+    def _checked(self, status: _Status, instruction: int, expected: int) -> ServoAnswer:
         error, complete = status.error, len(status.data) == expected
         if self.protocol == 2.0:
             conditions, number = error & _ALERT_2, error & ~_ALERT_2
@@ -243,7 +243,7 @@ class ServoBus:
         wire_ns = (len(self._line.sent) - status.length) * self._line.byte_s * 1e9
         total_ns = self._line.ended_ns - self._line.began_ns
         known_ns = (len(self._line.sent) + status.length) * self._line.byte_s * 1e9 + self.return_delay_ns
-        return Answer(
+        return ServoAnswer(
             data=status.data,
             conditions=conditions,
             sampled_ns=self._line.began_ns + round((total_ns + wire_ns - self.return_delay_ns) / 2),

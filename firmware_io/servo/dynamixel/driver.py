@@ -15,9 +15,9 @@ from types import TracebackType
 from typing import NoReturn, Self
 
 from design.errors import DeviceError, DeviceFaultError
-from firmware_io.servo.dynamixel.bus import Answer, ServoBus
+from firmware_io.servo.dynamixel.bus import ServoAnswer, ServoBus
 from firmware_io.servo.dynamixel.registers import ControlTable, Register, Setting, motor_of
-from firmware_io.servo.dynamixel.setup import find, prepare, set_kept
+from firmware_io.servo.dynamixel.setup import find_servo, prepare, set_kept
 from firmware_io.servo.guard import SILENCE_S, Guard
 
 _STALL_S = 0.5
@@ -72,7 +72,7 @@ class _Order:
     from_rad: float = math.nan
 
 
-class Servo:
+class DynamixelServo:
     """One servo on its port; made by `open_servo`, used as a context manager.
 
     Attributes:
@@ -206,7 +206,7 @@ class Servo:
             self._known = state
         return state
 
-    def _state(self, answer: Answer) -> ServoState:
+    def _state(self, answer: ServoAnswer) -> ServoState:
         table, data = self._table, answer.data
         count = round(table.pick(table.position, data) / table.position.unit)
         angle_rad = (count - table.centre) * table.position.unit
@@ -229,7 +229,7 @@ class Servo:
             temperature_degC=table.pick(table.temperature, data),
         )
 
-    def _due_rad(self, known: ServoState, velocity_rad_s: float, answer: Answer) -> float:
+    def _due_rad(self, known: ServoState, velocity_rad_s: float, answer: ServoAnswer) -> float:
         """How far it will have turned since it was known where it is; next to nothing without an order to turn."""
         if not self._order:
             return 0.0
@@ -258,7 +258,7 @@ class Servo:
             self._fault(f"stall: {moved} {due}: {_ADVICE['overload']}")
         return replace(order, since_ns=state.time_ns, from_rad=here_rad)
 
-    def _conditions(self, answer: Answer) -> str:
+    def _conditions(self, answer: ServoAnswer) -> str:
         table = self._table
         code = answer.conditions if table.hardware_error is None else round(self._value(table.hardware_error))
         names, volts = table.names(code), table.pick(table.voltage, answer.data)
@@ -336,7 +336,7 @@ def nearest_turn(angle_rad: float, expected_rad: float) -> float:
     return angle_rad + 2 * math.pi * round((expected_rad - angle_rad) / (2 * math.pi))
 
 
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> Servo:
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> DynamixelServo:
     """Find the servo on a port, whatever its speed and protocol, and make it ready; it stands, without torque.
 
     Args:
@@ -349,8 +349,8 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     """
     bus = ServoBus(port)
     try:
-        table, found_id = find(bus, model, servo_id)
-        return Servo(bus, table, found_id, prepare(bus, table, found_id))
+        table, found_id = find_servo(bus, model, servo_id)
+        return DynamixelServo(bus, table, found_id, prepare(bus, table, found_id))
     except BaseException:
         bus.close()
         raise

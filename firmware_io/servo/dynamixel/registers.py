@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo as CatalogueServo
+from design.catalogue.products import Servo as Servo
 from design.errors import DeviceError
 
 RPM = 2 * math.pi / 60
@@ -155,7 +155,7 @@ class Motor:
 
 def motor_of(model: str) -> Motor:
     """The motor of a model of the catalogue."""
-    servo = load_catalogue().get(model, CatalogueServo)
+    servo = load_catalogue().get(model, Servo)
     backlash_rad = None if servo.backlash_deg is None else math.radians(servo.backlash_deg)
     return Motor(servo.stall_torque_nm, servo.no_load_rpm * RPM, backlash_rad)
 

@@ -18,7 +18,7 @@ _REBOOT_S = 3.0
 _READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
 
 
-def find(bus: ServoBus, model: str | None, servo_id: int | None) -> tuple[ControlTable, int]:
+def find_servo(bus: ServoBus, model: str | None, servo_id: int | None) -> tuple[ControlTable, int]:
     """Set the bus to the speed and protocol that a servo answers to; its table and id.
 
     Raises:

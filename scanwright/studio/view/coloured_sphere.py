@@ -8,8 +8,8 @@ import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
+from design.arrays import Array
 from design.evaluation.coverage import mean_density_at
-from design.frames import Array
 from design.objective.problem import Problem
 from design.sphere.directions import spiral
 from design.sphere.regions import Field

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design import frames
-from design.frames import Array, Rx, Ry, Rz
+from design.arrays import Array
+from design.frames import Rx, Ry, Rz
 from design.scanner import Scanner
-from design.scene.ray_caster import Scene, load_scene, scene_of
+from design.scene.ray_caster import Scene, build_scene, load_scene
 from design.task.shapes import Placed
-from firmware_io.twins.world import furnished_room, measure, range_model, see
+from firmware_io.twins.world import furnished_room, measure_ranges, range_model, see
 
 MOST_RAYS = 150_000  # what a page draws at once
 SEED = 0
@@ -40,7 +41,7 @@ def preview_scan(scanner: Scanner, joint_rad: Array, placed: Placed | None, fold
     beams = np.tile(bearing_rad, len(joint_rad))
     joint_rad = np.repeat(joint_rad, len(bearing_rad))
     hits = see(_scene(placed, folder), angles, beams, joint_rad)
-    range_m = measure(hits, range_model(lidar), np.random.default_rng(SEED)).range_m
+    range_m = measure_ranges(hits, range_model(lidar), np.random.default_rng(SEED)).range_m
     back = np.isfinite(range_m)
     in_plane = np.stack([np.cos(beams), np.sin(beams)], axis=-1)[back]
     T = angles.T_world_laser(joint_rad[back])
@@ -50,7 +51,7 @@ def preview_scan(scanner: Scanner, joint_rad: Array, placed: Placed | None, fold
 @lru_cache(maxsize=4)
 def _scene(placed: Placed | None, folder: Path) -> Scene:
     if placed is None:
-        return scene_of(furnished_room())
+        return build_scene(furnished_room())
     roll, pitch, yaw = np.radians(placed.rpy_deg)
     R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
     T_world_mesh = frames.rigid(R_mesh_world.T, -R_mesh_world.T @ np.array(placed.sensor_m))

@@ -8,7 +8,8 @@ import numpy as np
 import viser
 import viser.transforms
 
-from design.frames import Array, R_world_rot
+from design.arrays import Array
+from design.frames import R_world_rot
 from design.objective.problem import Problem
 from scanwright.serving.style import Colours, ramp
 from scanwright.studio.state import Setting

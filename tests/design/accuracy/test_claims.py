@@ -17,7 +17,7 @@ from design.objective.problem import problem_of
 from design.objective.quadrature import breaks_of
 from design.objective.score import score
 from design.search import coarse, coarse_sweep, families
-from design.search.coarse import landscape_of
+from design.search.coarse import coarse_landscape
 from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.optimum import directions_left_out
 from design.search.search import search
@@ -83,7 +83,7 @@ def test_equivalent_settings_folded_and_not(sensor, monkeypatch):
     assert len(folded[0].first) * len(folded[1].first) < 0.3 * len(whole[0].first) * len(whole[1].first)
     lowest = []
     for axes, planes in (folded, whole):
-        land, _ = landscape_of(problem, planes, axes, lambda _: None)
+        land, _ = coarse_landscape(problem, planes, axes, lambda _: None)
         by_plane = land.by_plane[planes.flip.astype(int), planes.classes]
         lowest.append((by_plane, land.by_axis[axes.flip.astype(int), axes.classes]))
     for of_folded, of_whole in zip(*lowest, strict=True):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.density.beams import Lines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
+from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_the_paper_s_scan_has_777600_and_720_beams():
 
 def test_a_rolling_scanner_sees_all_with_half_a_turn_and_its_focus_points_lie_ahead_and_behind():
     bearings = np.radians(np.arange(-180, 180, 90.0))
-    lines = Lines(count=2, step_rad=pi / 2)
+    lines = ScanLines(count=2, step_rad=pi / 2)
     scan = simulated_scan(bearings, lines, np.radians([0, 90, 0, -90])).reshape(2, 4, 3)
     np.testing.assert_allclose(scan[0], [[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0]], atol=1e-12)
     np.testing.assert_allclose(scan[1], [[-1, 0, 0], [0, 0, -1], [1, 0, 0], [0, 0, 1]], atol=1e-12)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.density.beams import Lines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
+from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
 from design.density.spin import ball_search, count_at, mean_count, zones
 from design.frames import R_world_rot
 from design.objective import ball_search as oracle
@@ -180,7 +180,7 @@ def test_the_scan_plane_across_the_axis_has_its_mean_count_in_closed_form(utm):
 
 @pytest.mark.parametrize("ball_deg", [0.5, 2.0, 30.0, 90.0])
 def test_a_beam_on_the_axis_counts_with_every_line_near_it_and_with_none_elsewhere(ball_deg):
-    lines, ball = Lines(count=7, step_rad=2 * pi / 7), radians(ball_deg)
+    lines, ball = ScanLines(count=7, step_rad=2 * pi / 7), radians(ball_deg)
     g = -np.log1p(np.arange(8.0))
     t = np.array([0.0, 0.999 * ball, min(1.001 * ball, pi), pi])
     z = zones(t, np.zeros(1), np.zeros(1), lines, ball, g)
@@ -341,7 +341,7 @@ def test_the_oracle_sees_a_density_that_is_a_tenth_off(problems):
     """The test above must be able to fail: J of 10 % more lines is further away than the stated errors."""
     problem = problems["uniform", 2.0, 2.0]
     setting = np.radians(SETTINGS[100])
-    lines = Lines(problem.lines.count + 8, problem.lines.step_rad * 80 / 88)
+    lines = ScanLines(problem.lines.count + 8, problem.lines.step_rad * 80 / 88)
     wrong = problem.with_beams(problem.bearings_rad, lines)
     ball = oracle.ball_score(problem, setting, directions=400)
     assert abs(score(problem, setting).J - ball.J) < 0.5 * abs(score(wrong, setting).J - ball.J)

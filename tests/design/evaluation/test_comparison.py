@@ -14,11 +14,20 @@ from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import ball_search, count_at
 from design.errors import BuildError
 from design.evaluation import comparison as comparison
-from design.evaluation.comparison import Row, compare, lines_of, multibeam_scan, ready_made, sampled, table, write_csv
+from design.evaluation.comparison import (
+    ComparisonRow,
+    compare,
+    layer_lines,
+    multibeam_scan,
+    ready_made,
+    sampled,
+    table,
+    write_csv,
+)
 from design.evaluation.comparison_picture import compare_picture
 from design.frames import R_rot_laser, R_world_rot
 from design.objective.ball_search import SETS
-from design.objective.objectives import log_density
+from design.objective.named_objectives import log_density
 from design.objective.problem import problem_of
 from design.objective.score import score
 from design.search.search import search
@@ -27,7 +36,7 @@ from design.task.task import load_task
 from scanwright.pipeline.folder import report_folder
 
 FULL = ("VLP-16", "HDL-32E", "HDL-64E")
-FIELDS = dict(Row.__annotations__)
+FIELDS = dict(ComparisonRow.__annotations__)
 
 
 def multibeam(name):
@@ -65,7 +74,7 @@ def test_the_tables_of_the_ready_made_scanners(name, elevations_deg, azimuth_deg
     assert product.turn_rate_hz == rate_hz
     assert product.points_per_second == per_second
     assert product.price_usd == price_usd
-    made = lines_of(product).count * len(product.elevations_deg) * rate_hz
+    made = layer_lines(product).count * len(product.elevations_deg) * rate_hz
     assert made == pytest.approx(per_second, rel=0.04), "layers, step and rate make the points that the maker states"
 
 
@@ -73,7 +82,7 @@ def test_the_tables_of_the_ready_made_scanners(name, elevations_deg, azimuth_deg
 def test_a_multibeam_is_a_fan_that_holds_the_axis(name):
     """The closed form at single directions, and the explicit scan: exactly the same counts."""
     product = multibeam(name)
-    lines, ball = lines_of(product), np.radians(2)
+    lines, ball = layer_lines(product), np.radians(2)
     polar, azimuth = polar_and_azimuth(
         beam_directions_rot(np.radians(product.elevations_deg), *comparison.UPRIGHT_RAD[2:])
     )
@@ -167,7 +176,7 @@ def test_the_csv_holds_the_rows(rows, tmp_path):
     with (tmp_path / "c.csv").open(encoding="utf-8", newline="") as file:
         read = list(csv.DictReader(file))
     kinds = {"str": str, "int": int, "float": float, "float | None": lambda text: float(text) if text else None}
-    assert [Row(**{key: kinds[FIELDS[key]](text) for key, text in line.items()}) for line in read] == rows
+    assert [ComparisonRow(**{key: kinds[FIELDS[key]](text) for key, text in line.items()}) for line in read] == rows
 
 
 def test_a_price_that_nobody_knows_is_a_question_mark(rows):

@@ -11,7 +11,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.evaluation.coverage import blind_zones, coverage
 from design.frames import R_world_rot
 from design.objective.ball_search import scan_tree
-from design.objective.objectives import log
+from design.objective.named_objectives import log
 from design.objective.problem import problem_of
 from design.task.task import LoadedTask, Task
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from design.density.ball_count import ball_count
-from design.density.beams import Lines, beam_directions_rot, scan_lines, simulated_scan
+from design.density.beams import ScanLines, beam_directions_rot, scan_lines, simulated_scan
 from design.errors import TaskError
 from design.evaluation.gaps import gaps, interlaced_period_s
 from design.frames import R_world_rot
@@ -38,8 +38,8 @@ def seen(bearings, lines, angles, directions, radius):
 def test_half_a_turn_against_a_simulated_one(uniform, angles_deg):
     angles = np.radians(angles_deg)
     directions = spiral(6000)
-    lines = Lines(1440, 2 * np.pi / 1440)
-    half = Lines(720, lines.step_rad)
+    lines = ScanLines(1440, 2 * np.pi / 1440)
+    half = ScanLines(720, lines.step_rad)
     radius = np.radians(0.3)  # a few beams: blurs every edge by 0.3 deg
     full = seen(uniform.bearings_rad, lines, angles, directions, radius)
     missed = full & ~seen(uniform.bearings_rad, half, angles, directions, radius)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.density.beams import Lines, scan_lines
+from design.density.beams import ScanLines, scan_lines
 from design.errors import TaskError
-from design.evaluation.poles import Pole, pole_chances, pole_of
+from design.evaluation.poles import Pole, parse_pole, pole_chances
 from design.frames import R_rot_laser, R_world_rot, Rz
 from design.objective.problem import problem_of
 from design.task.task import Task, load_task
@@ -62,7 +62,7 @@ CASES = {
     "lines across, the turn not of whole lines": (turning("uniform", 1.03), CROSSING, Pole(0.03, 1.0, 5.0)),
     "a region and a mask": (turning("ground_ahead"), TILTED, Pole(0.1, 2.0, 3.0)),
     "lower halves hidden": (hidden, TILTED, Pole(0.1, 2.0, 5.0)),
-    "stop and go": (turning("uniform", lines=Lines(40, np.pi / 20, 2)), TILTED, Pole(0.05, 1.0, 3.0)),
+    "stop and go": (turning("uniform", lines=ScanLines(40, np.pi / 20, 2)), TILTED, Pole(0.05, 1.0, 3.0)),
     "a sweep": (swept, TILTED, Pole(0.01, 0.2, 3.0)),
 }
 
@@ -132,10 +132,10 @@ def test_a_pole_outside_the_region_stands_anywhere_that_is_not_hidden():
 def test_the_words_of_a_pole(text, complaint):
     lidar = load_task(Path("uniform")).lidar
     if complaint is None:
-        assert pole_of(text, lidar) == Pole(9.0, 1.0, 5.0)
+        assert parse_pole(text, lidar) == Pole(9.0, 1.0, 5.0)
         return
     with pytest.raises(TaskError, match=complaint):
-        pole_of(text, lidar)
+        parse_pole(text, lidar)
 
 
 def test_evaluate_tells_of_a_pole(command):

@@ -9,7 +9,7 @@ import pytest
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.objective.ball_search import ball_score
-from design.objective.objectives import homogeneity, kl, worst
+from design.objective.named_objectives import homogeneity, kl, worst
 from design.objective.problem import problem_of
 from design.objective.score import quick_J, score
 from design.search.search import search

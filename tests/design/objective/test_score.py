@@ -15,7 +15,7 @@ from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_li
 from design.density.spin import zones
 from design.errors import TaskError
 from design.frames import R_world_rot
-from design.objective import objectives
+from design.objective import named_objectives
 from design.objective.ball_search import ball_score
 from design.objective.problem import NODES, problem_of
 from design.objective.score import quick_J, score, score_on
@@ -190,7 +190,7 @@ def test_the_scale_of_the_weights_does_not_matter(seed):
     rows = p.field.weight.rows.copy()
     rows[:, 7] *= 7.5
     field = replace(p.field, weight=replace(p.field.weight, rows=rows), background=7.5 * p.field.background)
-    one, other = score(p, setting), score(p.with_objective(objectives.log(field)), setting)
+    one, other = score(p, setting), score(p.with_objective(named_objectives.log(field)), setting)
     assert pytest.approx(one.J, abs=1e-12) == other.J
     assert other.J_error == pytest.approx(one.J_error, rel=1e-6)
 

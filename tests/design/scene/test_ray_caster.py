@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from design import frames
 from design.errors import SceneError
 from design.scene.nearest import by_boxes, by_embree
-from design.scene.ray_caster import Scene, cast, load_scene, load_triangles, scene_of
+from design.scene.ray_caster import Scene, build_scene, cast, load_scene, load_triangles
 
 seeds = st.integers(0, 2**32 - 1)
 each_search = pytest.mark.parametrize("search", [by_embree, by_boxes])
@@ -57,7 +57,7 @@ def test_in_a_room_every_beam_has_the_analytic_range(search, half, centre, scale
     half, centre = np.array(half) * scale, np.array(centre) * scale
     rng = np.random.default_rng(seed)
     directions, origins = unit_vectors(rng, 500), rng.uniform(-0.99, 0.99, (500, 3)) * half
-    found = cast(searched(search, scene_of(box_triangles(half, centre))), origins + centre, directions)
+    found = cast(searched(search, build_scene(box_triangles(half, centre))), origins + centre, directions)
     range_m, incidence_rad, to_edge = walls_of_a_room(half, origins, directions)
     clear = to_edge > 1e-6 * half.max()
     # double precision of coordinates as large as the centre
@@ -87,7 +87,7 @@ def test_in_triangle_soup_it_finds_what_an_obvious_search_finds(search, seed):
     rng = np.random.default_rng(seed)
     triangles = rng.uniform(-1, 1, (40, 1, 3)) * 5 + rng.normal(size=(40, 3, 3))
     origins, directions = rng.uniform(-5, 5, (100, 3)), unit_vectors(rng, 100)
-    found = cast(searched(search, scene_of(triangles)), origins, directions)
+    found = cast(searched(search, build_scene(triangles)), origins, directions)
     for ray, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
         range_m, triangle, margin = nearest_triangle(triangles, origin, direction)
         if margin > 1e-4:  # away from every edge
@@ -97,7 +97,7 @@ def test_in_triangle_soup_it_finds_what_an_obvious_search_finds(search, seed):
 
 @each_search
 def test_what_hits_nothing_says_so(search):
-    found = cast(searched(search, scene_of(box_triangles((1, 1, 1)))), (5, 0, 0), [[1.0, 0, 0], [-1, 0, 0]])
+    found = cast(searched(search, build_scene(box_triangles((1, 1, 1)))), (5, 0, 0), [[1.0, 0, 0], [-1, 0, 0]])
     assert found.range_m.tolist() == [np.inf, 4.0]
     assert found.triangle[0] == -1
     assert np.isnan(found.incidence_rad[0])
@@ -105,7 +105,7 @@ def test_what_hits_nothing_says_so(search):
 
 
 def test_more_rays_than_a_batch_are_the_same_rays():
-    scene = scene_of(box_triangles((5, 4, 1.5)))
+    scene = build_scene(box_triangles((5, 4, 1.5)))
     directions = unit_vectors(np.random.default_rng(0), 300_000)
     whole = cast(scene, np.zeros(3), directions)
     part = cast(scene, np.zeros(3), directions[131_000:131_200])
@@ -151,7 +151,7 @@ def test_no_beam_slips_through_an_edge_or_a_corner(search):
     ball = trimesh.creation.icosphere(subdivisions=3)
     aims = np.concatenate([ball.vertices, ball.vertices[ball.edges_unique].mean(axis=1)])
     directions = aims / np.linalg.norm(aims, axis=1)[:, None]
-    found = cast(searched(search, scene_of(np.array(ball.triangles) + 100)), (100.0, 100.0, 100.0), directions)
+    found = cast(searched(search, build_scene(np.array(ball.triangles) + 100)), (100.0, 100.0, 100.0), directions)
     np.testing.assert_allclose(found.range_m, np.linalg.norm(aims, axis=1), atol=1e-6)
 
 
@@ -178,15 +178,15 @@ def test_embree_and_boxes_see_the_same_among_many_triangles():
     rng = np.random.default_rng(3)
     directions = unit_vectors(rng, 6_000)
     directions[:600] = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 100, axis=0)
-    scene = scene_of(np.concatenate([ball, ball * 0.3 + (0.4, 0, 0)]))
+    scene = build_scene(np.concatenate([ball, ball * 0.3 + (0.4, 0, 0)]))
     assert_the_searches_agree(scene, rng.uniform(-1.5, 1.5, (6_000, 3)), directions)
 
 
 def test_without_embree_the_boxes_are_searched(monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
-    found = cast(scene_of(box_triangles((5, 4, 1.5))), np.zeros(3), np.eye(3))
+    found = cast(build_scene(box_triangles((5, 4, 1.5))), np.zeros(3), np.eye(3))
     assert found.range_m.tolist() == [5, 4, 1.5]
-    assert "by_boxes" in scene_of(box_triangles((1, 1, 1))).nearest.__qualname__
+    assert "by_boxes" in build_scene(box_triangles((1, 1, 1))).nearest.__qualname__
 
 
 BROKEN = {

@@ -14,7 +14,7 @@ from design.objective.ball_search import start_phases
 from design.objective.problem import problem_of
 from design.objective.score import score
 from design.search.families import Family
-from design.search.with_parts import Refused, choose, equivalents, score_with
+from design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
 from design.shadow import AXIS_STEPS, Shadow
 from design.sphere.directions import weighted_samples
 from design.task.task import AngleRanges, Limits, LoadedTask, Task
@@ -39,7 +39,7 @@ def family(p, *angles_deg):
 
 
 @dataclass(frozen=True)
-class Cone:
+class ConeRegion:
     """A workshop whose parts fill the cone about -z of the rotation frame, and which refuses some settings."""
 
     p: object
@@ -95,12 +95,12 @@ def test_the_equivalent_that_hides_least_is_built():
     """A fan that dips towards the servo loses beams; its mirror image looks the other way and loses none."""
     p = problem(region={"shape": "all"})
     towards, away = (0.0, 40.0, 0.0, 45.0), None
-    workshop = Cone(p, np.radians(60))
+    workshop = ConeRegion(p, np.radians(60))
     for setting in equivalents(p, towards, AngleRanges()):
         if not workshop.bound(np.radians(setting)).beams.any():
             away = setting
     assert away is not None and workshop.bound(np.radians(towards)).beams.any()
-    chosen = choose(p, (family(p, *towards),), AngleRanges(), Limits(), workshop, lambda _: None)
+    chosen = choose_with_parts(p, (family(p, *towards),), AngleRanges(), Limits(), workshop, lambda _: None)
     assert chosen.family.angles_deg == away
     assert chosen.hidden == 0 and chosen.family.score.J == pytest.approx(chosen.bare.J, abs=1e-9)
     assert chosen.bounded == 2 and chosen.built == 1
@@ -110,8 +110,8 @@ def test_a_family_that_hides_less_wins_and_the_rest_is_not_made():
     p = problem()
     fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0), family(p, 0.0, 85.0, 0.0, 3.0))
-    workshop = Cone(p, np.radians(60))
-    chosen = choose(p, families, fixed, Limits(), workshop, lambda _: None)
+    workshop = ConeRegion(p, np.radians(60))
+    chosen = choose_with_parts(p, families, fixed, Limits(), workshop, lambda _: None)
     best = min(families, key=lambda f: score_with(p, f.angles_rad, workshop.bound(f.angles_rad)).J)
     assert chosen.family.angles_deg == best.angles_deg
     assert chosen.built <= len(families) and chosen.open == 0
@@ -122,13 +122,15 @@ def test_what_cannot_be_built_is_refused_with_its_reason():
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))
     fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
     first, second = sorted(families, key=lambda f: f.score.J)
-    chosen = choose(p, families, fixed, Limits(), Cone(p, 0.1, (first.angles_deg,)), lambda _: None)
+    chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg,)), lambda _: None)
     assert chosen.family.angles_deg == second.angles_deg
     assert [reason.split(": ")[1] for reason in chosen.refused] == ["tilted too far"]
     with pytest.raises(BuildError, match="tilted too far"):
-        choose(p, families, fixed, Limits(), Cone(p, 0.1, (first.angles_deg, second.angles_deg)), lambda _: None)
+        choose_with_parts(
+            p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg, second.angles_deg)), lambda _: None
+        )
     with pytest.raises(BuildError, match=r"limits\.max_blocked"):
-        choose(p, families[:1], fixed, Limits(max_blocked=0.01), Cone(p, 1.2), lambda _: None)
+        choose_with_parts(p, families[:1], fixed, Limits(max_blocked=0.01), ConeRegion(p, 1.2), lambda _: None)
 
 
 def test_a_sweep_keeps_its_setting():

@@ -11,7 +11,17 @@ from design.angles import Angles, AngleSet
 from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.deskew import deskew, place
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.calibration.model import BACKLASH, COUNT, LAG, PARAMETERS, Beams, Mount, gather, rays, start_vector
+from firmware_io.calibration.model import (
+    BACKLASH,
+    COUNT,
+    LAG,
+    PARAMETERS,
+    Mount,
+    ReturnedBeams,
+    beam_rays,
+    gather,
+    start_vector,
+)
 from firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
 from firmware_io.calibration.tiles import flat_tiles
 from firmware_io.samples import JointLog, Scan, straight
@@ -36,7 +46,7 @@ def some_beams(rng, count=40):
     time_ns = START + np.sort(rng.integers(300_000_000, 1_700_000_000, count))
     none = np.zeros(count, np.int64)
     columns = (rng.uniform(1, 9, count), rng.uniform(-2, 2, count), np.zeros(count), np.zeros(count))
-    return Beams(*columns, none, none, time_ns, (straight(log),)).late_by(0.0)
+    return ReturnedBeams(*columns, none, none, time_ns, (straight(log),)).late_by(0.0)
 
 
 class Recorded:
@@ -72,7 +82,7 @@ def test_it_places_points_where_the_assembler_does(seed):
     log = JointLog(START + np.array([0, 2 * 10**9]), np.array([0.0, 5.0]))
     beams, left_out = gather([Recorded([scan], log)], one_place=True)
     assert left_out == {}
-    origin, direction = rays(Mount.of(angles), start_vector(angles), beams)
+    origin, direction = beam_rays(Mount.of(angles), start_vector(angles), beams)
     T_world_rot = angles.T_world_rot(0.0)
     points = (origin + beams.range_m[:, None] * direction) @ T_world_rot[:3, :3].T + T_world_rot[:3, 3]
     np.testing.assert_allclose(points, deskew(scan, log, angles), atol=1e-7)
@@ -110,7 +120,7 @@ def test_it_leaves_out_the_beams_that_the_assembler_does(seed):
 
 def residuals(mount, x, beams, q):
     late = beams.late_by(x[LAG[0]])
-    origin, direction = rays(mount, x, late)
+    origin, direction = beam_rays(mount, x, late)
     return late.range_m + x[4] - (1 - origin @ q) / (direction @ q)
 
 
@@ -119,7 +129,7 @@ def residuals(mount, x, beams, q):
 def test_its_derivatives_are_those_of_finite_differences(seed):
     rng = np.random.default_rng(seed)
     mount, x, beams = Mount.of(an_angle_set(rng)), rng.uniform(-1, 1, COUNT) * SIZES, some_beams(rng, 1)
-    q = rays(mount, x, beams)[1][0] + rng.uniform(-0.5, 0.5, 3)  # a plane that the beam meets at no grazing angle
+    q = beam_rays(mount, x, beams)[1][0] + rng.uniform(-0.5, 0.5, 3)  # a plane that the beam meets at no grazing angle
     q /= 5
     rows = sums(mount, x, beams.late_by(x[LAG[0]]), np.zeros(1, np.int64), np.ones(1), q[None], np.inf)[0]
     e = residuals(mount, x, beams, q)[0]
@@ -192,8 +202,10 @@ def test_tiles_hold_flat_looks_of_one_pass():
     bearing = np.tile(np.linspace(0.2, 1.2, 200), 200)
     log = JointLog(START + np.rint(time_s * 1e9).astype(np.int64), joint)
     none = np.zeros(time_s.size, np.int64)
-    beams = Beams(np.ones(time_s.size), bearing, joint, joint, none, none, log.time_ns, (straight(log),)).late_by(0.0)
-    _, direction = rays(mount, x, beams)
+    beams = ReturnedBeams(
+        np.ones(time_s.size), bearing, joint, joint, none, none, log.time_ns, (straight(log),)
+    ).late_by(0.0)
+    _, direction = beam_rays(mount, x, beams)
     range_m = np.where(joint < 0.6, 3 / direction[:, 0], 1 / direction[:, 0]) + rng.normal(0, 0.01, time_s.size)
     tiles = flat_tiles(replace(beams, range_m=range_m), mount, x)
     assert tiles.noise_m == pytest.approx(0.01, rel=0.1)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.lidar import streams
+from firmware_io.lidar import byte_stream
 from firmware_io.lidar.scip import driver as driver
 from firmware_io.lidar.scip import protocol
-from firmware_io.lidar.scip.driver import Lidar, clock_of, open_lidar
-from firmware_io.lidar.scip.raw_scan import scan_of
+from firmware_io.lidar.scip.driver import ScipLidar, new_clock, open_lidar
+from firmware_io.lidar.scip.raw_scan import to_laser_scan
 from firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
@@ -75,7 +75,7 @@ def test_clusters_and_skips():
         valid = np.where(np.isinf(look(SEEN_M)[0]), 99, look(SEEN_M)[0])
         expected = [valid[k : k + 5].min() for k in range(0, 1081, 5)]
         np.testing.assert_allclose(first.range_m, expected, atol=6e-4)
-        scan, whole = scan_of(first, lidar.parameters, 10**9), lidar.parameters.window.size
+        scan, whole = to_laser_scan(first, lidar.parameters, 10**9), lidar.parameters.window.size
         assert scan.range_m.size == 217 == -(-whole // 5)
         # The middle one of five steps: two steps after the first.
         assert scan.angle_min_rad == pytest.approx(np.radians(-135 + 2 * 0.25))
@@ -94,7 +94,7 @@ def test_first_beams_get_their_true_times(model, intensity):
 
     with LidarTwin(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as twin, open_lidar(twin.port) as lidar:
         assert lidar.sync is not None
-        clock = clock_of(lidar)
+        clock = new_clock(lidar)
         lidar.start(intensity=intensity)
         true_ns.clear()
         errors_ns, wrapped = [], False
@@ -146,7 +146,7 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
     with LidarTwin("UTM-30LX", look) as ours, LidarTwin("UTM-30LX", lambda t: (look(t)[0] + 1, look(t)[1])) as other:
         other.machine.identity = replace(other.machine.identity, serial_number="00900001")
         name.symlink_to(ours.port)
-        with Lidar(str(name), search=lambda: [other.port, str(tmp_path / "gone"), ours.port]) as lidar:
+        with ScipLidar(str(name), search=lambda: [other.port, str(tmp_path / "gone"), ours.port]) as lidar:
             lidar.start()
             ours.unplug()
             with pytest.raises(DeviceError):
@@ -163,7 +163,7 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
     with LidarTwin("UTM-30LX", look, clock_ms=1_000_000) as twin, open_lidar(twin.port) as lidar:
-        clock = clock_of(lidar)
+        clock = new_clock(lidar)
         lidar.start()
         before = lidar.read()
         clock.update(before.stamp_ms, before.arrival_ns, before.restarts)
@@ -217,7 +217,7 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
         os.close(slave)
 
 
-class SlowPort(streams.SerialStream):
+class SlowPort(byte_stream.SerialStream):
     """A port whose sensor listens at the speed that it has after power-up, until it is told another one."""
 
     listens = 19_200
@@ -230,7 +230,7 @@ class SlowPort(streams.SerialStream):
 
 
 def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch):
-    monkeypatch.setattr(streams, "SerialStream", SlowPort)
+    monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
     with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
         assert lidar._stream.listens == lidar._stream.baud == 115_200

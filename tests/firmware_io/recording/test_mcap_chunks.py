@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from design.errors import RecordingError
 from firmware_io.recording import ros_messages
-from firmware_io.recording.mcap_chunks import note_of, read_messages, topics_of
+from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
 
 TOPICS = ("/a", "/b", "/c")
 
@@ -57,8 +57,8 @@ def test_messages_come_as_the_formats_own_reader_gives_them(
 
 def test_topics_and_notes_are_found(tmp_path):
     path = write(tmp_path / "m.mcap", [("/a", 1, b"")])
-    assert topics_of(path) == dict.fromkeys(TOPICS, "some/Type")
-    assert (note_of(path, "note"), note_of(path, "other")) == ({"hold": "true"}, {})
+    assert read_topics(path) == dict.fromkeys(TOPICS, "some/Type")
+    assert (read_note(path, "note"), read_note(path, "other")) == ({"hold": "true"}, {})
 
 
 @pytest.mark.parametrize("where", [0.2, 0.5, 0.8])

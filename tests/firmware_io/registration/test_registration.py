@@ -15,16 +15,16 @@ from scipy.spatial.transform import Rotation
 from benchmarks.firmware_io.registration import building, room, scan, shell
 from design import frames
 from design.errors import RecordingError
-from firmware_io.clouds.files import read_clouds, write_clouds
-from firmware_io.clouds.record import Cloud, pose_matrix
+from firmware_io.clouds.cloud import Cloud, pose_matrix
+from firmware_io.clouds.formats import read_clouds, write_clouds
 from firmware_io.registration.cube_map import cells_of, depth_map, solid_angles_sr
-from firmware_io.registration.graph import Edge, solve
+from firmware_io.registration.graph import Edge, solve_graph
 from firmware_io.registration.merge import merge
 from firmware_io.registration.pairwise import align
 from firmware_io.registration.poses import read_poses, write_poses
 from firmware_io.registration.register import register
-from firmware_io.registration.sensor_view import view_of
-from firmware_io.registration.start import find
+from firmware_io.registration.sensor_view import make_view
+from firmware_io.registration.start import find_start
 from firmware_io.registration.thin import beam_step_rad, line_gaps_rad, thin, voxel_means
 
 
@@ -39,7 +39,7 @@ def off_by(T, truth):
 
 
 def seen(boxes, T, seed, lines=180, beams=541, spacing_m=0.15):
-    return view_of(f"stand{seed}", scan(boxes, T, lines, beams, seed), spacing_m)
+    return make_view(f"stand{seed}", scan(boxes, T, lines, beams, seed), spacing_m)
 
 
 # What a scanner's density is
@@ -119,7 +119,7 @@ def stands():
 
 def test_a_pair_is_found_from_no_start_to_a_millimetre(stands):
     a, b, truth = stands
-    pair = find(a, b)
+    pair = find_start(a, b)
     assert pair.why_not == ()
     metres, degrees = off_by(pair.T_a_b, truth)
     assert metres < 1e-3
@@ -156,7 +156,7 @@ def test_a_corridor_is_refused_with_its_direction():
 
 def test_a_hall_that_looks_alike_from_both_ends_is_refused():
     boxes = shell(6, 4, 3)
-    pair = find(seen(boxes, pose(0, 1, 0.5), 0), seen(boxes, pose(30, -1.5, 1), 1))
+    pair = find_start(seen(boxes, pose(0, 1, 0.5), 0), seen(boxes, pose(30, -1.5, 1), 1))
     assert any("another pose" in why for why in pair.why_not)
 
 
@@ -174,14 +174,14 @@ def test_the_two_sides_of_a_thin_wall_do_not_settle_on_each_other():
 
 def test_bare_ground_gives_no_start_and_no_identity():
     ground = shell(40, 40, 60)[:1]
-    pair = find(seen(ground, pose(0, 0, 0), 0), seen(ground, pose(20, 1, 0), 1))
+    pair = find_start(seen(ground, pose(0, 0, 0), 0), seen(ground, pose(20, 1, 0), 1))
     assert not np.array_equal(pair.T_a_b, np.eye(4))
     assert pair.why_not
 
 
 def test_too_few_points_are_one_line():
     with pytest.raises(RecordingError, match=r"few: 3 points 0\.1 m apart"):
-        view_of("few", np.eye(3), 0.1)
+        make_view("few", np.eye(3), 0.1)
 
 
 # Graphs
@@ -210,7 +210,7 @@ def test_exact_edges_bring_back_the_poses(seed):
     rng = np.random.default_rng(seed)
     start = np.array([T @ pose(*rng.uniform(-10, 10, 1), *rng.uniform(-0.5, 0.5, 2), 0.0) for T in poses])
     start[0] = poses[0]
-    graph = solve(start, edges)
+    graph = solve_graph(start, edges)
     np.testing.assert_allclose(graph.T_world, poses, atol=1e-8)
     assert graph.scale == 1
     assert graph.left_out == ()
@@ -218,7 +218,7 @@ def test_exact_edges_bring_back_the_poses(seed):
 
 def test_a_general_solver_finds_the_same_minimum_and_covariance():
     poses, edges = some_graph(3, 1e-3)
-    graph = solve(poses, edges)
+    graph = solve_graph(poses, edges)
 
     def unpacked(x):
         moves = [np.eye(4), *(frames.rigid(frames.rotvec_to_matrix(m[:3]), m[3:]) for m in x.reshape(5, 6))]
@@ -243,7 +243,7 @@ def test_a_general_solver_finds_the_same_minimum_and_covariance():
 def test_the_one_edge_that_contradicts_all_others_is_left_out():
     poses, edges = some_graph(4, 1e-3)
     lie = Edge(0, 3, np.linalg.inv(poses[0]) @ poses[3] @ pose(0, 9, 0, 0), np.eye(6) * 1e-6)
-    graph = solve(poses, [*edges, lie])
+    graph = solve_graph(poses, [*edges, lie])
     assert graph.left_out == (lie,)
     assert np.abs(graph.T_world - poses).max() < 0.02
 
@@ -251,7 +251,7 @@ def test_the_one_edge_that_contradicts_all_others_is_left_out():
 def test_poses_that_no_edge_joins_are_a_bug():
     poses, edges = some_graph(5, 0.0)
     with pytest.raises(ValueError, match="do not connect"):
-        solve(poses, [edge for edge in edges if 3 not in (edge.i, edge.j)])
+        solve_graph(poses, [edge for edge in edges if 3 not in (edge.i, edge.j)])
 
 
 # Sessions

@@ -142,7 +142,7 @@ BLIND = angle_set(servo="AX-12A")
     ],
 )
 def test_what_cannot_be_scanned_is_one_line(tmp_path, command, monkeypatch, angles, words, says):
-    monkeypatch.setattr("firmware_io.ports.list_ports.comports", lambda: [])
+    monkeypatch.setattr("firmware_io.device_ports.list_ports.comports", lambda: [])
     if angles is not None:
         (tmp_path / "angles.json").write_text(angles.to_json())
     code, _, complaints = command("scan", tmp_path, *words)
@@ -385,7 +385,7 @@ def test_the_doctor_finds_healthy_devices_healthy(out, twins, command):
 
 
 def test_the_doctor_says_what_is_wrong_and_the_remedy(twins, command, monkeypatch):
-    monkeypatch.setattr("firmware_io.ports.list_ports.comports", lambda: [])
+    monkeypatch.setattr("firmware_io.device_ports.list_ports.comports", lambda: [])
     assert command("doctor")[0] == 1
     code, said, _ = command("doctor", "--lidar", twins.ports.servo, "--servo", "no-such-port")
     assert code == 1

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo as CatalogueServo
+from design.catalogue.products import Servo as Servo
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo import guard
 from firmware_io.servo.dynamixel import bus as servo_bus
-from firmware_io.servo.dynamixel import port
+from firmware_io.servo.dynamixel import serial_line
 from firmware_io.servo.dynamixel.bus import ServoBus
 from firmware_io.servo.dynamixel.driver import nearest_turn, open_servo
 from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register, motor_of
@@ -56,8 +56,8 @@ def bus(monkeypatch):
 
     def make(protocol, reply, tries=1, wait_s=0.05):
         wire = Wire(reply)
-        monkeypatch.setattr(port.serial, "Serial", lambda *_, **__: wire)
-        monkeypatch.setattr(port.Line, "wait_s", wait_s)
+        monkeypatch.setattr(serial_line.serial, "Serial", lambda *_, **__: wire)
+        monkeypatch.setattr(serial_line.SerialLine, "wait_s", wait_s)
         monkeypatch.setattr(servo_bus, "_TRIES", tries)
         return ServoBus("wire", protocol=protocol), wire
 
@@ -93,7 +93,7 @@ def test_counts_as_the_manual_writes_them():
 def test_tables_agree_with_the_catalogue():
     for table in TABLES:
         record = load_catalogue().products.get(table.model)
-        if isinstance(record, CatalogueServo):
+        if isinstance(record, Servo):
             step_deg = table.position.unit * 360 / (2 * 3.141592653589793)
             assert step_deg == pytest.approx(record.position_step_deg, rel=1e-6)
             assert table.measures_turn == (record.position_feedback_deg == 360)

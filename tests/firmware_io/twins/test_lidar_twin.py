@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar as CatalogueLidar
+from design.catalogue.products import Lidar as Lidar
 from design.errors import DeviceError
 from firmware_io.lidar.scip import protocol
 from firmware_io.twins.lidar import LidarTwin
@@ -73,7 +73,7 @@ def test_the_models_are_those_of_the_catalogue():
     catalogue, shared = load_catalogue(), 0
     for model, identity in IDENTITIES.items():
         if model in catalogue.products:
-            product, of = catalogue.get(model, CatalogueLidar), identity.parameters
+            product, of = catalogue.get(model, Lidar), identity.parameters
             shared += 1
             assert (product.first_step, product.last_step, product.front_step, product.steps_per_turn) == (
                 of.first_step,

@@ -10,12 +10,12 @@ from design.angles import STANDARD_DEG, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError
-from design.scene.ray_caster import Hits, cast, scene_of
+from design.scene.ray_caster import Hits, build_scene, cast
 from firmware_io.assembly.deskew import place
 from firmware_io.samples import JointLog, Scan
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.head import load_of
-from firmware_io.twins.world import RangeModel, furnished_room, measure, range_model, rays, see
+from firmware_io.twins.head import read_load
+from firmware_io.twins.world import RangeModel, furnished_room, measure_ranges, range_model, rays, see
 
 BEARINGS_RAD = load_catalogue().get("UTM-30LX", Lidar).bearings_rad()
 MODEL = RangeModel(sigma_m=0.01, quantum_m=0.001, range_min_m=0.1, range_max_m=30, incidence_max_rad=np.radians(85))
@@ -28,7 +28,7 @@ def angle_set(alpha_rot=0.0, beta_rot=0.0, alpha_laser=0.0, beta_laser=0.0, **mo
 
 @pytest.fixture(scope="module")
 def room():
-    return scene_of(furnished_room())
+    return build_scene(furnished_room())
 
 
 @pytest.mark.parametrize(("name", "turn"), [("rolling", frames.Rx), ("pitching", frames.Ry)])
@@ -86,14 +86,14 @@ def hits_at(range_m, incidence_deg=0.0, count=100_000):
 
 
 def test_noise_has_the_spread_that_was_set_and_no_bias():
-    error_m = measure(hits_at(4.0004), MODEL, np.random.default_rng(3)).range_m - 4.0004
+    error_m = measure_ranges(hits_at(4.0004), MODEL, np.random.default_rng(3)).range_m - 4.0004
     expected_m = np.hypot(0.01, 0.001 / np.sqrt(12))
     assert error_m.std() == pytest.approx(expected_m, rel=4 / np.sqrt(2 * error_m.size))
     assert abs(error_m.mean()) < 4 * expected_m / np.sqrt(error_m.size)
 
 
 def test_ranges_are_whole_millimetres():
-    range_mm = measure(hits_at(4.0004), MODEL, np.random.default_rng(3)).range_m * 1000
+    range_mm = measure_ranges(hits_at(4.0004), MODEL, np.random.default_rng(3)).range_m * 1000
     np.testing.assert_allclose(range_mm, np.rint(range_mm), atol=1e-9)
 
 
@@ -102,14 +102,14 @@ def test_ranges_are_whole_millimetres():
     [(31, 0, np.inf), (np.inf, np.nan, np.inf), (5, 86, np.inf), (0.02, 0, -np.inf)],
 )
 def test_what_cannot_be_measured_says_why(range_m, incidence_deg, says):
-    found = measure(hits_at(range_m, incidence_deg, 9), MODEL, np.random.default_rng(0))
+    found = measure_ranges(hits_at(range_m, incidence_deg, 9), MODEL, np.random.default_rng(0))
     assert found.range_m.tolist() == [says] * 9
     assert found.intensity.tolist() == [0] * 9
 
 
 def test_equal_seeds_are_equal_scans(room):
     hits = see(room, angle_set(0, 0, 40, 30), BEARINGS_RAD, np.zeros(BEARINGS_RAD.size))
-    first, again, other = (measure(hits, MODEL, np.random.default_rng(seed)).range_m for seed in (1, 1, 2))
+    first, again, other = (measure_ranges(hits, MODEL, np.random.default_rng(seed)).range_m for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert (first != other).mean() > 0.9
 
@@ -130,7 +130,7 @@ URDF = """<robot name="r"><link name="world"/>
 def test_gravity_on_the_head_is_the_slope_of_its_potential_energy(tmp_path):
     (tmp_path / "scanner.urdf").write_text(URDF)
     angles = angle_set(20, -55, -80, 75, t_rot_laser_mm=(3, -2, 1))
-    load = load_of(tmp_path, angles)
+    load = read_load(tmp_path, angles)
 
     def energy_J(joint_rad):
         heights_m = [
@@ -146,11 +146,11 @@ def test_gravity_on_the_head_is_the_slope_of_its_potential_energy(tmp_path):
 
 
 def test_before_the_build_the_head_is_light_and_afterwards_a_broken_file_is_one_line(tmp_path):
-    assert load_of(tmp_path, angle_set()) == Load()
+    assert read_load(tmp_path, angle_set()) == Load()
     for text in ("", "<robot/>", URDF.replace("izz", "jzz")):
         (tmp_path / "scanner.urdf").write_text(text)
         with pytest.raises(DeviceError, match="no masses of the links rot and laser"):
-            load_of(tmp_path, angle_set())
+            read_load(tmp_path, angle_set())
 
 
 def test_the_room_of_the_tour_is_closed_and_within_reach(room):

@@ -10,7 +10,7 @@ import pytest
 from design.angles import Angles, AngleSet
 from firmware_io.assembly.deskew import deskew
 from firmware_io.samples import JointLog, Scan
-from firmware_io.scan.live_feed import MOST_SCANS, Batch, Feed, Growth, Placing, growing
+from firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
 from scanwright.live import cloud_view
 from scanwright.live.cloud_view import CloudView
 from scanwright.serving.page_server import guarded_server
@@ -111,10 +111,10 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         view = CloudView(server, "scan of live")
         for index in range(30):
             points = rng.normal(0, 1 + index, (100, 3)).astype(np.float32)
-            view.add(Growth(points, np.zeros(100, np.float32), np.full(100, index, np.float32), (), 0))
+            view.add(CloudGrowth(points, np.zeros(100, np.float32), np.full(100, index, np.float32), (), 0))
         view.by.value = "time"
         nothing = np.empty(0, np.float32)
-        view.add(Growth(nothing.reshape(0, 3), nothing, nothing, ("a line",), 7))
+        view.add(CloudGrowth(nothing.reshape(0, 3), nothing, nothing, ("a line",), 7))
         shown = sum(len(chunk.points_m) for chunk in view.chunks)
         assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from design.angles import load_angles
-from design.search.optimum import optimum_of
+from design.search.optimum import find_optimum
 from design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
@@ -105,7 +105,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.get_by_text(J, exact=True).wait_for()
 
     # a painted region changes the optimum, and the button finds a better one for it
-    before = optimum_of(load_task(folder / "small.toml"), lambda _: None).search.best[0].angles_deg
+    before = find_optimum(load_task(folder / "small.toml"), lambda _: None).search.best[0].angles_deg
     tab(page, "Paint")
     page.get_by_label("brush").check()
     until(lambda: studio.controls.painting.value)

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Float64
+from numpy import ndarray
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from design import frames
-from firmware_io.samples import Floats
+from design.arrays import Pose
 
 Column = NDArray[Any]
 
@@ -34,10 +36,10 @@ class Cloud:
         start_ns: moment of `time_s` = 0 since 1970, where it is known.
     """
 
-    points_m: NDArray[np.floating]
+    points_m: Float[ndarray, "n 3"]
     columns: Mapping[str, Column] = field(default_factory=dict)
     shape: tuple[int, int] = (1, 0)
-    T_world_cloud: Floats = field(default_factory=lambda: np.eye(4))
+    T_world_cloud: Pose = field(default_factory=lambda: np.eye(4))
     start_ns: int | None = None
 
     def __post_init__(self) -> None:
@@ -58,7 +60,7 @@ class Cloud:
         return not np.array_equal(self.T_world_cloud, np.eye(4))
 
 
-def rows_of(cloud: Cloud) -> NDArray[np.void]:
+def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
     """The cloud as one structured array, little endian: x y z, then its columns."""
     real = "<f4" if cloud.points_m.dtype == np.float32 else "<f8"
     kinds = [(axis, real) for axis in "xyz"]
@@ -71,7 +73,7 @@ def rows_of(cloud: Cloud) -> NDArray[np.void]:
     return rows
 
 
-def cloud_of(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
+def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
     """The cloud of a structured array with x y z, and of what the lines of its header tell."""
     names = rows.dtype.names or ()
     real = np.float32 if all(rows.dtype[axis].itemsize == 4 for axis in "xyz") else np.float64
@@ -106,12 +108,12 @@ def told(cloud: Cloud, lines: Iterable[str]) -> Cloud:
     return Cloud(cloud.points_m, cloud.columns, (shape[0], shape[1]), T, start_ns)
 
 
-def pose_numbers(T: Floats) -> Floats:
+def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
     """Position and quaternion: x y z qx qy qz qw."""
     return np.concatenate([T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)])
 
 
-def pose_matrix(numbers: Iterable[float]) -> Floats:
+def pose_matrix(numbers: Iterable[float]) -> Pose:
     """Inverse of `pose_numbers`; the quaternion may have any length but zero."""
     x, y, z, *quaternion = numbers
     return frames.rigid(Rotation.from_quat(quaternion).as_matrix(), [x, y, z])

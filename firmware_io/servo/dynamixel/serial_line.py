@@ -13,7 +13,7 @@ from design.errors import DeviceError, ProtocolError
 _SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenever its time-out is changed
 
 
-class Line:
+class SerialLine:
     """An open port, with what the SDK's packet handlers ask of one to read an answer; those names are theirs.
 
     Attributes:

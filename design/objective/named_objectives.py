@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Num
+from numpy import ndarray
 
+from design.arrays import Array
 from design.errors import TaskError
-from design.frames import Array
 from design.sphere.regions import MAP, Field, Layers, field_of
 from design.task.shapes import Region
 from design.task.task import LoadedTask
@@ -51,7 +53,7 @@ class Objective:
     join: Callable[[Array], Array]
 
 
-def log_density(counts: Array) -> Array:
+def log_density(counts: Num[ndarray, ...]) -> Array:
     """`g(d) = -ln(1 + d)`: rewards every direction's first beams most (the paper's logarithm, with its sign)."""
     return -np.log1p(counts)
 

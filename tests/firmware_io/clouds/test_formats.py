@@ -15,8 +15,8 @@ from pypcd4 import Encoding, PointCloud
 
 from design import frames
 from design.errors import RecordingError
-from firmware_io.clouds.files import read_clouds, write_clouds
-from firmware_io.clouds.record import Cloud, pose_matrix, pose_numbers
+from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
+from firmware_io.clouds.formats import read_clouds, write_clouds
 
 FORMATS = ["ply", "pcd", "las", "laz", "e57", "npz", "xyz"]
 EXACT = ["ply", "pcd", "e57", "npz", "xyz"]

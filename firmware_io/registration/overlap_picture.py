@@ -11,15 +11,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from design import frames
-from firmware_io.files import whole_file
+from design.atomic_file import whole_file
+from design.errors import RecordingError
 from firmware_io.registration.register import Registration
-from firmware_io.registration.sensor_view import View
+from firmware_io.registration.sensor_view import SensorView
 
 _SHOWN = 20_000  # points of one cloud: more only blacken the page
 _KEPT_PERCENT = (0.5, 99.5)
 
 
-def overlap_picture(png: Path, views: Sequence[View], found: Registration) -> None:
+def overlap_picture(png: Path, views: Sequence[SensorView], found: Registration) -> None:
     """Draw a session that found all its poses."""
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(views)))
     figure = Figure(figsize=(12, 6.5), dpi=120, layout="constrained")
@@ -51,5 +52,5 @@ def overlap_picture(png: Path, views: Sequence[View], found: Registration) -> No
     table.set_xticklabels(names, rotation=90, fontsize=7)
     table.set_yticklabels(names, fontsize=7)
     figure.colorbar(image, ax=table, shrink=0.7)
-    with whole_file(png) as part:
+    with whole_file(png, RecordingError) as part:
         figure.savefig(part, format="png", metadata={"Software": None})

@@ -1,26 +1,14 @@
-"""Files that are whole or not there, and foreign readers whose every failure is one clear line."""
+"""Readers of other people's formats, whose every failure becomes one clear line."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from design import atomic_file
 from design.errors import RecordingError
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
-def whole_file(path: Path) -> AbstractContextManager[Path]:
-    """A temporary name beside `path` that becomes `path` when the block ends well.
-
-    Raises:
-        RecordingError: the file cannot be written there.
-    """
-    return atomic_file.whole_file(path, RecordingError)
 
 
 def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:

@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 
 from design.angles import AngleSet
-from design.atomic_file import check_place
+from design.atomic_file import check_place, whole_file
 from design.errors import RecordingError
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.calibration.entropy import witness
 from firmware_io.calibration.estimate import Estimate, estimate
-from firmware_io.calibration.lag import lag_of
+from firmware_io.calibration.lag import find_lag
 from firmware_io.calibration.model import Mount, gather, start_vector
-from firmware_io.calibration.report import lines, report
+from firmware_io.calibration.report import calibration_report, lines
 from firmware_io.calibration.tiles import fan_side
-from firmware_io.files import whole_file
 from firmware_io.recording.recording import Recording, open_recording
 
 
@@ -89,10 +88,10 @@ def calibrate_recordings(
     record = {
         "recordings": [path.name for path in recordings],
         "left_out": left_out,
-        **report(found, start, mount, beams, seen),
+        **calibration_report(found, start, mount, beams, seen),
     }
     calibration = Calibration(calibrated(angles, found), record, out)
-    with whole_file(out) as part, whole_file(report_path(out)) as beside:
+    with whole_file(out, RecordingError) as part, whole_file(report_path(out), RecordingError) as beside:
         part.write_text(calibration.angles.to_json(), encoding="utf-8")
         beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return calibration
@@ -102,7 +101,7 @@ def _late(opened: Sequence[Recording]) -> str:
     """What recordings whose mounting errors cannot be found still tell of time; "" where they do not."""
     for recording in opened:
         with suppress(RecordingError):
-            lag = lag_of(recording)
+            lag = find_lag(recording)
             return (
                 f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
                 f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"

@@ -10,7 +10,7 @@ from typing import Any
 
 from design.atomic_file import check_place
 from design.errors import RecordingError, require, suggest
-from firmware_io.clouds.record import Cloud
+from firmware_io.clouds.cloud import Cloud
 
 _FORMATS = {  # suffix: module of this folder, and the packages of the extra `clouds` that it needs
     ".ply": ("ply",),

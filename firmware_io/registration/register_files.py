@@ -10,17 +10,17 @@ import numpy as np
 
 from design.atomic_file import check_place
 from design.errors import RecordingError
-from firmware_io.clouds.files import check_target, read_clouds, write_clouds
+from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from firmware_io.registration.merge import merge
+from firmware_io.registration.overlap_picture import overlap_picture
 from firmware_io.registration.pairwise import Pair
-from firmware_io.registration.picture import overlap_picture
 from firmware_io.registration.poses import read_poses, write_covariances, write_poses
 from firmware_io.registration.register import Registration, register
-from firmware_io.registration.sensor_view import view_of
+from firmware_io.registration.sensor_view import make_view
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class RegisteredFiles:
     """What became of `register_files`.
 
     Attributes:
@@ -74,7 +74,7 @@ def register_files(
     spacing_m: float,
     map_spacing_m: float,
     say: Callable[[str], None],
-) -> Session:
+) -> RegisteredFiles:
     """Register clouds, write map, poses, covariances and picture; nothing at all unless every cloud found its place.
 
     Args:
@@ -113,10 +113,10 @@ def register_files(
     views = []
     for name, cloud in zip(names, clouds, strict=True):
         say(f"{name}: {len(cloud.points_m):,} points")
-        views.append(view_of(name, cloud.points_m.astype(float), spacing_m))
+        views.append(make_view(name, cloud.points_m.astype(float), spacing_m))
     found = register(views, given, say)
     if not found.complete:
-        return Session(tuple(names), found, 0, (), tuple(said))
+        return RegisteredFiles(tuple(names), found, 0, (), tuple(said))
     say("merging")
     merged = merge(clouds, found.T_world, map_spacing_m)
     wrote, lost = write_clouds(out, [merged])
@@ -124,4 +124,4 @@ def register_files(
     write_poses(poses, names, clouds, found.T_world)
     write_covariances(covariances, names, found.covariance)
     overlap_picture(png, views, found)
-    return Session(tuple(names), found, len(merged.points_m), (*wrote, poses, covariances, png), (*said, *lost))
+    return RegisteredFiles(tuple(names), found, len(merged.points_m), (*wrote, poses, covariances, png), (*said, *lost))

@@ -1,0 +1,33 @@
+"""Types of arrays: what they hold, and their shape. Tests check them wherever they are called; runs pay nothing.
+
+A shape names its axes: in one call every `n` is the same number, `...` is any number of axes, `*k` axes that are
+alike throughout the call. A single axis is written with a space before it, as `Float[ndarray, " n"]`: without it a
+linter takes it for the name of a type.
+"""
+
+from __future__ import annotations
+
+from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt8
+from numpy import ndarray
+
+Array = Float[ndarray, "..."]
+"""Of either precision."""
+
+Floats = Float64[ndarray, "..."]
+Float32s = Float32[ndarray, "..."]
+Ints = Int64[ndarray, "..."]
+Bytes = UInt8[ndarray, "..."]
+Mask = Bool[ndarray, "..."]
+
+Times = Int64[ndarray, "..."]
+"""Nanoseconds."""
+
+Vector = Float[ndarray, " 3"]
+Rotation = Float[ndarray, "3 3"]
+Pose = Float[ndarray, "4 4"]
+
+Setting = Float[ndarray, " 4"]
+"""(alpha_rot, beta_rot, alpha_laser, beta_laser) in radians."""
+
+Plane = Float[ndarray, " 2"]
+"""(alpha_laser, beta_laser) in radians: a scan plane."""
