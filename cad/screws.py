@@ -99,9 +99,3 @@ def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True)
 def passing_hole(screw: Screw, printer: Printer) -> float:
     """Diameter of the hole in a part that a screw passes through."""
     return screw.nominal + printer.screw_clearance_mm
-
-
-def holding_holes(screw: Screw, printer: Printer) -> tuple[float, ...]:
-    """Diameters of all holes in parts that a screw may hold on to."""
-    trap = trap_of(screw, printer)
-    return (thread_hole(screw, printer),) if trap is None else (screw.core, trap.hole)

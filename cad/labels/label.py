@@ -17,7 +17,6 @@ from itertools import product
 import cadquery as cq
 import numpy as np
 import shapely
-import shapely.affinity
 from numpy.typing import NDArray
 
 from cad import solids
@@ -27,7 +26,7 @@ from cad.geometry.holes import Piercing
 from cad.geometry.mesh import TriMesh, checked_mesh
 from cad.labels.engrave import Groove, engrave, groove_of
 from cad.labels.flats import Flat, flat_at, flats_of
-from cad.labels.glyphs import letters, text_width
+from cad.labels.lettering import Lettering, Place
 from cad.labels.sight import Sight
 from cad.parts.part_spec import PartSpec
 from design.errors import BuildError
@@ -36,7 +35,6 @@ from design.left_out import LeftOut
 from design.scanner import Scanner
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
-LEADING = 1.65  # from line to line, of the height
 MARGIN = 1.5  # of a face around its label
 HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
 FACES = 12  # that are tried, the largest first
@@ -65,46 +63,6 @@ class Labelled:
     meshes: dict[str, TriMesh] = field(default_factory=dict)
     findings: list[PartFinding] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True)
-class Lettering:
-    """Lettering, its origin at the lower left corner of its last line."""
-
-    lines: tuple[str, ...]
-    height: float
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and height of all lines."""
-        width = max(text_width(line, self.height) for line in self.lines)
-        return width, self.height * (1 + LEADING * (len(self.lines) - 1))
-
-    def outlines(self, stroke: float) -> list[shapely.Polygon]:
-        """Of its grooves, about its origin."""
-        return [
-            shapely.affinity.translate(letter, 0.0, LEADING * self.height * i)
-            for i, line in enumerate(reversed(self.lines))
-            for letter in letters(line, self.height, stroke)
-        ]
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where lettering stands on a face: its axes are the columns of `turn` (2, 2), its origin is at (x, y)."""
-
-    flat: Flat
-    x: float
-    y: float
-    turn: Array
-
-    def put(self, points: Array) -> Array:
-        """Points of the lettering, shape (n, 2), in the axes of the face."""
-        return np.asarray(points @ self.turn.T + [self.x, self.y])
-
-    def outlines(self, lines: Lettering, stroke: float) -> list[shapely.Polygon]:
-        """Of the grooves of some lines, in the axes of the face."""
-        return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from cad.assembly.make import make_parts
 from cad.geometry.holes import Piercing, rounds_of
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
-from cad.screws import SCREWS, holding_holes, trap_of
+from cad.screws import SCREWS, thread_hole, trap_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -81,6 +81,12 @@ def screw_for(hole, printer):
         if any(abs(hole.diameter - size) < 0.01 for size in holding_holes(screw, printer)):
             return screw, True
     return None, False
+
+
+def holding_holes(screw, printer):
+    """Diameters of all holes in parts that a screw may hold on to."""
+    trap = trap_of(screw, printer)
+    return (thread_hole(screw, printer),) if trap is None else (screw.core, trap.hole)
 
 
 def is_trap(hole, screw, printer):

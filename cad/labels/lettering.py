@@ -1,0 +1,55 @@
+"""Lines of lettering, and where they stand on a face. Millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import shapely.affinity
+
+from cad.labels.flats import Flat
+from cad.labels.glyphs import letters, text_width
+from design.frames import Array
+
+LEADING = 1.65  # from line to line, of the height
+
+
+@dataclass(frozen=True, slots=True)
+class Lettering:
+    """Lettering, its origin at the lower left corner of its last line."""
+
+    lines: tuple[str, ...]
+    height: float
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of all lines."""
+        width = max(text_width(line, self.height) for line in self.lines)
+        return width, self.height * (1 + LEADING * (len(self.lines) - 1))
+
+    def outlines(self, stroke: float) -> list[shapely.Polygon]:
+        """Of its grooves, about its origin."""
+        return [
+            shapely.affinity.translate(letter, 0.0, LEADING * self.height * i)
+            for i, line in enumerate(reversed(self.lines))
+            for letter in letters(line, self.height, stroke)
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where lettering stands on a face: its axes are the columns of `turn` (2, 2), its origin is at (x, y)."""
+
+    flat: Flat
+    x: float
+    y: float
+    turn: Array
+
+    def put(self, points: Array) -> Array:
+        """Points of the lettering, shape (n, 2), in the axes of the face."""
+        return np.asarray(points @ self.turn.T + [self.x, self.y])
+
+    def outlines(self, lines: Lettering, stroke: float) -> list[shapely.Polygon]:
+        """Of the grooves of some lines, in the axes of the face."""
+        return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]
