@@ -1,1 +1,1 @@
-"""All parts of one scanner together: bodies, joints, masses, what they hide."""
+"""All parts of one scanner together: solids of parts and bought bodies, masses, steps, what they hide."""

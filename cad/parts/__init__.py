@@ -1,1 +1,1 @@
-"""One file per printed or turned part. Lengths are millimetres, frames are the rotation frame."""
+"""One file per printed or turned part: its shape and what is to know of it. Rotation frame, millimetres."""

@@ -74,7 +74,7 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     """Make the linkage.
 
     A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck, and only the neck, is then
-    turned a little and made again, so that the height, and with it the frame chain, stays what `sizing` said.
+    turned a little and made again, so that the height, and with it the frame chain, stays what the layout said.
 
     Raises:
         BuildError: no attempt gave one valid watertight solid.
