@@ -117,8 +117,12 @@ def _held_by_screws(scanner: Scanner, deck: Deck) -> PartFinding:
 def unverified(product: Product, assembly: Assembly) -> list[PartFinding]:
     """Values of a product that nobody has verified and that shape a part."""
     provenance, shaping = product.provenance(), dict(SHAPING)
-    for part in reversed(assembly.parts.values()):  # of two parts that name a value, the first tells
-        shaping |= part.shaped_by
+    for field in product.unverified():
+        parts = [part.name for part in assembly.parts.values() if f"{product.kind}.{field}" in part.shaped_by]
+        if parts:
+            shaping[f"{product.kind}.{field}"] = " and ".join(parts)
+    for part in reversed(assembly.parts.values()):  # of two parts that say more of a value, the first does
+        shaping |= part.shapes
     return [
         PartFinding(
             "unverified",

@@ -21,7 +21,7 @@ from cad.screws import INSERT_LENGTH, SCREWS
 from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from design.scanner import Scanner
 
-HOLES = "holes of the solids"
+JOINTS = "joints of the layout"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 
 # What else a product needs: name, quantity, source. A product that is not here asks for its data sheet.
@@ -167,12 +167,12 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
         kind = "grub screw" if number.startswith("ISO 4026") else "cap screw"
         where = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
         total = sum(joint.count for joint in used)
-        yield BomItem("screw", kind, number, total, source=HOLES, note=f"{where}; price unknown")
+        yield BomItem("screw", kind, number, total, source=JOINTS, note=f"{where}; price unknown")
     for name, count in sorted(nuts.items()):
-        yield BomItem("nut", "hexagon nut", f"ISO 4032 {name}", count, source=HOLES, note="price unknown")
+        yield BomItem("nut", "hexagon nut", f"ISO 4032 {name}", count, source=JOINTS, note="price unknown")
     for name, count in sorted(inserts.items()):
         note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm; price unknown"
-        yield BomItem("insert", "heat-set insert", name, count, source=HOLES, note=note)
+        yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note)
 
 
 def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:

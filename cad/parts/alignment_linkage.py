@@ -28,12 +28,23 @@ from cad.layout.linkage import AlignmentLinkage, neck_corners
 from cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT, SERVO_SHAFT
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.linkage_hub import hub, hub_cuts
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.parts.part_spec import PartSpec, Step
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
 from cad.solids import building, checked
 from design.errors import BuildError
 
+OF_LIDAR = (
+    "lidar.body_mm",
+    "lidar.optical_height_mm",
+    "lidar.window_z_mm",
+    "lidar.mount_screw",
+    "lidar.mount_holes_mm",
+    "lidar.cable_y_mm",
+    "lidar.cable_z_mm",
+    "lidar.cable_diameter_mm",
+    "lidar.cable_straight_mm",
+)
 RETRIES = 5
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
 BELT_WORDS = (
@@ -55,16 +66,14 @@ def linkage_spec(layout: Layout) -> PartSpec:
     step = Step("Linkage on the shaft", words)
     if isinstance(stack, BeltStack):
         step = Step("Linkage on the shaft, and the belt set", BELT_WORDS)
-    of_lidar = ("body_mm", "optical_height_mm", "window_z_mm", "mount_screw", "mount_holes_mm")
-    of_cables = ("cable_y_mm", "cable_z_mm", "cable_diameter_mm", "cable_straight_mm")
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
         turns=True,
         make=partial(alignment_linkage, p),
         step=step,
         sheet=OnSheet(() if stack.bearing is None else (printed_journal(stack.bearing, p.fit),)),
-        shaped_by=shapes(ALIGNMENT_LINKAGE, *(f"lidar.{field}" for field in (*of_lidar, *of_cables)), "bearing.bore_mm")
-        | shapes(f"the bore of {ALIGNMENT_LINKAGE}", "printer.fit_clearance_mm"),
+        shaped_by=OF_LIDAR,
+        shapes={"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"},
         angles="laser",
         seat=p.top,
     )

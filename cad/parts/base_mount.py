@@ -21,11 +21,18 @@ from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, 
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO_CASE
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Screw, passing_hole
 from cad.solids import building, checked
 from design.frames import Array
 
+OF_SERVO = (
+    "servo.case_min_mm",
+    "servo.case_max_mm",
+    "servo.case_screw",
+    "servo.case_rear_holes_mm",
+    "servo.case_rear_holes_z_mm",
+)
 RAIL_HALF_WIDTH = 4.0  # least
 RAIL_WALL = 1.3  # of a rail beside the heads of its screws
 FOOT_RADIUS = 3.0
@@ -64,7 +71,7 @@ def mount_spec(layout: Layout) -> PartSpec | None:
         turns=False,
         make=partial(base_mount, mount_of(layout)),
         step=step,
-        shaped_by=shapes(BASE_MOUNT, "servo.case_min_mm", "servo.case_rear_holes_mm", "servo.case_rear_holes_z_mm"),
+        shaped_by=() if isinstance(layout.stack, BeltStack) else OF_SERVO,
         angles="rot",
     )
 

@@ -34,8 +34,8 @@ from cad.layout.direct.cage import (
 from cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from cad.layout.fits import OnSheet, printed_seat
 from cad.layout.joints import ALL_SCREWS, screws
-from cad.layout.names import BEARING_CAGE, CAGE_BASE, SERVO_CASE, SLIP_RING_ADAPTER
-from cad.parts.part_spec import PartSpec, Step, on_servo_front
+from cad.layout.names import BEARING_CAGE, CAGE_BASE, SERVO_CASE
+from cad.parts.part_spec import ON_CASE, PartSpec, Step
 from cad.screws import Trap
 from cad.solids import building, checked
 from design.scanner import Scanner
@@ -72,7 +72,7 @@ def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         turns=False,
         make=partial(cage_base, p),
         step=Step("Base of the cage on the servo", f"Lower the base over the shaft. {screws(SERVO_CASE)}"),
-        shaped_by=on_servo_front(SLIP_RING_ADAPTER),
+        shaped_by=ON_CASE,
     )
 
 

@@ -34,8 +34,8 @@ from cad.layout.belt.stack import (
 )
 from cad.layout.belt.tower import DISC_SCREW, UNDER_FOOT_NUT, UNDER_HEAD, BearingTower, disc_azimuths, tower_of
 from cad.layout.fits import OnSheet, printed_seat
-from cad.layout.names import BEARING_TOWER, DRIVE_PLATE
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.layout.names import BEARING_TOWER
+from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Trap
 from cad.solids import building, checked
 from design.scanner import Scanner
@@ -57,9 +57,8 @@ def tower_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         make=partial(bearing_tower, p),
         step=Step("Bearings into the tower", words),
         sheet=OnSheet((printed_seat(stack.carrier, p.fit),), _nuts_words(p)),
-        shaped_by=shapes(BEARING_TOWER, "servo.case_min_mm", "slip_ring.length_mm")
-        | shapes(f"{BEARING_TOWER} and {DRIVE_PLATE}", "servo.case_max_mm")
-        | shapes("every bore and seat", "printer.fit_clearance_mm"),
+        shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
+        shapes={"printer.fit_clearance_mm": "every bore and seat"},
     )
 
 

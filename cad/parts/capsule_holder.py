@@ -18,8 +18,8 @@ from cad import solids
 from cad.layout.belt.stack import DISC, BeltStack
 from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
 from cad.layout.joints import screws
-from cad.layout.names import BEARING_TOWER, RING_STATOR, SLIP_RING_ADAPTER
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.layout.names import RING_STATOR, SLIP_RING_ADAPTER
+from cad.parts.part_spec import PartSpec, Step
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from cad.solids import building, checked
 from design.scanner import Scanner
@@ -50,8 +50,7 @@ def holder_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         turns=False,
         make=partial(capsule_holder, holder_of(scanner, stack)),
         step=Step("Capsule on its disc", words),
-        shaped_by=shapes(SLIP_RING_ADAPTER, "slip_ring.outer_diameter_mm")
-        | shapes(f"{SLIP_RING_ADAPTER} and {BEARING_TOWER}", "slip_ring.flange"),
+        shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
     )
 
 

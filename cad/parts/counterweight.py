@@ -15,7 +15,7 @@ from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.parts.part_spec import PartSpec, Step
 from cad.solids import building, checked
 from design.left_out import LeftOut
 
@@ -40,8 +40,8 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
         material=bar.stock,
         work=f"{len(bar.screws)} threads {SCREW.name}",
         sheet=OnSheet(notes=(f"Holes of {SCREW.core:g}: thread {SCREW.name} all through.",)),
-        shaped_by=shapes(COUNTERWEIGHT, "lidar.mass_g")
-        | shapes(f"whether there is a {COUNTERWEIGHT}", "servo.backlash_deg"),
+        shaped_by=("lidar.mass_g",),
+        shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
         lifted="radius",
     )
 

@@ -17,10 +17,17 @@ from cad.layout.belt.stack import PLATE, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
 from cad.layout.names import DRIVE_PLATE, SERVO_CASE
-from cad.parts.part_spec import PartSpec, Step, shapes
+from cad.parts.part_spec import PartSpec, Step
 from cad.solids import building, checked
 from design.scanner import Scanner
 
+OF_SERVO = (
+    "servo.case_max_mm",
+    "servo.case_screw",
+    "servo.case_holes_mm",
+    "servo.case_holes_z_mm",
+    "servo.horn_diameter_mm",
+)
 FOOT_RADIUS = 3.0
 
 
@@ -30,15 +37,14 @@ def plate_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024) and put the plate on its front. "
         f"{screws(SERVO_CASE)}"
     )
-    fields = ("horn_diameter_mm", "case_screw", "case_holes_mm", "case_holes_z_mm")
     return PartSpec(
         name=DRIVE_PLATE,
         turns=False,
         make=partial(drive_plate, plate_of(scanner, stack)),
         step=Step("Servo on its plate", words),
         sheet=OnSheet(axis=stack.horn_axis),
-        shaped_by=shapes(DRIVE_PLATE, *(f"servo.{field}" for field in fields))
-        | shapes("where the servo stands", "belt.teeth"),
+        shaped_by=OF_SERVO,
+        shapes={"belt.teeth": "where the servo stands"},
     )
 
 

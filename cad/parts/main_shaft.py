@@ -15,7 +15,7 @@ from cad import solids
 from cad.layout.belt.stack import BeltStack
 from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
 from cad.layout.names import MAIN_SHAFT
-from cad.parts.part_spec import TURNED_FROM, PartSpec, Step, shapes
+from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
 from cad.solids import building, checked
 from design.scanner import Scanner
 
@@ -37,7 +37,7 @@ def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
         sheet=OnSheet((seat, turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm))),
-        shaped_by=shapes(MAIN_SHAFT, "bearing.bore_mm", "slip_ring.rotor"),
+        shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
     )
 
 

@@ -10,7 +10,6 @@ import cadquery as cq
 
 from cad.layout.fits import OnSheet
 from cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
-from cad.layout.names import BASE_MOUNT
 from design.catalogue.products import Printer
 
 Process = Literal["printed", "turned", "sawn"]
@@ -24,6 +23,14 @@ HORN = (
     "servo.horn_holes",
     "servo.horn_first_hole_deg",
     "servo.horn_screw",
+)
+ON_CASE = (
+    "servo.case_max_mm",
+    "servo.case_screw",
+    "servo.case_holes_mm",
+    "servo.case_holes_z_mm",
+    "servo.horn_diameter_mm",
+    "servo.horn_thickness_mm",
 )
 TURNED_FROM = "aluminium or steel"
 
@@ -50,7 +57,8 @@ class PartSpec:
         work: what else is done to it.
         why_metal: why no printer makes it.
         sheet: what its drawing says beyond its shape.
-        shaped_by: fields of products, as "kind.field", that shape it, and what they shape of this scanner: words.
+        shaped_by: fields of products, as "kind.field", that shape it.
+        shapes: fields that shape something else, and what, in words: these go before any part.
         angles: those that shape it and stand on its label.
         seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
         lifted: along what the exploded view moves it.
@@ -66,7 +74,8 @@ class PartSpec:
     work: str = ""
     why_metal: str = ""
     sheet: OnSheet = field(default_factory=OnSheet)
-    shaped_by: Mapping[str, str] = field(default_factory=dict)
+    shaped_by: tuple[str, ...] = ()
+    shapes: Mapping[str, str] = field(default_factory=dict)
     angles: Literal["none", "rot", "laser"] = "none"
     seat: float | None = None
     lifted: Literal["axis", "radius", "lidar"] = "axis"
@@ -91,14 +100,3 @@ class PartSpec:
         """Of its material."""
         densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
         return densities[self.process]
-
-
-def shapes(what: str, *fields: str) -> dict[str, str]:
-    """Entries of `PartSpec.shaped_by` with the same words."""
-    return dict.fromkeys(fields, what)
-
-
-def on_servo_front(name: str) -> dict[str, str]:
-    """Entries of what stands on the servo's front, where the servo stands on the axis."""
-    both = shapes(f"{name} and {BASE_MOUNT}", "servo.case_max_mm", "servo.case_screw")
-    return both | shapes(name, "servo.horn_thickness_mm", "servo.case_holes_mm", "servo.case_holes_z_mm")

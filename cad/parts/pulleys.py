@@ -24,7 +24,7 @@ from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, RIM, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet, no_wider
 from cad.layout.joints import horn_centres, screws
 from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
-from cad.parts.part_spec import HORN, PartSpec, Step, shapes
+from cad.parts.part_spec import HORN, PartSpec, Step
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from cad.solids import building, checked
 from design.catalogue.products import Servo
@@ -66,8 +66,7 @@ def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         make=partial(shaft_pulley, pulley_of(scanner, stack)),
         step=Step("Pulley and belt on the shaft", words),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
-        shaped_by=shapes("the rims of the pulleys", "belt.thickness_mm")
-        | shapes("the teeth of the pulleys", "belt.groove_radius_mm"),
+        shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
     )
 
 
@@ -89,7 +88,7 @@ def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         make=partial(drive_pulley, pulley_of(scanner, stack)),
         step=Step("Drive pulley, and the servo beside the shaft", words),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
-        shaped_by=shapes(DRIVE_PULLEY, *HORN, "servo.horn_thickness_mm"),
+        shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, pulley_of(scanner, stack)),
     )
 

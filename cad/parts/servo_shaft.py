@@ -18,8 +18,8 @@ from cad import outlines, solids
 from cad.layout.direct.stack import WAIST, DirectStack
 from cad.layout.fits import OnSheet, turned_spigot
 from cad.layout.joints import horn_centres, screws
-from cad.layout.names import SERVO_HORN, SERVO_SHAFT, SLIP_RING_ADAPTER
-from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step, shapes
+from cad.layout.names import SERVO_HORN, SERVO_SHAFT
+from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
 from cad.screws import SCREWS, passing_hole
 from cad.solids import building, checked
 from design.catalogue.products import Servo
@@ -57,8 +57,7 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
         material=TURNED_FROM if turned else "",
         why_metal=f"{stack.shaft_diameter:g} mm is too thin to print (0.9 deg of bending with the axis horizontal)",
         sheet=OnSheet(fits),
-        shaped_by=shapes(SERVO_SHAFT, *HORN, "slip_ring.bore_mm")
-        | shapes(f"{SERVO_SHAFT} and {SLIP_RING_ADAPTER}", "servo.horn_diameter_mm", "slip_ring.length_mm"),
+        shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
     )
 
 

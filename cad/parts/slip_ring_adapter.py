@@ -22,10 +22,11 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import screws
 from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
 from cad.parts.bearing_cage import cage_base
-from cad.parts.part_spec import PartSpec, Step, on_servo_front, shapes
+from cad.parts.part_spec import ON_CASE, PartSpec, Step
 from cad.solids import building, checked
 from design.scanner import Scanner
 
+RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
 PLATE = 6.0
 PLAY = 0.25  # between arm and stator, on the radius
 ARM = 5.0
@@ -45,7 +46,7 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         turns=False,
         make=partial(slip_ring_adapter, adapter_of(scanner, stack)),
         step=Step("Adapter on the servo", f"{how} {screws(SERVO_CASE)}"),
-        shaped_by=on_servo_front(SLIP_RING_ADAPTER) | shapes(SLIP_RING_ADAPTER, "slip_ring.outer_diameter_mm"),
+        shaped_by=(*ON_CASE, *RING),
     )
 
 
