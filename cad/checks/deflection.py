@@ -21,10 +21,8 @@ from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import TriMesh
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from cad.layout.layout import Layout
 from cad.layout.loads import ALUMINIUM_PA, FAR_MM, noise_deg
 from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.parts.servo_shaft import shaft_is_turned
 from cad.statics.sag import Sag, linkage_sag, with_shaft
 from cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
 from design.arrays import Array
@@ -80,16 +78,17 @@ def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial],
     seat = np.array([linkage.half_x, linkage.half_y, linkage.seat])
     printed = [meshes[name] for name in assembly.carriers()]
     sag = linkage_sag(stack, printed, seat, bodies["laser"], 1000 * printer.modulus_gpa, printer.density_g_cm3)
-    return with_shaft(sag, bend_of(layout), stack, rotor_of(scanner, bodies))
+    return with_shaft(sag, bend_of(assembly), stack, rotor_of(scanner, bodies))
 
 
-def bend_of(layout: Layout) -> ShaftBend:
+def bend_of(assembly: Assembly) -> ShaftBend:
     """How far the shaft gives way at the hub."""
+    layout = assembly.layout
     stack, scanner = layout.stack, layout.scanner
     if isinstance(stack, BeltStack):
         return belt_shaft_bend(stack)
     cage = cage_of(scanner, stack)
-    modulus = ALUMINIUM_PA if shaft_is_turned(stack) else 1e9 * scanner.printer.modulus_gpa
+    modulus = ALUMINIUM_PA if assembly.parts[layout.drive.shaft].metal else 1e9 * scanner.printer.modulus_gpa
     return shaft_bend(stack, modulus, 0.0 if cage is None else stiffness_n_per_m(cage))
 
 

@@ -41,7 +41,7 @@ class ServoShaft:
 
 def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
     """The shaft of one scanner."""
-    turned = shaft_is_turned(stack)
+    turned = stack.shaft_diameter < SHAFT_PRINTABLE
     fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),) if turned else ()
     words = (
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
@@ -59,11 +59,6 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
         sheet=OnSheet(fits),
         shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
     )
-
-
-def shaft_is_turned(stack: DirectStack) -> bool:
-    """Whether the shaft is too thin to be printed."""
-    return stack.shaft_diameter < SHAFT_PRINTABLE
 
 
 def shaft_of(scanner: Scanner, stack: DirectStack) -> ServoShaft:

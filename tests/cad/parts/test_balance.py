@@ -172,7 +172,7 @@ def test_a_sweep_that_gravity_holds_on_one_flank_needs_none():
 
 def test_an_ear_over_the_index_mark_carries_it():
     scanner = scanner_for(0, 90, -80, 0)  # wires and ear at +y
-    assembly = make_parts(scanner, lambda name: name == "alignment_linkage")
+    assembly = make_parts(scanner, lambda spec: spec.name == "alignment_linkage")
     ear = assembly.layout.counterweight.ear
     assert math.degrees(ear.azimuth) == pytest.approx(90)
     part = meshes(assembly, ["alignment_linkage"])["alignment_linkage"]

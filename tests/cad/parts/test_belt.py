@@ -27,9 +27,10 @@ from cad.layout.belt.sizing import QUARTERS, belt_stack
 from cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
 from cad.layout.belt.tower import tower_of
 from cad.layout.direct.stack import DirectStack
-from cad.layout.layout import config_hash, drive_of, mount_offset_mm
+from cad.layout.layout import config_hash, drive_of, layout_of, mount_offset_mm
 from cad.layout.loads import Weight
 from cad.outlines import polygon
+from cad.parts.all_parts import parts_of
 from cad.parts.bearing_tower import bearing_tower
 from cad.screws import SCREWS
 from cad.solids import prism, upright
@@ -438,11 +439,11 @@ def test_what_else_cannot_be_built_is_refused():
         mount_offset_mm(scanner_for(alpha=120, beta=0))
     wide = Servo.model_validate(scanner.servo.model_dump() | {"horn_circle_mm": 46.0})
     with pytest.raises(BuildError, match=r"drive_pulley: heads: horn_circle_mm = 46: .*teeth of a pulley of 80"):
-        drive_of(replace(scanner, servo=wide)).made()
+        parts_of(layout_of(replace(scanner, servo=wide)))
     holes = ((9.0, 0.0), (-9.0, 0.0), (9.0, -3.0), (-9.0, -3.0))
     bare = Servo.model_validate(scanner.servo.model_dump() | {"case_holes_mm": holes})
     with pytest.raises(BuildError, match=r"drive_plate: ears: case_holes_mm"):
-        drive_of(replace(scanner, servo=bare)).made()
+        parts_of(layout_of(replace(scanner, servo=bare)))
 
 
 @pytest.mark.parametrize(
@@ -468,7 +469,7 @@ def test_a_ring_with_a_bore_keeps_its_digest():
 def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     """ISO 4032: M4 is 7.0 across and 3.2 high, M3 5.5 and 2.4; the play is the sliding fit of 0.2."""
     scanner = replace(scanner_for(), printer=load_catalogue().products["fdm-0.4-nut"])
-    assembly = make_parts(scanner, lambda name: name in ("bearing_tower", "drive_plate", "base_mount"))
+    assembly = make_parts(scanner, lambda spec: spec.name in ("bearing_tower", "drive_plate", "base_mount"))
     tower, stack = assembly.made["bearing_tower"], assembly.layout.stack
 
     def nut(across, height, at, turn_deg):
