@@ -7,7 +7,7 @@ linter takes it for the name of a type.
 
 from __future__ import annotations
 
-from jaxtyping import Bool, Float, Float32, Float64, Int64, UInt8
+from jaxtyping import Bool, Float, Float32, Float64, Int64, Num, UInt8
 from numpy import ndarray
 
 Array = Float[ndarray, "..."]
@@ -21,6 +21,9 @@ Mask = Bool[ndarray, "..."]
 
 Times = Int64[ndarray, "..."]
 """Nanoseconds."""
+
+Counts = Num[ndarray, "..."]
+"""Of beams: whole numbers, or means of them."""
 
 Vector = Float[ndarray, " 3"]
 Rotation = Float[ndarray, "3 3"]

@@ -91,7 +91,7 @@ class Sweep(Record):
         lower, upper = self.limits_deg
         cruising = lower + v * (t - ramp / 2)
         degrees = np.where(t < ramp, lower + a * t * t / 2, cruising)
-        return np.radians(np.where(t > half - ramp, upper - a * (half - t) ** 2 / 2, degrees))
+        return np.asarray(np.radians(np.where(t > half - ramp, upper - a * (half - t) ** 2 / 2, degrees)))
 
     def time_s(self, angle_rad: ArrayLike) -> Array:
         """Time at which the way out passes joint angles; those outside the limits count as the nearer limit."""

@@ -114,7 +114,7 @@ class JointLog:
     """
 
     time_ns: Int64[ndarray, " n"]
-    position_rad: Float64[ndarray, " n"]
+    position_rad: Float64[ndarray, " m"]  # as many as times, or `__post_init__` says so
 
     def __post_init__(self) -> None:
         if self.time_ns.shape != self.position_rad.shape or self.time_ns.ndim != 1 or not self.time_ns.size:

@@ -1,15 +1,43 @@
 """What several test files share."""
 
+import inspect
 import os
 import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
+import numba
 import pytest
+from beartype import beartype
 from hypothesis import settings
+from jaxtyping import AbstractArray, install_import_hook
 
-from scanwright.cli.app import run as scanwright_command
+
+def check_arrays(function):
+    """The function, its arrays checked wherever it is called; what else it takes may be a stand-in of a test."""
+    hints = function.__annotations__
+    function.__annotations__ = {name: hint for name, hint in hints.items() if _has_array(hint)}
+    return beartype(function) if function.__annotations__ else function
+
+
+def _has_array(hint):
+    return (isinstance(hint, type) and issubclass(hint, AbstractArray)) or any(map(_has_array, get_args(hint)))
+
+
+njit = numba.njit
+
+
+def compile_as_written(*given, **options):
+    """`numba.njit` of the function itself: the check around it cannot be compiled."""
+    if given and inspect.isfunction(given[0]):
+        return njit(inspect.unwrap(given[0]), *given[1:], **options)
+    return lambda function: njit(*given, **options)(inspect.unwrap(function))
+
+
+numba.njit = compile_as_written
+install_import_hook(["design", "firmware_io"], f"{__name__}.check_arrays")
 
 # CI judges the change, not the dice, and shares its cores; at a developer's desk every run draws new examples
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -82,6 +110,8 @@ def cheapest_task() -> str:
 @pytest.fixture
 def command(monkeypatch, capsys):
     """Run a command as its user would: exit code, what it printed, and the lines of complaint (progress left out)."""
+
+    from scanwright.cli.app import run as scanwright_command
 
     def run(*words):
         monkeypatch.setattr(sys, "argv", ["scanwright", *map(str, words)])

@@ -55,7 +55,7 @@ def parts(glb: Path, png: Path) -> None:
 
 def room(data: Path, folder: Path) -> None:
     """The cloud of the real recording, as commands draw it."""
-    from firmware_io.clouds.picture import cloud_picture
+    from benchmarks.firmware_io.cloud_picture import cloud_picture
 
     recording, cloud = folder / "room.mcap", folder / "room.ply"
     bag = data / "tilting/room_240.bag"

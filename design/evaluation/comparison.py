@@ -30,7 +30,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.angles import STANDARD_DEG
-from design.arrays import Array, Setting
+from design.arrays import Array, Counts, Setting
 from design.catalogue.products import Multibeam, SlipRing
 from design.density.ball_count import ball_count
 from design.density.beams import ScanLines
@@ -163,7 +163,7 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     """J, J_error, blind share of the sphere and of the weight, by ball search: for azimuths that are no full turn."""
     scans = [multibeam_scan(product, (i + 0.5) / PHASES) for i in range(PHASES)]
 
-    def counts(directions: Array) -> Array:
+    def counts(directions: Array) -> Counts:
         return np.stack([ball_count(scan, directions, problem.ball_rad) for scan in scans])
 
     uppers, lowers, blind = [], [], []

@@ -14,10 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Num
-from numpy import ndarray
 
-from design.arrays import Array
+from design.arrays import Array, Counts
 from design.errors import TaskError
 from design.sphere.regions import MAP, Field, Layers, field_of
 from design.task.shapes import Region
@@ -38,7 +36,7 @@ class Moment:
     """
 
     field: Field
-    g: Callable[[Array], Array]
+    g: Callable[[Counts], Array]
     gathered: Literal["mean", "highest"] = "mean"
     share: float = 1.0
 
@@ -53,7 +51,7 @@ class Objective:
     join: Callable[[Array], Array]
 
 
-def log_density(counts: Num[ndarray, ...]) -> Array:
+def log_density(counts: Counts) -> Array:
     """`g(d) = -ln(1 + d)`: rewards every direction's first beams most (the paper's logarithm, with its sign)."""
     return -np.log1p(counts)
 
@@ -131,14 +129,14 @@ def worst(field: Field) -> Objective:
 
 
 def _first(moments: Array) -> Array:
-    return moments[0]
+    return np.asarray(moments[0])
 
 
-def _itself(counts: Array) -> Array:
+def _itself(counts: Counts) -> Array:
     return np.asarray(counts, dtype=float)
 
 
-def _one_more(counts: Array) -> Array:
+def _one_more(counts: Counts) -> Array:
     return 1.0 + counts
 
 
@@ -147,7 +145,7 @@ def _asking(level: float, otherwise: float | None) -> Callable[[Region], float]:
     return lambda region: region.value if (region.required or otherwise) == level else 0.0
 
 
-def _shortfall(level: float) -> Callable[[Array], Array]:
+def _shortfall(level: float) -> Callable[[Counts], Array]:
     return lambda counts: np.maximum(0.0, 1.0 - counts / level)
 
 

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array
+from design.arrays import Array, Ints
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
 from design.density.spin import mean_count, zones
@@ -58,7 +58,7 @@ class Landscape:
     g: Array
     weights: tuple[Array, ...]
     by_plane: Array
-    its_axis: tuple[Array, Array]
+    its_axis: tuple[Ints, Ints]
     by_axis: Array
 
     def about_axes(self, plane: int) -> Float[ndarray, "ways axes"]:
@@ -122,7 +122,7 @@ def coarse_landscape(problem: Problem, planes: Folded, axes: Folded, progress: P
     return Landscape(problem.objective, g, weights, by_plane, (its_class, its_flip), by_axis), int(exact.sum())
 
 
-def _batches(order: Array) -> list[Array]:
+def _batches(order: Ints) -> list[Ints]:
     """The first one alone, as it sets the mark for all others; then `BATCH` at a time."""
     return [order[:1], *(order[i : i + BATCH] for i in range(1, len(order), BATCH))]
 

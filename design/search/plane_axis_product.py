@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Mask
+from design.arrays import Array, Ints, Mask
 from design.concurrency.parallel import in_chunks
 from design.objective.named_objectives import Moment, Objective
 
@@ -19,14 +19,14 @@ BothWays = Callable[[slice], tuple[Array, Array]]
 """A moment of a piece of planes about all axes, (planes, axes): straight, and with the planes turned round."""
 
 
-def gathered(moment: Moment, weights: Float[ndarray, "... axes nodes"], g: Float[ndarray, "planes nodes"]) -> Array:
+def gathered(moment: Moment, weights: Float[ndarray, "... axes nodes"], g: Float[ndarray, " nodes"]) -> Array:
     """A moment of one plane about each axis, from its g over the nodes, shape (axes,)."""
     return weights @ g if moment.gathered == "mean" else np.where(weights > 0, g, -np.inf).max(axis=1)
 
 
 def lowest(
     objective: Objective, ways: list[BothWays], has_plane: Mask, has_axis: Mask
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Ints, Ints, Array]:
     """Lowest J of every plane (with the axis it is about) and about every axis, for the flips that the grid holds.
 
     Args:
@@ -42,8 +42,8 @@ def lowest(
     closed_axis = np.where(has_axis, 0, np.inf).astype(np.float32)
     closed_plane = np.where(has_plane, 0, np.inf).astype(np.float32)
     by_plane = np.empty((2, planes), np.float32)
-    its_class: Array = np.empty((2, planes), np.intp)
-    its_flip: Array = np.empty((2, planes), np.intp)
+    its_class: Ints = np.empty((2, planes), np.intp)
+    its_flip: Ints = np.empty((2, planes), np.intp)
     by_axis = np.full((2, axes), np.inf, np.float32)
     for first in range(0, planes, PIECE):
         piece = slice(first, min(first + PIECE, planes))
@@ -61,7 +61,9 @@ def lowest(
     return by_plane.astype(float), its_class, its_flip, by_axis.astype(float)
 
 
-def _in_parts(straight: Array, turned: Array, closed_plane: Array, closed_axis: Array) -> list[tuple[Array, ...]]:
+def _in_parts(
+    straight: Array, turned: Array, closed_plane: Array, closed_axis: Array
+) -> list[tuple[Array, Ints, Ints, Array]]:
     """`_lowest_of` the axes in parts, on all cores."""
     return in_chunks(
         lambda chunk: _lowest_of(straight[:, chunk], turned[:, chunk], closed_plane, closed_axis[:, chunk]),

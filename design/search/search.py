@@ -44,7 +44,7 @@ class SearchResult:
     evaluated: int
     seconds: float
     left_out: tuple[LeftOut, ...]
-    planes: Float[ndarray, "planes 5"]
+    planes: Float[ndarray, "planes columns"]
     axes: Float[ndarray, "axes 3"]
 
 

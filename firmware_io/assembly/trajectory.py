@@ -152,7 +152,7 @@ def at_rest(T_world_rot: Pose) -> PosePieces:
     )
 
 
-def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, " n"], Float64[ndarray, "n 3"]]:
+def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"], Float64[ndarray, " k"]]:
     """Axis (z where there is none) and angle [rad] from each orientation to the next, the short way round."""
     v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
     vector = w0 * v1 - w1 * v0 - np.cross(v0, v1)

@@ -58,7 +58,7 @@ class Start:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
     T_level_view: Pose
-    points_m: Float64[ndarray, "n 3"]
+    points_m: Float64[ndarray, "n 2"]
     arrows: Complexes
     floors: Floats
 

@@ -15,21 +15,6 @@ from firmware_io.lidar.scip.protocol import Integers, Window
 
 StampAt = Literal["step_0", "rear"]
 
-# SCIP 2.0, p. 12, by the beginning of the model's name; other models share the last list.
-ERROR_CODES: dict[str, dict[int, str]] = {
-    "URG-04LX": {
-        0: "nothing within 22 m",
-        **dict.fromkeys(range(1, 6), "too little light came back"),
-        7: "neighbours in error",
-        8: "light differs from the last scan",
-        9: "in error in the last two scans",
-        18: "strong reflector",
-        19: "not measurable",
-    },
-    "UTM-30LX": {1: "nothing in range", 2: "too near", 3: "interference", 4: "near end of range"},
-    "": {1: "nothing in range", 65533: "no return", 65534: "no return", 65535: "nothing in range"},
-}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
@@ -110,12 +95,6 @@ def parameters(told: Mapping[str, str]) -> Parameters:
     if not (ordered and known.rpm > 0 and 0 <= known.range_min_mm < known.range_max_mm):
         raise ProtocolError(f"PP: the values contradict each other: {dict(told)}")
     return known
-
-
-def code_meaning(model: str, code: int) -> str:
-    """What an error code means, in words."""
-    codes = next(table for start, table in ERROR_CODES.items() if model.startswith(start))
-    return codes.get(code, "other error")
 
 
 def ranges_m(value: Integers, of: Parameters, characters: int = 3) -> tuple[Float32s, dict[int, int]]:

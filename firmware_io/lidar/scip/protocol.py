@@ -173,11 +173,6 @@ def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:
     return f"M{window.letter}{_steps(window)}{skip}{count:02d}".encode()
 
 
-def snapshot(window: Window) -> bytes:
-    """The request (without LF) for the latest scan."""
-    return f"G{window.letter}{_steps(window)}".encode()
-
-
 def reply(echo: bytes, status: str, lines: Sequence[bytes] = ()) -> bytes:
     """The bytes of a reply whose lines are complete."""
     return b"\n".join([echo, summed(status.encode()), *lines, b"", b""])

@@ -173,8 +173,14 @@ def test_eliminating_planes_and_bulges_is_one_dense_least_squares(seed, bulge):
 
 def test_what_is_not_known_at_all_is_infinite_and_the_rest_is_not():
     part = replace(
-        reduced(np.zeros((3, WIDTH, WIDTH)), Grouping(np.zeros(3, int), np.zeros(3, int), np.ones((1, 3))), [0], 0.0),
+        reduced(
+            np.zeros((3, WIDTH, WIDTH)),
+            Grouping(np.zeros(3, int), np.zeros(3, int), np.ones((1, 3))),
+            np.array([0]),
+            0.0,
+        ),
         information=np.array([[4.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]]),
+        right=np.zeros(3),
     )
     np.testing.assert_allclose(np.diag(covariance(part)), [0.25, np.inf, np.inf])
 

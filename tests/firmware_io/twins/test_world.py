@@ -82,7 +82,7 @@ def test_each_beam_is_cast_at_the_angle_of_its_own_time(room):
 
 
 def hits_at(range_m, incidence_deg=0.0, count=100_000):
-    return Hits(np.full(count, range_m), np.full(count, np.radians(incidence_deg)), np.zeros(count, np.int32))
+    return Hits(np.full(count, float(range_m)), np.full(count, np.radians(incidence_deg)), np.zeros(count, np.int32))
 
 
 def test_noise_has_the_spread_that_was_set_and_no_bias():
