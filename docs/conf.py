@@ -8,6 +8,7 @@ page) and there is no such thing, the build fails.
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
@@ -111,6 +112,8 @@ def _indent(line: str) -> int:
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    for heavy in ("cadquery", "matplotlib.figure", "numba", "scipy.spatial"):
+        import_module(heavy)  # once: Sphinx forks its readers
     app.connect("source-read", name_rooms)
     app.connect("builder-inited", describe_commands)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
