@@ -8,6 +8,7 @@ page) and there is no such thing, the build fails.
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
@@ -38,6 +39,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Floats", "Mask", "Say", "Times")}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 
@@ -46,6 +48,7 @@ apidoc_modules = [
         "path": f"../{package}",
         "destination": f"reference/{package}",
         "max_depth": 1,
+        "module_first": True,
         "automodule_options": {"members", "undoc-members"},
     }
     for package in PACKAGES
@@ -60,13 +63,20 @@ def describe_commands(app: Any) -> None:
 
     page = ["# Commands", "", "`scanwright COMMAND --help` says the same.", ""]
     for name, command in sorted(get_command(commands).commands.items()):  # type: ignore[attr-defined]
-        page += [f"## {name}", "", str(command.help).replace("\b", ""), ""]
+        page += [f"## {name}", "", str(command.help).replace("<", "&lt;"), ""]
         for parameter in command.params:
             written = ", ".join(parameter.opts) if parameter.param_type_name == "option" else parameter.metavar
             page += [f"`{written}`", f": {parameter.help or 'value'}", ""]
     folder = Path(app.srcdir) / "reference/cli"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "commands.md").write_text("\n".join(page))
+
+
+def name_rooms(_app: Any, page: str, source: list[str]) -> None:
+    """A room is called by its name, not "package"; its modules follow without a heading over them."""
+    if page.startswith("reference/"):
+        text = re.sub(r"^(Subpackages|Submodules)\n-+\n", "", source[0], flags=re.MULTILINE)
+        source[0] = re.sub(r"^(\S+) (package|module)\n(=+|-+)$", r"\1\n\3", text, flags=re.MULTILINE)
 
 
 def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
@@ -102,6 +112,9 @@ def _indent(line: str) -> int:
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    for heavy in ("cadquery", "matplotlib.figure", "numba", "scipy.spatial"):
+        import_module(heavy)  # once: Sphinx forks its readers
+    app.connect("source-read", name_rooms)
     app.connect("builder-inited", describe_commands)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
     app.connect("missing-reference", points_nowhere)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from firmware_io.servo.dynamixel.driver import DynamixelServo
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
-"""A task: loaded, the name of a shipped one, a file, or a table with the keys of a task file."""
+"""A loaded task, the name of a shipped one, a file, or a table with the keys of a task file."""
 AnglesLike = AngleSet | str | Path
 """An angle set, or the file of one."""
 Say = Callable[[str], None]
