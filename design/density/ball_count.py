@@ -1,4 +1,4 @@
-"""Exact ball counts of any set of beams: what `density.ball_search` counts, through a grid on the sphere.
+"""Exact ball counts of any set of beams: what `design.objective.ball_search` counts, through a grid on the sphere.
 
 Beams are sorted into rows of the polar angle and, within a row, by azimuth cell. The beams that can lie in a ball are
 then one or two unbroken stretches of memory per row, and each is tested.
