@@ -52,6 +52,8 @@ def main() -> None:
     if given.command == "costs":
         measure_costs(given.folder, given.every)
     elif given.command == "kills":
+        if "scheduler" in given.what and not given.dask:
+            parser.error("there is no scheduler to kill without --dask")
         sys.exit(0 if kills(given.what, given.each, given.units, given.seconds, given.seed, 2 * given.dask) else 1)
     elif given.command == "efficiency":
         efficiency(given.units, given.seconds)
