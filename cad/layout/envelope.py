@@ -20,7 +20,7 @@ from design.scanner import Scanner
 
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
-SUB_PLATE_THICKNESS = 4.0  # thickness
+SUB_PLATE_THICKNESS = 4.0
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0
 EAR_SCREW = SCREWS["M3"]
