@@ -205,7 +205,7 @@ class HornMotion:
         with self._lock:
             return self._drives[self._index((time_ns - self._origin_ns) / 1e9)][1]
 
-    def angle_rad(self, time_ns: Int64[ndarray, " n"]) -> Float64[ndarray, " n"]:
+    def angle_rad(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
         """True angle of the horn at given times, in the shape given.
 
         Raises:
