@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float, Float64
 from numpy import ndarray
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from design import frames
 from design.arrays import Pose
@@ -110,11 +109,15 @@ def told(cloud: Cloud, lines: Iterable[str]) -> Cloud:
 
 def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
     """Position and quaternion: x y z qx qy qz qw."""
+    from scipy.spatial.transform import Rotation
+
     return np.concatenate([T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)])
 
 
 def pose_matrix(numbers: Iterable[float]) -> Pose:
     """Inverse of `pose_numbers`; the quaternion may have any length but zero."""
+    from scipy.spatial.transform import Rotation
+
     x, y, z, *quaternion = numbers
     return frames.rigid(Rotation.from_quat(quaternion).as_matrix(), [x, y, z])
 

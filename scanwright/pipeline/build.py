@@ -9,9 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cad.files.part_files import build_parts, write_files
 from cad.kernel import require_kernel
-from cad.layout.layout import mount_offset_mm
 from design.angles import standard_settings
 from design.concurrency.second_process import second_process
 from design.task.task import LoadedTask, load_task
@@ -106,6 +104,8 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
 
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
+    from cad.files.part_files import build_parts, write_files
+    from cad.layout.layout import mount_offset_mm
     from design.evaluation.density_picture import density_picture
     from design.search.optimum import angle_set, find_optimum
     from design.search.with_parts import choose_with_parts

@@ -19,7 +19,6 @@ NEEDS = {  # a file that is not there would be named first, if anything were loo
         "OCP",
         "accuracy --choices needs the CAD kernel: pip install 'scanwright[cad]'",
     ),
-    ("study", "no_such_study"): ("distributed", "study needs Dask: pip install 'scanwright[cluster]'"),
     ("studio", "no_such_task"): ("viser", "studio needs a page server: pip install 'scanwright[pages]'"),
     ("scan", "no_such", "--live"): ("websockets", "scan --live needs a page server: pip install 'scanwright[pages]'"),
     ("convert", "no_such.ply", "b.las"): ("laspy", "b.las: .las needs laspy: pip install 'scanwright[clouds]'"),
