@@ -1,53 +1,28 @@
 """What several test files share."""
 
-import inspect
 import os
 import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
-from typing import get_args
 
-import numba
 import pytest
-from beartype import beartype
 from hypothesis import settings
-from jaxtyping import AbstractArray, install_import_hook
 
+sys.path.insert(0, str(Path(__file__).parent / "house"))
+import checked_arrays
 
-def check_arrays(function):
-    """The function, its arrays checked wherever it is called; what else it takes may be a stand-in of a test."""
-    hints = function.__annotations__
-    function.__annotations__ = {name: hint for name, hint in hints.items() if _has_array(hint)}
-    return beartype(function) if function.__annotations__ else function
-
-
-def _has_array(hint):
-    return (isinstance(hint, type) and issubclass(hint, AbstractArray)) or any(map(_has_array, get_args(hint)))
-
-
-njit = numba.njit
-
-
-def compile_as_written(*given, **options):
-    """`numba.njit` of the function itself: the check around it cannot be compiled."""
-    if given and inspect.isfunction(given[0]):
-        return njit(inspect.unwrap(given[0]), *given[1:], **options)
-    return lambda function: njit(*given, **options)(inspect.unwrap(function))
-
-
-numba.njit = compile_as_written
-# not in the rooms whose threads answer devices in real time: a check takes longer there than what it looks at
-NUMERICAL = [
-    *(f"design.{room}" for room in ("density", "evaluation", "frames", "objective", "search", "shadow", "sphere")),
-    *(f"firmware_io.{room}" for room in ("assembly", "calibration", "clouds", "colour", "registration")),
-]
-install_import_hook(NUMERICAL, f"{__name__}.check_arrays")
+checked_arrays.install()
 
 # CI judges the change, not the dice, and shares its cores; at a developer's desk every run draws new examples
 settings.register_profile("ci", derandomize=True, deadline=None)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+
+@pytest.fixture(autouse=True)
+def _arrays_are_checked_anew():
+    checked_arrays.begin()
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Array
+from design.arrays import Array, Ints
 
 Nearest: TypeAlias = Callable[[Array, Array], tuple[NDArray[np.int32], Array]]
 """Origins and unit directions, both (n, 3), to the row of the triangle that each ray hits first and its range, both
@@ -98,7 +98,7 @@ def by_boxes(triangles: Array) -> Nearest:
     return nearest
 
 
-def _meeting(tree: Any, low: Array, high: Array) -> tuple[Array, Array]:
+def _meeting(tree: Any, low: Array, high: Array) -> tuple[Ints, Ints]:
     """Triangles whose box meets each box, one after the other, and how many each box meets."""
     if int(np.__version__.split(".")[0]) > 1:
         triangle, count = tree.intersection_v(low, high)
