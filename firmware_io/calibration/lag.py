@@ -156,10 +156,10 @@ def _monotone(falling: Floats) -> int:
 
 
 def _differences(
-    joint_rad: Float64[ndarray, " scans"],
+    joint_rad: Float64[ndarray, "scans beams"],
     range_m: Float64[ndarray, "scans beams"],
-    there: Bool[ndarray, " scans"],
-    back: Bool[ndarray, " scans"],
+    there: Bool[ndarray, "scans beams"],
+    back: Bool[ndarray, "scans beams"],
 ) -> tuple[Floats, Floats]:
     """Of two range images (beams x angle cells): sum of each beam's capped differences, and how many there are."""
     if not (there.any() and back.any()):
