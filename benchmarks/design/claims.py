@@ -3,8 +3,9 @@
     uv run python -m benchmarks.design.claims [errors] [optima] [--pairs 300] [--draws 100000] [--tasks NAME...]
         [--seed 1]
 
-Errors: random tasks at random settings, against the reference of `design.accuracy.methods`, which shares no
-quadrature with the program. That reference is for turning scanners and objectives of one mean, `log` and `required`.
+Errors: random tasks at random settings (bands, cones, fine maps, masks of meshes, scenes; regions down to a thousandth
+of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against `benchmarks.design.reference`, which
+shares no code with the program.
 Optima: settings drawn at random from the ranges of each shipped task, and scipy's `differential_evolution`. All are
 looked at roughly, the best of them with all nodes.
 """
@@ -19,12 +20,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from design.accuracy.methods import Reference, reference
+from benchmarks.design.reference import Counted, counted_J
 from design.arrays import Array
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, quick_J, score
+from design.scene.surface import Surface, cell_directions
 from design.search.families import EQUAL, Family
 from design.search.search import search
 from design.task.task import NAMES, AngleRanges, LoadedTask, Task, load_task, shipped_tasks
@@ -32,7 +34,10 @@ from design.task.task import NAMES, AngleRanges, LoadedTask, Task, load_task, sh
 MOST_ERROR = 1e-3  # that a score may state at the default
 SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")
 PERIODS_S = 1.0, 60.0
-BALLS_DEG = 0.5, 10.0
+BALLS_DEG = 0.3, 15.0
+OBJECTIVES = {"log": 0.5, "required": 0.15, "kl": 0.1, "homogeneity": 0.15, "worst": 0.1}
+FIELDS = {"painted": 0.5, "tiny": 0.15, "map": 0.15, "mesh mask": 0.1, "scene": 0.1}
+MOTIONS = {"spin": 0.7, "sweep": 0.15, "stop_and_go": 0.15}
 LOOKS = ((120, 1000), (1215, 30))  # quadrature nodes, and how many of the settings are looked at again
 GENERATIONS = 40
 
@@ -44,7 +49,7 @@ class Claim:
     task: dict[str, Any]
     angles_deg: tuple[float, ...]
     score: Score
-    truth: Reference
+    truth: Counted
 
     @property
     def off(self) -> float:
@@ -81,38 +86,56 @@ class Contest:
 def random_claim(rng: np.random.Generator, largest_ball_deg: float = BALLS_DEG[1]) -> Claim:
     """A task out of the blue, one of its settings, and what the program says of it."""
     while True:
-        table = random_task(rng, largest_ball_deg)
+        loaded = random_task(rng, largest_ball_deg)
+        low, high = np.array([AngleRanges().limits(name) for name in NAMES]).T
+        angles_deg = rng.uniform(low, high)
+        if rng.random() < 0.3:  # where edges, poles and lines meet
+            angles_deg = np.clip(np.round(angles_deg / 15) * 15, low, high)
+        angles = np.radians(angles_deg)
         try:
-            problem = problem_of(LoadedTask(Task.model_validate(table), Path(), load_catalogue(), ()))
-            break
+            found = score(problem_of(loaded), angles)
         except TaskError:  # the mask hides the whole region
             continue
-    low, high = np.array([AngleRanges().limits(name) for name in NAMES]).T
-    angles_deg = rng.uniform(low, high)
-    if rng.random() < 0.3:  # where edges, poles and lines meet
-        angles_deg = np.clip(np.round(angles_deg / 15) * 15, low, high)
-    angles = np.radians(angles_deg)
-    return Claim(table, tuple(angles_deg.tolist()), score(problem, angles), reference(problem, angles))
+        if np.isfinite(found.J):
+            truth = counted_J(loaded, angles, int(rng.integers(1 << 30)))
+            return Claim(loaded.task.model_dump(mode="json"), tuple(angles_deg.tolist()), found, truth)
 
 
-def random_task(rng: np.random.Generator, largest_ball_deg: float) -> dict[str, Any]:
-    """A task with one to three regions, and a mask in every other one."""
+def random_task(rng: np.random.Generator, largest_ball_deg: float) -> LoadedTask:
+    """A task of any kind, with one to three regions, and a mask in every other one."""
+    motion, field, objective = (_drawn(rng, kinds) for kinds in (MOTIONS, FIELDS, OBJECTIVES))
     density: dict[str, Any] = {"ball_radius_deg": _log_uniform(rng, BALLS_DEG[0], largest_ball_deg)}
-    if rng.random() < 0.2:
-        density |= {"objective": "required", "required": _log_uniform(rng, 1.0, 300.0)}
-    period_s = _log_uniform(rng, *PERIODS_S)
-    if rng.random() < 0.5:  # a turn of whole lines, as most people take
-        period_s = float(round(period_s))
-    return {
+    density |= {"objective": objective}
+    if objective == "required":
+        density |= {"required": _log_uniform(rng, 1.0, 300.0)}
+    smallest = 1e-3 if field == "tiny" else 3.0
+    weight = [_region(rng, smallest) | {"value": rng.uniform(0.1, 1)} for _ in range(rng.integers(1, 4))]
+    mask = [_region(rng, 3.0, largest=0.3)] if rng.random() < 0.5 else []
+    maps, surface = [], None
+    if field == "map":
+        weight = [*weight[1:], {"shape": "map", "file": "drawn.npy", "value": 1.0}]
+        maps = [_table(rng)]
+    elif field == "mesh mask":
+        mask = [{"shape": "map", "file": "cast.npy"}]
+        maps = [(_table(rng) > 1.0).astype(float)]
+    elif field == "scene":
+        surface = _room(rng)
+        middle = rng.uniform(-2, 2, 3)
+        size = _log_uniform(rng, 0.5, 4.0)
+        weight += [{"shape": "box", "min_m": (middle - size).tolist(), "max_m": (middle + size).tolist()}]
+    table = {
         "name": "random",
         "sensor": str(rng.choice(SENSORS)),
         "servo": "MX-64R",
         "slip_ring": "UH1256-02-0610-06S",
-        "motion": {"period_s": period_s},
+        "motion": _motion(rng, motion),
         "density": density,
-        "weight": [_region(rng) | {"value": rng.uniform(0.1, 1)} for _ in range(rng.integers(1, 4))],
-        "mask": [_region(rng, largest=0.3)] if rng.random() < 0.5 else [],
+        "weight": weight,
+        "mask": mask,
     }
+    if surface is not None:
+        table |= {"scene": {"file": "room.stl", "sensor_m": [0, 0, 0]}}
+    return LoadedTask(Task.model_validate(table), Path(), load_catalogue(), tuple(maps), surface)
 
 
 def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int, seed: int) -> Contest:
@@ -205,16 +228,57 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
         print(f"  {setting.round(2).tolist()}: J = {rival.J:.6f} +- {rival.J_error:.0e} {name}", flush=True)
 
 
-def _region(rng: np.random.Generator, largest: float = 1.0) -> dict[str, Any]:
+def _drawn(rng: np.random.Generator, kinds: dict[str, float]) -> str:
+    return str(rng.choice(list(kinds), p=list(kinds.values())))
+
+
+def _motion(rng: np.random.Generator, mode: str) -> dict[str, Any]:
+    period_s = _log_uniform(rng, *PERIODS_S)
+    if mode == "sweep":
+        lower, upper = np.sort(rng.uniform(-150, 150, 2)).tolist()
+        return {"mode": mode, "limits_deg": [lower, upper], "period_s": 2.0 + period_s, "accel_deg_s2": 900.0}
+    if mode == "stop_and_go":
+        return {"mode": mode, "stops": int(_log_uniform(rng, 10, 700)), "dwell_s": _log_uniform(rng, 0.03, 0.5)}
+    # a turn of whole lines, as most people take, in every other task
+    return {"period_s": float(round(period_s)) if rng.random() < 0.5 else period_s}
+
+
+def _region(rng: np.random.Generator, smallest_deg: float, largest: float = 1.0) -> dict[str, Any]:
     """A band or a cone, at most a share of all that there is."""
     if rng.random() < 0.5:
-        axis = rng.normal(size=3)
-        return {"shape": "cone", "axis": axis.tolist(), "half_angle_deg": _log_uniform(rng, 3.0, 180 * largest)}
-    theta = np.sort(rng.uniform(0, 180, 2))
-    theta[1] = theta[0] + largest * (theta[1] - theta[0])
-    phi = rng.uniform(-180, 180)
-    width = rng.uniform(5, 360 * largest)
-    return {"shape": "band", "theta_deg": theta.tolist(), "phi_deg": [phi, phi + width]}
+        axis = np.round(rng.normal(size=3), int(rng.integers(0, 3))) + np.array([0.0, 0.0, 1e-3])
+        half = _log_uniform(rng, smallest_deg, 180 * largest)
+        return {"shape": "cone", "axis": axis.tolist(), "half_angle_deg": half}
+    if smallest_deg < 1:
+        theta, phi = rng.uniform(0, 170), rng.uniform(-180, 180)
+        high, wide = (_log_uniform(rng, smallest_deg, 10) for _ in range(2))
+        return {"shape": "band", "theta_deg": [theta, theta + high], "phi_deg": [phi, phi + wide]}
+    low, high = np.sort(rng.uniform(0, 180, 2))
+    phi, width = rng.uniform(-180, 180), rng.uniform(5, 360 * largest)
+    return {"shape": "band", "theta_deg": [low, low + largest * (high - low)], "phi_deg": [phi, phi + width]}
+
+
+def _table(rng: np.random.Generator) -> Array:
+    """Weights of cells: patches of a few cells and of many, zero elsewhere."""
+    rows = int(rng.choice([18, 45, 90, 180, 360]))
+    theta, phi = np.meshgrid(np.arange(rows) + 0.5, np.arange(2 * rows) + 0.5, indexing="ij")
+    table = np.zeros(theta.shape)
+    for _ in range(rng.integers(1, 5)):
+        row, column, size = rng.uniform(0, rows), rng.uniform(0, 2 * rows), _log_uniform(rng, 1.0, rows / 2)
+        away = np.hypot(theta - row, (phi - column + rows) % (2 * rows) - rows)
+        table += rng.uniform(0.5, 2) * (away < size)
+    return table
+
+
+def _room(rng: np.random.Generator) -> Surface:
+    """What the rays would hit in a box about the scanner, in closed form."""
+    low, high = -rng.uniform(0.5, 4, 3), rng.uniform(0.5, 4, 3)
+    d = cell_directions(float(rng.choice([1.0, 2.0])))
+    with np.errstate(divide="ignore"):
+        to_walls = np.where(d > 0, high / d, np.where(d < 0, low / d, np.inf))
+    range_m = to_walls.min(axis=2)
+    facing = np.take_along_axis(np.abs(d), to_walls.argmin(axis=2)[..., None], axis=2)[..., 0]
+    return Surface(d, range_m, np.arccos(facing), range_m[..., None] * d)
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:

@@ -27,9 +27,10 @@ from design.frames import R_world_rot
 from design.motion import Sweep
 from design.objective.named_objectives import log_density
 from design.objective.problem import Problem
-from design.objective.quadrature import breaks_of, polar_rule
+from design.objective.quadrature import polar_rule
 from design.objective.score import quick_J
 from design.sphere.directions import equal_angle_grid
+from design.sphere.polar_rule import breaks_of
 from design.task.task import LoadedTask
 
 REPEATS = 5

@@ -17,7 +17,8 @@ import numpy as np
 
 from design.arrays import Array, Counts
 from design.errors import TaskError
-from design.sphere.regions import MAP, Field, Layers, field_of
+from design.sphere.polar_rule import circle_rule
+from design.sphere.regions import MAP, Field, field_of
 from design.task.shapes import Region
 from design.task.task import LoadedTask
 
@@ -81,7 +82,9 @@ def kl(field: Field) -> Objective:
     normaliser by itself.
     """
     support = _mapped(field, lambda w: (w > 0).astype(float))
-    entropy = _integral(_mapped(field, lambda w: w * np.log(np.where(w > 0, w, 1.0)))) / _integral(field)
+    least = _least(field)  # in units of it no weight has a negative logarithm
+    logarithms = _mapped(field, lambda w: w * np.log(np.where(w > 0, w / least, 1.0)))
+    entropy = _integral(logarithms) / _integral(field) + np.log(least)
     shift = entropy - np.log(_integral(field) / _integral(support))
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift)
@@ -103,7 +106,7 @@ def required(loaded: LoadedTask, field: Field) -> Objective:
     for level in sorted({r for r in wanted if r is not None}):
         part = field_of(loaded, _asking(level, asked))
         part = replace(part, background=field.background * (asked == level))
-        if len(part.weight.caps) or part.background:
+        if len(part.patches):
             moments.append(Moment(part, _shortfall(level), share=_integral(part)))
     total = sum(moment.share for moment in moments)
     shared = tuple(replace(moment, share=moment.share / total) for moment in moments if moment.share > 0)
@@ -161,12 +164,19 @@ def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
     for row in rows[maps]:
         tables[int(row[1])] = function(row[7] * tables[int(row[1])])
     rows[:, 7] = np.where(maps, 1.0, function(rows[:, 7]))
-    weight = Layers(rows, field.weight.planes, tables, field.weight.caps)
+    weight = replace(field.weight, rows=rows, tables=tables)
     return replace(field, weight=weight, background=float(function(np.array([field.background]))[0]))
 
 
+def _least(field: Field) -> float:
+    """The smallest weight that any region paints."""
+    rows = field.patches
+    painted = [rows[rows[:, 0] != MAP, 7]]
+    painted += [row[7] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]
+    values = np.concatenate(painted)
+    return float(values[values > 0].min())
+
+
 def _integral(field: Field) -> float:
-    """`int w dO` outside the masks: circles about z, exact along each, evenly spaced in height."""
-    z = 1 - 2 * (np.arange(INTEGRAL_CIRCLES) + 0.5) / INTEGRAL_CIRCLES
-    means, _ = field.on_circles(np.array([0.0, 0.0, 1.0]), np.arccos(z))
-    return float(4 * np.pi * means.mean())
+    """`int w dO` outside the masks, by circles about z: exact along each."""
+    return float(circle_rule(field, np.array([0.0, 0.0, 1.0]), np.empty(0), INTEGRAL_CIRCLES).fine.sum())

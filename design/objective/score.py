@@ -77,11 +77,13 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
     join, moments = problem.objective.join, problem.objective.moments
     values = np.array([moment.value for moment in found])
     J = float(join(values))
-    moved = [join(np.where(np.arange(len(values)) == k, m.value + m.error, values)) - J for k, m in enumerate(found)]
+    moved = np.array(
+        [join(np.where(np.arange(len(values)) == k, m.value + m.error, values)) for k, m in enumerate(found)]
+    )
     spoken = [(moment.share, m) for moment, m in zip(moments, found, strict=True) if moment.share > 0]
     return Score(
         J=J,
-        J_error=float(np.linalg.norm(moved)) + ROUNDING if np.isfinite(J) else 0.0,
+        J_error=float(np.linalg.norm(moved - J)) + ROUNDING if np.isfinite(J) else 0.0,
         J_lower=float(join(np.array([moment.lower for moment in found]))),
         least=min(m.least for _, m in spoken),
         blind_weight=sum(share * m.blind for share, m in spoken),

@@ -23,10 +23,10 @@ from design.density.spin import mean_count, zones
 from design.errors import TaskError
 from design.objective.named_objectives import Objective
 from design.objective.problem import Problem
-from design.objective.quadrature import MANY_EDGES
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import BothWays, both_ways, gathered, lowest
 from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
+from design.sphere.polar_rule import MANY_EDGES
 from design.sphere.regions import Field
 
 FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg

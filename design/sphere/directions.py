@@ -9,10 +9,10 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.errors import TaskError
-from design.sphere.regions import SPHERE, Field, frames_about
+from design.sphere.regions import ALL, BAND, CONE, Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
-MOST_LOOKS = 1_000_000  # directions looked at in one cap
+MOST_LOOKS = 1_000_000  # directions looked at in one patch
 EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
 
 
@@ -25,16 +25,18 @@ class Samples:
 
 
 def spiral(
-    count: int, turn_rad: float = 0.0, cap_rad: float = np.pi, shift: float = 0.5
+    count: int, turn_rad: float = 0.0, lowest_z: float = -1.0, shift: float = 0.5
 ) -> Float[ndarray, "{count} 3"]:
-    """Fibonacci spiral: `count` directions of equal solid angle within `cap_rad` of z, shape (count, 3).
+    """Fibonacci spiral: `count` directions of equal solid angle in the cap about z that ends at a height.
 
-    Each stands for a slice of the cap; `shift` is where in it, 0 to 1.
+    Each stands for a slice of the cap; `shift` is where in it, 0 to 1. Shape (count, 3).
     """
     k = np.arange(count) + shift
-    z = 1 - (1 - np.cos(cap_rad)) * k / count
-    r = np.sqrt(np.maximum(1 - z * z, 0.0))
-    phi = turn_rad + 2 * np.pi * k / GOLDEN
+    return _on_sphere(1 - (1 - lowest_z) * k / count, turn_rad + 2 * np.pi * k / GOLDEN)
+
+
+def _on_sphere(z: Float[ndarray, " n"], phi: Float[ndarray, " n"]) -> Float[ndarray, "n 3"]:
+    r = np.sqrt(np.maximum((1 - z) * (1 + z), 0.0))
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1)
 
 
@@ -50,13 +52,13 @@ def equal_angle_grid(step_deg: float) -> Float[ndarray, "n 3"]:
 def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: float = 0.5) -> Samples:
     """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
 
-    Every painted region has a cap that holds it, and gets a spiral of its own in what the caps before it leave.
+    Every painted region is covered by itself, in what those before it leave: however small one is, it gets its share.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    caps = field.weight.caps if field.background == 0 else np.vstack([field.weight.caps, SPHERE])
-    found = [_in_cap(field, caps, i, wanted // len(caps) + 1, turn_rad, shift) for i in range(len(caps))]
+    patches = len(field.patches)
+    found = [_in_patch(field, k, wanted // patches + 1, turn_rad, shift) for k in range(patches)]
     if not any(len(samples.weights) for samples in found):
         raise TaskError(
             f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
@@ -85,21 +87,40 @@ def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: in
     return weighted_samples(field, wanted + 17 * index, turn_rad=float(index), shift=(0.5 + index / GOLDEN) % 1)
 
 
-def _in_cap(
-    field: Field, caps: Float[ndarray, "caps 4"], index: int, wanted: int, turn_rad: float, shift: float
-) -> Samples:
-    """Weighted directions in one cap and in none before it; denser until there are enough, or it is given up."""
-    centre, reach = caps[index, :3], float(caps[index, 3])
-    to_centre = frames_about(centre[None])[0]
+def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: float) -> Samples:
+    """Weighted directions in one patch and in none before it; denser until there are enough, or it is given up."""
     count = wanted
     while True:
-        directions = spiral(count, turn_rad, reach, shift) @ to_centre
-        new = np.ones(count, dtype=bool)
-        for before in caps[:index]:
-            new &= directions @ before[:3] < np.cos(before[3])
-        weights = np.where(new, field.weight_at(directions), 0.0)
+        directions, solid_angle = _spread(field, index, count, turn_rad, shift)
+        if not solid_angle > 0:
+            return Samples(np.empty((0, 3)), np.empty(0))
+        weights = np.where(field.patch_at(directions) == index, field.weight_at(directions), 0.0)
         hits = int((weights > 0).sum())
         if hits >= wanted or count >= MOST_LOOKS:
-            solid_angle = 2 * np.pi * (1 - np.cos(reach)) / count
-            return Samples(directions[weights > 0], weights[weights > 0] * solid_angle)
+            return Samples(directions[weights > 0], weights[weights > 0] * (solid_angle / count))
         count = min(MOST_LOOKS, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
+
+
+def _spread(field: Field, index: int, count: int, turn_rad: float, shift: float) -> tuple[Float[ndarray, "n 3"], float]:
+    """Directions of equal solid angle all over one patch, and the solid angle of the patch."""
+    row = field.patches[index]
+    if row[0] == ALL:
+        return spiral(count, turn_rad, -1.0, shift), 4 * np.pi
+    if row[0] == CONE:
+        return spiral(count, turn_rad, row[4], shift) @ frames_about(row[None, 1:4])[0], 2 * np.pi * (1 - row[4])
+    k = np.arange(count) + shift
+    share = (k / GOLDEN + turn_rad / (2 * np.pi)) % 1
+    if row[0] == BAND:
+        half = np.arccos(row[5])
+        phi = np.arctan2(row[4], row[3]) + half * (2 * share - 1)
+        return _on_sphere(row[2] - (row[2] - row[1]) * k / count, phi), 2 * half * (row[2] - row[1])
+    height, width = int(row[2]), int(row[3])
+    edges = np.cos(np.pi * np.arange(height + 1) / height)
+    r, c = np.nonzero(field.weight.tables[int(row[1]), :height, :width])
+    ends = np.cumsum(edges[r] - edges[r + 1])
+    if not len(ends):
+        return np.empty((0, 3)), 0.0
+    at = k / count * ends[-1]  # along the cells as if they lay one below the other
+    cell = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
+    z = np.clip(edges[r[cell] + 1] + ends[cell] - at, edges[r[cell] + 1], edges[r[cell]])
+    return _on_sphere(z, 2 * np.pi * (c[cell] + share) / width), float(2 * np.pi / width * ends[-1])

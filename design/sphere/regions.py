@@ -12,18 +12,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Vector
+from design.arrays import Array, Ints, Vector
 from design.concurrency.parallel import in_chunks
 from design.scene.surface import Surface
 from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, MapRegion, MaskRegion, Region
 from design.task.task import LoadedTask
 
 ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
-SPHERE = [0.0, 0.0, 1.0, np.pi]
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
 
@@ -32,14 +31,14 @@ class Layers:
     """Painted regions as numbers.
 
     `rows`: (kind, six parameters, value) of each region, in painting order, shape (regions, 8).
-    `planes`: (m, c) of each edge, shape (edges, 4). `tables`: the maps, padded to one shape, (maps, rows, columns).
-    `caps`: for each region with a value above 0 a cap that holds it, (direction, angular radius), shape (caps, 4).
+    `planes`: (m, c) of each edge of a band or a cone, shape (edges, 4). `map_planes`: of the cells of maps, the same.
+    `tables`: the maps, padded to one shape, (maps, rows, columns).
     """
 
     rows: Float[ndarray, "regions 8"]
     planes: Float[ndarray, "edges 4"]
+    map_planes: Float[ndarray, "cell_edges 4"]
     tables: Float[ndarray, "maps rows columns"]
-    caps: Float[ndarray, "caps 4"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +59,29 @@ class Field:
         return _paint(self.mask, directions, 0.0) > 0
 
     @property
+    def planes(self) -> Float[ndarray, "edges 4"]:
+        """Planes of the edges of bands and cones, masks included."""
+        return np.concatenate([self.weight.planes, self.mask.planes])
+
+    @property
+    def map_planes(self) -> Float[ndarray, "cell_edges 4"]:
+        """Planes of the cells of maps, masks included."""
+        return np.concatenate([self.weight.map_planes, self.mask.map_planes])
+
+    @property
     def edges(self) -> int:
         """Number of edge planes: what a circle integral costs."""
-        return len(self.weight.planes) + len(self.mask.planes)
+        return len(self.planes) + len(self.map_planes)
+
+    @property
+    def patches(self) -> Float[ndarray, "patches 8"]:
+        """Rows of the regions that hold weight, the background last: together they hold all of it."""
+        rows = self.weight.rows[self.weight.rows[:, 7] > 0]
+        return rows if self.background == 0 else np.vstack([rows, [ALL, 0, 0, 0, 0, 0, 0, self.background]])
+
+    def patch_at(self, directions: Float[ndarray, "n 3"]) -> Int[ndarray, " n"]:
+        """The first of `patches` that holds each direction; their number where none does. Shape (n,)."""
+        return _first_patch(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables)
 
     def on_circles(
         self, axis: Vector, polar_rad: Float[ndarray, " n"]
@@ -84,7 +103,7 @@ class Field:
 
     def _numbers(self) -> tuple[Array, Array, Array, Array, Array, float]:
         weight, mask = self.weight, self.mask
-        planes = np.concatenate([weight.planes, mask.planes])
+        planes = np.concatenate([self.planes, self.map_planes])
         return planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
 
 
@@ -131,12 +150,10 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
 def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of: Callable[[Any], float]) -> Layers:
     """Turn regions into numbers; takes as many tables off the front of `maps` as there are map regions."""
     rows: list[list[float]] = []
-    planes = [np.empty((0, 4))]
+    planes, map_planes = [np.empty((0, 4))], [np.empty((0, 4))]
     tables: list[Array] = []
-    caps: list[list[float]] = []
     for region in regions:
         value = weight_of(region)
-        cap = SPHERE
         if isinstance(region, AllRegion):
             rows.append([ALL, 0, 0, 0, 0, 0, 0, value])
         elif isinstance(region, BandRegion):
@@ -145,37 +162,22 @@ def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of
             around = [np.cos(middle), np.sin(middle), np.cos(half)]
             rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, value])
             planes.append(_edges_of_band(theta, phi))
-            cap = _cap_of_band(theta, middle, half)
         elif isinstance(region, ConeRegion):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
             half_angle = np.radians(region.half_angle_deg)
             rows.append([CONE, *axis, np.cos(half_angle), 0, 0, value])
             planes.append(np.array([[*axis, np.cos(half_angle)]]))
-            cap = [*axis, half_angle]
         else:
             table = maps.pop(0)
             rows.append([MAP, len(tables), *table.shape, 0, 0, 0, value])
             tables.append(table)
-            planes.append(_edges_of_map(*table.shape))
-        if value > 0:
-            caps.append(cap)
+            map_planes.append(_edges_of_map(*table.shape))
     return Layers(
         np.array(rows, dtype=float).reshape(-1, 8),
         np.concatenate(planes),
+        np.concatenate(map_planes),
         _stack(tables),
-        np.array(caps, dtype=float).reshape(-1, 4),
     )
-
-
-def _cap_of_band(theta: Array, middle: float, half: float) -> list[float]:
-    """A cap about the middle of a band, or about a pole where the band goes more than half around."""
-    if half > np.pi / 2:
-        return [0.0, 0.0, 1.0, theta[1]] if theta[1] <= np.pi - theta[0] else [0.0, 0.0, -1.0, np.pi - theta[0]]
-    t, p = np.meshgrid(np.linspace(theta[0], theta[1], 33), np.linspace(-half, half, 33))
-    points = np.stack([np.sin(t) * np.cos(middle + p), np.sin(t) * np.sin(middle + p), np.cos(t)], axis=-1)
-    centre = points[16, 16]
-    reach = np.arctan2(np.linalg.norm(np.cross(points, centre), axis=-1), points @ centre).max()
-    return [*centre, float(min(np.pi, 1.05 * reach + 1e-9))]
 
 
 def _edges_of_band(theta: Array, phi: Array) -> Float[ndarray, "edges 4"]:
@@ -221,27 +223,46 @@ def _paint(layers: Layers, directions: Float[ndarray, "n 3"], background: float)
 def _value(x: float, y: float, z: float, rows: Array, tables: Array, background: float) -> float:
     """Value of the last painted region that contains the direction."""
     for i in range(rows.shape[0] - 1, -1, -1):
-        row = rows[i]
-        kind = row[0]
-        if kind == ALL:
-            return row[7]
-        if kind == CONE:
-            if x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE:
-                return row[7]
-            continue
-        if kind == BAND:
-            if row[1] - EDGE <= z <= row[2] + EDGE:
-                ahead = x * row[3] + y * row[4]
-                if ahead >= row[5] * np.sqrt(x * x + y * y) - EDGE:
-                    return row[7]
-            continue
-        theta = np.arctan2(np.sqrt(x * x + y * y), z)
-        phi = np.arctan2(y, x)
-        height, width = int(row[2]), int(row[3])
-        r = min(int(theta / np.pi * height), height - 1)
-        c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
-        return row[7] * tables[int(row[1]), r, c]
+        if _holds(x, y, z, rows[i]):
+            return rows[i, 7] * _of_cell(x, y, z, rows[i], tables)
     return background
+
+
+@njit(cache=True, nogil=True)
+def _holds(x: float, y: float, z: float, row: Array) -> bool:
+    """Whether a region contains the direction; edges are inclusive."""
+    if row[0] == CONE:
+        return x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE
+    if row[0] == BAND:
+        if not row[1] - EDGE <= z <= row[2] + EDGE:
+            return False
+        return x * row[3] + y * row[4] >= row[5] * np.sqrt(x * x + y * y) - EDGE
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
+    """What a map holds at the direction; 1 of any other region."""
+    if row[0] != MAP:
+        return 1.0
+    theta = np.arctan2(np.sqrt(x * x + y * y), z)
+    phi = np.arctan2(y, x)
+    height, width = int(row[2]), int(row[3])
+    r = min(int(theta / np.pi * height), height - 1)
+    c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
+    return tables[int(row[1]), r, c]
+
+
+@njit(cache=True, nogil=True)
+def _first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
+    out = np.full(directions.shape[0], rows.shape[0])
+    for i in range(directions.shape[0]):
+        x, y, z = directions[i]
+        for k in range(rows.shape[0]):
+            if _holds(x, y, z, rows[k]) and _of_cell(x, y, z, rows[k], tables) > 0.0:
+                out[i] = k
+                break
+    return out
 
 
 @njit(cache=True, nogil=True)

@@ -14,7 +14,6 @@ from design.catalogue.catalogue import load_catalogue
 from design.objective import quadrature
 from design.objective import score as scoring
 from design.objective.problem import problem_of
-from design.objective.quadrature import breaks_of
 from design.objective.score import score
 from design.search import coarse, coarse_sweep, families
 from design.search.coarse import coarse_landscape
@@ -22,6 +21,7 @@ from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfol
 from design.search.optimum import directions_left_out
 from design.search.search import search
 from design.sphere.directions import Samples, spiral
+from design.sphere.polar_rule import breaks_of
 from design.task.task import LoadedTask, Task, load_task
 
 BAND = {"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}
