@@ -20,7 +20,7 @@ from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion
 from design.task.task import LoadedTask
 
 SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
-PHASES = 64
+PHASES = 2048
 
 
 @dataclass(frozen=True, slots=True)

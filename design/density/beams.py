@@ -87,6 +87,23 @@ def polar_and_azimuth(directions: Float[ndarray, "n 3"]) -> tuple[Float[ndarray,
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
+def blind_zones(
+    bearings_rad: Float[ndarray, " beams"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
+) -> Float[ndarray, "zones 2"]:
+    """Ranges of the polar angle about the axis that lie further than a ball radius from the fan, shape (zones, 2).
+
+    Between neighbouring beams the fan is continuous (docs/definitions.md, Blind); where beams are missing from the
+    middle of it, as behind a part that turns along, it is several.
+    """
+    apart = np.diff(bearings_rad)
+    ends = np.flatnonzero(apart > 1.5 * np.median(apart)) + 1 if len(apart) > 1 else np.empty(0, dtype=int)
+    fans = np.array([[fan.min() - ball_rad, fan.max() + ball_rad] for fan in np.split(beam_polar_rad, ends)])
+    fans = fans[np.argsort(fans[:, 0])]
+    starts = np.concatenate([[0.0], np.maximum.accumulate(fans[:, 1])])
+    zones = np.column_stack([starts, np.concatenate([fans[:, 0], [np.pi]])])
+    return zones[zones[:, 1] > zones[:, 0]]
+
+
 def simulated_scan(
     bearings_rad: Float[ndarray, " beams"], lines: ScanLines, angles_rad: ArrayLike, start_phase_rad: float = 0.0
 ) -> Float[ndarray, "n 3"]:

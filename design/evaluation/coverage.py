@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Setting, Vector
-from design.density.beams import polar_and_azimuth
+from design.density.beams import blind_zones, polar_and_azimuth
 from design.density.spin import mean_count
 from design.density.sweep import mean_count_swept
 from design.frames import R_world_rot
@@ -42,7 +42,7 @@ def coverage(problem: Problem, angles_rad: Setting) -> Coverage:
     polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     up = np.array([0.0, 0.0, 1.0])
     open_share = _unmasked(problem, up, 0.0, np.pi)
-    blind = sum(_unmasked(problem, axis, a, b) for a, b in blind_zones(polar, problem.ball_rad))
+    blind = sum(_unmasked(problem, axis, a, b) for a, b in blind_zones(problem.bearings_rad, polar, problem.ball_rad))
     return Coverage(
         blind_fraction=blind / open_share if open_share > 0 else 0.0,
         masked_fraction=max(0.0, 1.0 - open_share),
@@ -92,14 +92,6 @@ def on_surfaces(problem: Problem, angles_rad: Setting, surface: Surface) -> dict
     seen = order[area[order] > 0]
     middle = seen[np.searchsorted(np.cumsum(area[seen]), area[seen].sum() / 2)]
     return {"lowest_points_per_m2": float(density[seen[0]]), "median_points_per_m2": float(density[middle])}
-
-
-def blind_zones(beam_polar_rad: Float[ndarray, " beams"], ball_rad: float) -> list[tuple[float, float]]:
-    """Ranges of the polar angle about the axis that lie further than a ball radius from every beam."""
-    polar = np.sort(beam_polar_rad)
-    starts = np.concatenate([[0.0], polar + ball_rad])
-    ends = np.concatenate([polar - ball_rad, [np.pi]])
-    return [(float(a), float(b)) for a, b in zip(starts, ends, strict=True) if b > a]
 
 
 def _unmasked(problem: Problem, axis: Vector, low_rad: float, high_rad: float) -> float:

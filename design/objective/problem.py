@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Array, Plane
-from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, scan_lines
+from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
 from design.density.sweep import SweepLines
 from design.errors import TaskError
 from design.motion import Motion, Shortest, StopAndGo, Sweep
@@ -55,6 +55,10 @@ class Problem:
     def beams_rot(self, plane_rad: Plane) -> Float[ndarray, "beams 3"]:
         """Unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser), shape (beams, 3)."""
         return beam_directions_rot(self.bearings_rad, plane_rad[0], plane_rad[1], self.lever)
+
+    def blind_zones(self, beam_polar_rad: Float[ndarray, " beams"]) -> Float[ndarray, "zones 2"]:
+        """Ranges of the polar angle about the axis that no start phase brings a beam to, shape (zones, 2)."""
+        return blind_zones(self.bearings_rad, beam_polar_rad, self.ball_rad)
 
     @property
     def field(self) -> Field:

@@ -28,7 +28,7 @@ def polar_rule(
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     polar, azimuth = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     step = problem.grid_step_deg
-    breaks = _density_breaks(polar, problem.ball_rad)
+    breaks = np.concatenate([_density_breaks(polar, problem.ball_rad), problem.blind_zones(polar).ravel()])
     rule = _grid_rule(field, step, axis) if step else circle_rule(field, axis, breaks, nodes)
     if not rule.fine.sum() > 0:
         raise TaskError(EMPTY)

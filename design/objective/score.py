@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from design.arrays import Setting
 from design.density.spin import Zones, zones
-from design.density.sweep import zones_swept
+from design.density.sweep import mean_count_swept, zones_swept
 from design.frames import R_world_rot
 from design.objective.named_objectives import Moment
 from design.objective.problem import Problem
@@ -38,7 +38,7 @@ class Score:
         J_error: estimate of its numerical error, on the safe side; see `score_on`.
         J_lower: with g of the mean counts, a lower bound of J as g is convex.
         least: lowest count in the weighted region at any start phase, beams per ball.
-        blind_weight: share of the weight that is never seen, at no phase.
+        blind_weight: share of the weight that is blind: beyond a ball radius of all that the fan passes over.
     """
 
     J: float
@@ -97,6 +97,16 @@ def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     return float(problem.objective.join(np.array(found)))
 
 
+def blind_to_sweep(
+    problem: Problem, directions_rot: Float[ndarray, "n 3"], beams_rot: Float[ndarray, "beams 3"]
+) -> Bool[ndarray, " n"]:
+    """Whether directions of the rotation frame (n, 3) lie beyond a ball radius of all that a sweep passes over."""
+    assert problem.sweep is not None
+    # between two beams the fan is continuous: no ball is smaller than half their step
+    ball_rad = max(problem.ball_rad, float(np.median(np.diff(problem.bearings_rad))) / 2 + 1e-9)
+    return mean_count_swept(directions_rot, beams_rot, problem.sweep, ball_rad) <= 0
+
+
 @dataclass(frozen=True, slots=True)
 class _Found:
     """A moment of one setting, with its error, its lower bound, the least count and the share that is blind."""
@@ -114,8 +124,11 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[index])
     lower = moment.g(z.mean)
+    blind = np.zeros(len(rule.polar_rad), dtype=bool)
+    for low, high in problem.blind_zones(polar):
+        blind |= (low < rule.polar_rad) & (rule.polar_rad < high)
     if moment.gathered == "highest":
-        return _highest(moment, z, lower, rule.fine, rule.coarse)
+        return _highest(moment, z, lower, rule.fine, rule.coarse, blind)
     total = rule.fine.sum()
     share = rule.fine / total
     by_segment = np.bincount(rule.segment, (share - rule.coarse / total) * z.mean_g)
@@ -127,7 +140,7 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
         error=float(np.linalg.norm(by_segment) + 2 * np.linalg.norm(steps)),
         lower=float(share @ lower),
         least=int(z.least[share > 0].min()),
-        blind=float(share @ (z.most == 0)),
+        blind=float(share @ blind),
     )
 
 
@@ -141,13 +154,14 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     found = []
     for samples in sets:
         z = zones_swept(samples.directions @ R, beams, problem.sweep, problem.ball_rad, problem.tables[index])
+        blind = blind_to_sweep(problem, samples.directions @ R, beams)
         lower = moment.g(z.mean)
         if moment.gathered == "highest":
-            found.append(_highest(moment, z, lower, samples.weights, samples.weights))
+            found.append(_highest(moment, z, lower, samples.weights, samples.weights, blind))
         else:
             share = samples.weights / samples.weights.sum()
-            blind = float(share @ (z.most == 0))
-            found.append(_Found(float(share @ z.mean_g), 0.0, float(share @ lower), int(z.least.min()), blind))
+            value, bound, hidden = float(share @ z.mean_g), float(share @ lower), float(share @ blind)
+            found.append(_Found(value, 0.0, bound, int(z.least.min()), hidden))
     values = np.array([f.value for f in found])
     gather = np.max if moment.gathered == "highest" else np.mean
     return _Found(
@@ -165,6 +179,7 @@ def _highest(
     lower: Float[ndarray, " n"],
     fine: Float[ndarray, " n"],
     coarse: Float[ndarray, " n"],
+    blind: Bool[ndarray, " n"],
 ) -> _Found:
     """The highest g anywhere; its error is what a third of the nodes misses."""
     g = moment.g(z.least)
@@ -174,5 +189,5 @@ def _highest(
         error=value - float(g[coarse > 0].max()),
         lower=float(lower[fine > 0].max()),
         least=int(z.least[fine > 0].min()),
-        blind=float(fine @ (z.most == 0) / fine.sum()),
+        blind=float(fine @ blind / fine.sum()),
     )

@@ -16,24 +16,29 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints
+from design.arrays import Array, Ints, Mask
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
 from design.density.spin import mean_count, zones
 from design.errors import TaskError
 from design.objective.named_objectives import Objective
 from design.objective.problem import Problem
+from design.search.constraints import AtMost, Constraint, NoHole, fan_reach
 from design.search.grid_classes import Folded
-from design.search.plane_axis_product import BothWays, both_ways, gathered, lowest
+from design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
 from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
+from design.sphere.outline import reach_about
 from design.sphere.polar_rule import MANY_EDGES
 from design.sphere.regions import Field
+from design.task.task import Limits
 
 FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
 MOST_NODES = 1441  # for balls below half a degree
 BATCH = 64  # planes whose exact densities are computed before the bound is asked again
 DIRECTIONS = 20_000  # that stand for a map, where circles would be slower
+MISSED = 0.05  # share of the weight that circles may miss or count twice
 MARGIN = 0.15  # what the coarse J of the search may be off by: 0.134 was seen, for a ball of 0.5 deg
+BLIND_MARGIN = 0.02  # what a blind share told from nodes may be off by: the few best settings are asked exactly
 REPORT = 1000  # planes between two lines of progress
 SCOUTED = 0.05  # what a bound over the scouts may be above that over all axes: else all are visited twice
 SCOUTS = 1500  # axes that tell how low a plane's bound comes, before all are visited
@@ -49,17 +54,19 @@ class Landscape:
         objective: how moments become J.
         g: `<g(d)>` of each moment and plane class over the polar nodes, or its bound, (moments, planes, nodes).
         weights: share of each moment's weight about each axis class over the nodes, (axes, nodes) each.
-        by_plane: lowest J of a plane class, not flipped and flipped, over the axes of the grid, (2, planes).
-        its_axis: axis class where that was, and whether it is flipped, (2, planes) each.
-        by_axis: lowest J about an axis class, not flipped and flipped, over the planes of the grid, (2, axes).
+        blind: whether nodes are beyond a ball radius of the fan of a plane class, 1 or 0, (planes, nodes).
+        constraints: what settings must keep.
+        plain: lowest J of all settings.
+        kept: lowest J of those that keep the constraints.
     """
 
     objective: Objective
     g: Array
     weights: tuple[Array, ...]
-    by_plane: Array
-    its_axis: tuple[Ints, Ints]
-    by_axis: Array
+    blind: Array
+    constraints: tuple[Constraint, ...]
+    plain: Lowest
+    kept: Lowest
 
     def about_axes(self, plane: int) -> Float[ndarray, "ways axes"]:
         """J of one plane class, not flipped, about each axis class, not flipped and flipped, shape (2, axes)."""
@@ -69,62 +76,108 @@ class Landscape:
         ]
         return self.objective.join(np.stack(parts))
 
+    def broken(self, plane: int) -> Mask:
+        """Settings of that plane class that break a constraint, shape (2, axes)."""
+        out = np.zeros((2, len(self.weights[0])), dtype=bool)
+        for constraint in self.constraints:
+            out |= np.concatenate(constraint.broken(slice(plane, plane + 1)))
+        return out
 
-def coarse_landscape(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
+
+def coarse_landscape(
+    problem: Problem, planes: Folded, axes: Folded, progress: Progress, limits: Limits, avoid_holes: bool
+) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact.
 
     The others keep their bound, g of the mean count: it is above the best by more than the search may be off.
     """
     few = len(axes.first) <= FEW_AXES
     # caustics are as wide as the ball: a node every quarter of it, and every 0.5 deg at least
-    nodes = min(MOST_NODES, int(max(360, 4 * np.pi / problem.ball_rad)) + 1) if few else 181
+    half = min((MOST_NODES - 1) // 2, int(max(180, 2 * np.pi / problem.ball_rad))) if few else 90
+    nodes = 2 * half + 1  # odd: one at the equator, which turning round leaves where it is
     circles = max(nodes - 1, 720 - 720 % (nodes - 1)) if few else nodes - 1
     polar = np.linspace(0, np.pi, nodes)
     moments = problem.objective.moments
     over: dict[int, Array] = {}  # moments share fields
-    for moment in moments:
-        if id(moment.field) not in over:
-            over[id(moment.field)] = _weights_over_polar(problem, moment.field, axes.representatives, nodes, circles)
-    weights = tuple(over[id(moment.field)] for moment in moments)
+
+    def weights_of(field: Field) -> Array:
+        if id(field) not in over:
+            over[id(field)] = _weights_over_polar(problem, field, axes.representatives, nodes, circles)
+        return over[id(field)]
+
+    weights = tuple(weights_of(moment.field) for moment in moments)
     shown = np.radians(planes.settings_deg[planes.first])
     means = in_chunks(lambda chunk: _means(problem, polar, shown[chunk]), len(shown), smallest=8)
     mean = np.concatenate(means)
     g = np.stack([moment.g(mean) for moment in moments])
+    least = np.floor(mean / problem.lines.repeats + 1e-9) * problem.lines.repeats  # at most, until it is exact
+    thin = np.zeros((0, 0), np.float32)
+    fans = fan_reach(problem, shown)
+    blind = ((polar < fans[:, :1]) | (polar > fans[:, 1:])).astype(np.float32)
+    constraints: list[Constraint] = []
+    if avoid_holes:
+        constraints.append(NoHole(fans, reach_about(problem.field, axes.representatives)))
+    if limits.min_density is not None:
+        thin = (least < limits.min_density).astype(np.float32)
+        constraints.append(AtMost(thin, _within(weights_of(problem.field)), 0.5, turns=True))
+    if limits.max_blind_weight is not None:
+        of_axes = weights_of(problem.field).astype(np.float32)
+        constraints.append(AtMost(blind, of_axes, limits.max_blind_weight + BLIND_MARGIN, turns=True))
     open_planes = planes.has | planes.own
 
-    def ways_of(g: Array, weights: tuple[Array, ...]) -> list[BothWays]:
-        return [both_ways(moment, of_g, w) for moment, of_g, w in zip(moments, g, weights, strict=True)]
+    def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
+        ways = [both_ways(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)]
+        kept = [constraint.of(these, every) for constraint in constraints]
+        return lowest(problem.objective, ways, open_planes[:, these], axes.has[:, every], kept)
 
-    every = max(1, len(axes.first) // SCOUTS)
-    scouted = tuple(w[::every] for w in weights)
-    bounds = lowest(problem.objective, ways_of(g, scouted), open_planes, axes.has[:, ::every])[0].min(axis=0)
+    everything, scouts = slice(None), slice(None, None, max(1, len(axes.first) // SCOUTS))
+    bounds = by_plane(lowest_of(everything, scouts))
     exact = np.zeros(g.shape[1], dtype=bool)
-    best = np.inf
+    best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
     while True:
-        for todo in _batches(np.argsort(bounds, kind="stable")):
-            todo = todo[(bounds[todo] <= best + MARGIN + SCOUTED) & ~exact[todo]]
+        for todo in _batches(bounds):
+            todo = todo[may_win(bounds[:, todo], best + SCOUTED) & ~exact[todo]]
             if not len(todo):
                 continue
             if exact.sum() // REPORT > (exact.sum() - BATCH) // REPORT:
                 progress(f"exact densities: {exact.sum()} of at most {len(exact):,} scan planes")
-            g[:, todo] = _exact(problem, polar, shown[todo])
+            g[:, todo], least[todo] = _exact(problem, polar, shown[todo])
             exact[todo] = True
-            here = lowest(problem.objective, ways_of(g[:, todo], scouted), open_planes[:, todo], axes.has[:, ::every])[
-                0
-            ]
-            best = min(best, float(here.min()))
+            if limits.min_density is not None:
+                thin[todo] = least[todo] < limits.min_density
+            best = np.minimum(best, by_plane(lowest_of(todo, scouts)).min(axis=1))
         progress(f"all axes of all {len(exact):,} scan planes")
-        by_plane, its_class, its_flip, by_axis = lowest(problem.objective, ways_of(g, weights), open_planes, axes.has)
-        bounds = by_plane.min(axis=0)
-        best = float(bounds[exact].min())
-        if not np.any(bounds[~exact] <= best + MARGIN):
+        plain, kept = lowest_of(everything, everything)
+        bounds = by_plane((plain, kept))
+        best = bounds[:, exact].min(axis=1)
+        if not np.any(may_win(bounds, best) & ~exact):
             break
-    return Landscape(problem.objective, g, weights, by_plane, (its_class, its_flip), by_axis), int(exact.sum())
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())
 
 
-def _batches(order: Ints) -> list[Ints]:
-    """The first one alone, as it sets the mark for all others; then `BATCH` at a time."""
-    return [order[:1], *(order[i : i + BATCH] for i in range(1, len(order), BATCH))]
+def by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
+    """Lowest J of each plane either way round: of all settings, and of those that keep the constraints."""
+    return np.stack([side.by_plane.min(axis=0) for side in both])
+
+
+def may_win(bounds: Float[ndarray, "2 planes"], best: Float[ndarray, " 2"]) -> Mask:
+    """Planes whose bound is not above the best by more than the search may be off."""
+    return (np.isfinite(bounds) & (bounds <= best[:, None] + MARGIN)).any(axis=0)
+
+
+def _within(weights: Array) -> Array:
+    """Nodes that lie in the region and not at its edge, 1 or 0, (axes, nodes)."""
+    there = weights > 0
+    there[:, 1:-1] &= there[:, :-2] & there[:, 2:]
+    return there.astype(np.float32)
+
+
+def _batches(bounds: Float[ndarray, "2 planes"]) -> list[Ints]:
+    """Planes by how far their bounds are above the lowest: the first alone, as they set the mark for all others."""
+    finite = np.isfinite(bounds)
+    lowest_of_all = np.where(finite.any(axis=1), np.where(finite, bounds, np.inf).min(axis=1), 0.0)
+    order = np.argsort((bounds - lowest_of_all[:, None]).min(axis=0), kind="stable")
+    return [order[:1], order[1:2], *(order[i : i + BATCH] for i in range(2, len(order), BATCH))]
 
 
 def _means(problem: Problem, polar: Array, planes_rad: Array) -> Array:
@@ -133,42 +186,51 @@ def _means(problem: Problem, polar: Array, planes_rad: Array) -> Array:
     return np.stack([mean_count(polar, row, problem.lines, problem.ball_rad) for row in beams])
 
 
-def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) -> Array:
-    """`<g(d)>` of scan planes (alpha_laser, beta_laser) (n, 2) at polar angles, shape (moments, n, nodes)."""
+def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) -> tuple[Array, Array]:
+    """`<g(d)>` of scan planes (n, 2) at polar angles, (moments, n, nodes), and the least count there, (n, nodes)."""
 
-    def rows(plane: Array) -> Array:
+    def rows(plane: Array) -> tuple[Array, Array]:
         beams, azimuths = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, *plane))
         out = []
         for moment, table in zip(problem.objective.moments, problem.tables, strict=True):
             z = zones(polar, beams, azimuths, problem.lines, problem.ball_rad, table)
             out.append(z.mean_g if moment.gathered == "mean" else moment.g(z.least))
-        return np.stack(out)
+        return np.stack(out), z.least
 
     parts = in_chunks(lambda chunk: [rows(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
-    return np.stack([row for part in parts for row in part], axis=1)
+    found = [row for part in parts for row in part]
+    return np.stack([g for g, _ in found], axis=1), np.stack([least for _, least in found])
 
 
 def _weights_over_polar(
     problem: Problem, field: Field, axes: Float[ndarray, "axes 3"], nodes: int, circles: int
 ) -> Array:
     """Share of a weight near each polar node about each axis, shape (axes, nodes); rows sum to 1."""
-    if problem.grid_step_deg or field.edges > MANY_EDGES:
-        if problem.grid_step_deg:
-            directions = equal_angle_grid(problem.grid_step_deg)
-            samples = Samples(directions, field.weight_at(directions))
-        else:
-            samples = weighted_samples(field, DIRECTIONS)
-        parts = in_chunks(
-            lambda chunk: _polar_histogram(samples.directions, samples.weights, axes[chunk], nodes), len(axes), 4
-        )
-        rows = np.concatenate(parts)
+    if problem.grid_step_deg:
+        grid = equal_angle_grid(problem.grid_step_deg)
+        rows = _histogram(Samples(grid, field.weight_at(grid)), axes, nodes)
+    elif field.edges > MANY_EDGES:
+        rows = _histogram(weighted_samples(field, DIRECTIONS), axes, nodes)
     else:
         polar = (np.arange(circles) + 0.5) * (np.pi / circles)
         rows = _share_between_nodes(field.on_circles_about(axes, polar) * np.sin(polar), nodes)
+        around = rows.sum(axis=1) * (2 * np.pi * np.pi / circles)
+        samples = weighted_samples(field, DIRECTIONS // 10)
+        # what is narrower than the step between circles they meet about some axes and miss about others
+        if np.abs(around / samples.weights.sum() - 1).max() > MISSED:
+            rows = _histogram(samples, axes, nodes)
     total = rows.sum(axis=1, keepdims=True)
     if not (total > 0).all():
         raise TaskError(EMPTY)
     return rows / total
+
+
+def _histogram(samples: Samples, axes: Float[ndarray, "axes 3"], nodes: int) -> Array:
+    """Weight of samples near each polar node about each axis, shape (axes, nodes)."""
+    parts = in_chunks(
+        lambda chunk: _polar_histogram(samples.directions, samples.weights, axes[chunk], nodes), len(axes), 4
+    )
+    return np.concatenate(parts)
 
 
 def _share_between_nodes(circles: Array, nodes: int) -> Array:

@@ -8,6 +8,7 @@ turns to them. As for the spin, g of the mean count comes first and bounds what 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
@@ -15,12 +16,15 @@ from design.density.beams import beam_directions_rot
 from design.density.sweep import mean_count_swept, zones_swept
 from design.errors import TaskError
 from design.frames import R_world_rot
-from design.objective.named_objectives import Moment
 from design.objective.problem import Problem
-from design.search.coarse import MARGIN, Landscape, Progress
+from design.objective.score import blind_to_sweep
+from design.search.coarse import BLIND_MARGIN, Landscape, Progress, by_plane, may_win
+from design.search.constraints import AtMost, Constraint
 from design.search.grid_classes import Folded
-from design.search.plane_axis_product import BothWays, lowest, one_way
-from design.sphere.directions import EMPTY, spiral
+from design.search.plane_axis_product import Lowest, lowest, one_way
+from design.sphere.directions import EMPTY, spiral, weighted_samples
+from design.sphere.regions import Field
+from design.task.task import Limits
 
 DIRECTIONS = 3000  # of the rotation frame, at least: one every 3.7 deg
 MOST_DIRECTIONS = 20_000
@@ -29,7 +33,9 @@ MOST_SETTINGS = 50_000_000
 REPORT = 200
 
 
-def swept_landscape(problem: Problem, planes: Folded, axes: Folded, progress: Progress) -> tuple[Landscape, int]:
+def swept_landscape(
+    problem: Problem, planes: Folded, axes: Folded, progress: Progress, limits: Limits, avoid_holes: bool
+) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact; the others keep their bound.
 
     Raises:
@@ -43,30 +49,45 @@ def swept_landscape(problem: Problem, planes: Folded, axes: Folded, progress: Pr
         )
     share = float((problem.field.weight_at(spiral(MOST_DIRECTIONS)) > 0).mean())
     directions = spiral(int(np.clip(IN_REGION / max(share, 1e-9), DIRECTIONS, MOST_DIRECTIONS)))
-    weights = tuple(_weights(moment, axes, directions) for moment in problem.objective.moments)
+    weigh = _weights if share * len(directions) >= IN_REGION else _weights_nearby
+    weights = tuple(weigh(moment.field, axes, directions) for moment in problem.objective.moments)
     beams = [beam_directions_rot(problem.bearings_rad, *np.radians(plane)) for plane in planes.settings_deg]
     progress(f"mean densities of {len(beams):,} scan planes")
     means = in_chunks(lambda chunk: [_mean(problem, directions, b) for b in beams[chunk]], len(beams), smallest=1)
     mean = np.stack([row for part in means for row in part])
     g = np.stack([moment.g(mean) for moment in problem.objective.moments])
+    thin = np.zeros((0, 0), np.float32)
+    constraints: list[Constraint] = []
+    shares = weigh(problem.field, axes, directions).astype(np.float32)
+    blind = np.stack([blind_to_sweep(problem, directions, b) for b in beams]).astype(np.float32)
+    if avoid_holes:
+        constraints.append(AtMost(blind, (shares > 0).astype(np.float32), 0.5, turns=False))
+    if limits.max_blind_weight is not None:
+        constraints.append(AtMost(blind, shares, limits.max_blind_weight + BLIND_MARGIN, turns=False))
+    if limits.min_density is not None:
+        thin = (np.floor(mean + 1e-9) < limits.min_density).astype(np.float32)
+        constraints.append(AtMost(thin, (shares > 0).astype(np.float32), 0.5, turns=False))
     exact = np.zeros(len(beams), dtype=bool)
-    best = np.inf
+    best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
 
-    def ways_of(g: Array) -> list[BothWays]:
-        return [one_way(m, of_g, w) for m, of_g, w in zip(problem.objective.moments, g, weights, strict=True)]
+    def lowest_of(these: slice) -> tuple[Lowest, Lowest]:
+        ways = [one_way(m, of_g[these], w) for m, of_g, w in zip(problem.objective.moments, g, weights, strict=True)]
+        kept = [constraint.of(these, slice(None)) for constraint in constraints]
+        return lowest(problem.objective, ways, planes.has[:, these], axes.has, kept)
 
-    bounds = lowest(problem.objective, ways_of(g), planes.has, axes.has)[0].min(axis=0)
-    for c in np.argsort(bounds, kind="stable"):
-        if bounds[c] > best + MARGIN:
-            break
+    bounds = by_plane(lowest_of(slice(None)))
+    for c in np.argsort(bounds[0], kind="stable"):
+        if not may_win(bounds[:, c : c + 1], best)[0]:
+            continue
         if exact.sum() % REPORT == 0:
             progress(f"exact densities: {exact.sum()} of at most {len(beams):,} scan planes")
-        g[:, c] = _exact(problem, directions, beams[c])
+        g[:, c], least = _exact(problem, directions, beams[c])
         exact[c] = True
-        one = slice(c, c + 1)
-        best = min(best, float(lowest(problem.objective, ways_of(g[:, one]), planes.has[:, one], axes.has)[0].min()))
-    by_plane, its_class, its_flip, by_axis = lowest(problem.objective, ways_of(g), planes.has, axes.has)
-    return Landscape(problem.objective, g, weights, by_plane, (its_class, its_flip), by_axis), int(exact.sum())
+        if limits.min_density is not None:
+            thin[c] = least < limits.min_density
+        best = np.minimum(best, by_plane(lowest_of(slice(c, c + 1))).min(axis=1))
+    plain, kept = lowest_of(slice(None))
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())
 
 
 def _mean(problem: Problem, directions: Array, beams: Array) -> Array:
@@ -74,21 +95,30 @@ def _mean(problem: Problem, directions: Array, beams: Array) -> Array:
     return mean_count_swept(directions, beams, problem.sweep, problem.ball_rad)
 
 
-def _exact(problem: Problem, directions: Array, beams: Array) -> Array:
-    """What one plane gives at the directions, shape (moments, n)."""
+def _exact(problem: Problem, directions: Array, beams: Array) -> tuple[Array, Array]:
+    """What one plane gives at the directions, shape (moments, n), and the least count there, shape (n,)."""
     assert problem.sweep is not None
     rows = []
     for moment, table in zip(problem.objective.moments, problem.tables, strict=True):
         z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, table)
         rows.append(z.mean_g if moment.gathered == "mean" else moment.g(z.least))
-    return np.stack(rows)
+    return np.stack(rows), z.least
 
 
-def _weights(moment: Moment, axes: Folded, directions: Array) -> Array:
+def _weights(field: Field, axes: Folded, directions: Array) -> Array:
     """Share of the weight at each direction of the rotation frame, for each mounting, shape (mountings, n)."""
     R = R_world_rot(*np.radians(axes.settings_deg.T))
-    rows = np.stack([moment.field.weight_at(directions @ r.T) for r in R])
+    rows = np.stack([field.weight_at(directions @ r.T) for r in R])
     total = rows.sum(axis=1, keepdims=True)
     if not (total > 0).all():
         raise TaskError(EMPTY)
     return rows / total
+
+
+def _weights_nearby(field: Field, axes: Folded, directions: Array) -> Array:
+    """The same of a region that lies between the directions: each of its own is given to the one next to it."""
+    samples = weighted_samples(field, IN_REGION)
+    R = R_world_rot(*np.radians(axes.settings_deg.T))
+    tree = cKDTree(directions)
+    rows = np.stack([np.bincount(tree.query(samples.directions @ r)[1], samples.weights, len(directions)) for r in R])
+    return rows / samples.weights.sum()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -12,8 +13,9 @@ from scipy.optimize import minimize
 from design.arrays import Array, Mask, Setting
 from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
-from design.objective.score import Score, quick_J, score
+from design.objective.score import Score
 from design.search.coarse import Landscape
+from design.search.constraints import Judge
 from design.search.grid_classes import Folded
 from design.search.tolerance import worst_within
 from design.task.task import NAMES, AngleRanges
@@ -25,6 +27,7 @@ VALLEY_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one answ
 VALLEY_J = 2e-2
 NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
 MOST_LOOKS = 80  # for local minima, before the list is left shorter
+MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
 REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
 FINEST_DEG = 0.01
 
@@ -38,14 +41,12 @@ class Family:
         score: its J, rescored exactly.
         members: grid settings of the search that stand behind it.
         word: what the others are, for a person.
-        grid_deg: the setting of the grid that it was refined from.
     """
 
     angles_deg: tuple[float, float, float, float]
     score: Score
     members: int
     word: str
-    grid_deg: tuple[float, float, float, float] | None = None
 
     @property
     def angles_rad(self) -> Setting:
@@ -55,33 +56,49 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class Leader:
-    """Settings of equal coarse J, shown by the one that builds best; no `minimum` is on the slope of a better one."""
+    """Settings of equal coarse J, shown by the one that builds best; no `minimum` is on the slope of a better one.
+
+    `score` is the exact one of what is shown.
+    """
 
     angles_deg: Setting
-    J_coarse: float
+    score: Score
     members: int
     axes: int
     every_axis: bool
-    minimum: bool
+    minimum: bool = True
 
 
-def find_leaders(land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"]) -> list[Leader]:
-    """Local minima of J over planes and axes, lowest first, then settings on their slopes; equal ones are one.
+def find_leaders(
+    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], judge: Judge
+) -> list[Leader]:
+    """Local minima of J over what keeps the constraints, lowest first, then settings on their slopes.
 
-    A minimum takes its valley with it: settings about nearly the same axis with nearly the same J, whatever the plane.
+    Equal ones are one. A minimum takes its valley with it: settings about nearly the same axis with nearly the same J,
+    whatever the plane. What turns out to break a constraint between the nodes of the landscape is left out.
     """
-    J = np.stack([np.where(_open(planes, axes, c), land.about_axes(c), np.inf) for c in range(len(planes.first))])
+    rows = [
+        np.where(_open(planes, axes, c) & ~land.broken(c), land.about_axes(c), np.inf) for c in range(len(planes.first))
+    ]
+    J = np.stack(rows)
     left = J.copy()
     q = planes.representatives
     u = np.stack([axes.representatives, -axes.representatives])
     minima: list[Leader] = []
     slopes: list[Leader] = []
-    for _ in range(MOST_LOOKS):
+    looks = refused = 0
+    while looks < MOST_LOOKS and refused < MOST_REFUSED and len(minima) < FAMILIES:
         lowest = left.min()
-        if len(minima) == FAMILIES or not np.isfinite(lowest):
+        if not np.isfinite(lowest):
             break
         c, way, axis = (int(i) for i in np.unravel_index(int((left <= lowest + EQUAL).argmax()), left.shape))
         same = J[c] <= lowest + EQUAL
+        leader = _leader(J[c], planes, axes, c, way, axis, judge)
+        if leader is None:
+            J[c][same] = left[c][same] = np.inf
+            refused += 1
+            continue
+        looks += 1
         around = (u @ u[same].T).max(axis=2) >= np.cos(NEAR_RAD)
         beaten = False
         for mirror in mirrors:
@@ -89,20 +106,38 @@ def find_leaders(land: Landscape, planes: Folded, axes: Folded, mirrors: Float[n
                 beside = np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD
                 beaten |= bool((J[beside][:, there] < lowest - EQUAL).any())
                 left[beside] += np.where(there, np.inf, 0.0)
-        (slopes if beaten else minima).append(_leader(J[c], planes, axes, c, way, axis, not beaten))
+        (slopes if beaten else minima).append(replace(leader, minimum=not beaten))
         if not beaten:
             valley = around | around[::-1]
             left[:, valley] = np.where(left[:, valley] <= lowest + VALLEY_J, np.inf, left[:, valley])
     return minima + slopes
 
 
-def best_leader(land: Landscape, planes: Folded, axes: Folded) -> Leader:
-    """The lowest entry of a landscape too large to be looked at whole."""
-    lowest = land.by_plane.min(axis=0)
-    c = int((lowest <= lowest.min() + SINGLE).argmax())
-    J = np.where(_open(planes, axes, c), land.about_axes(c), np.inf)
-    way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
-    return _leader(J, planes, axes, c, int(way), int(axis), minimum=True)
+def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Judge, kept: bool = True) -> Leader | None:
+    """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
+
+    None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
+    """
+    lowest = (land.kept if kept else land.plain).by_plane.min(axis=0)
+    rows: dict[int, Array] = {}
+    refused = 0
+    while refused < MOST_REFUSED and np.isfinite(lowest.min()):
+        c = int((lowest <= lowest.min() + SINGLE).argmax())
+        if c not in rows:
+            closed = ~_open(planes, axes, c) | (land.broken(c) if kept else False)
+            rows[c] = np.where(closed, np.inf, land.about_axes(c))
+        J = rows[c]
+        if J.min() > lowest[c] + SINGLE:  # what was lowest has been refused
+            lowest[c] = J.min()
+            continue
+        way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
+        leader = _leader(J, planes, axes, c, int(way), int(axis), judge)
+        if leader is not None:
+            return leader
+        J[J.min() + EQUAL >= J] = np.inf
+        lowest[c] = J.min()
+        refused += 1
+    return None
 
 
 def _open(planes: Folded, axes: Folded, plane: int) -> Mask:
@@ -111,8 +146,8 @@ def _open(planes: Folded, axes: Folded, plane: int) -> Mask:
     return np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)])
 
 
-def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, minimum: bool) -> Leader:
-    """All grid settings that equal one entry by symmetry, shown by the one that builds best.
+def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, judge: Judge) -> Leader | None:
+    """All grid settings that equal one entry by symmetry, shown by the one that builds best; None where it is refused.
 
     `J` is that of the plane class about all axes, shape (2, axes); `way` is 1 where just one of plane and axis is
     flipped.
@@ -139,30 +174,29 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
     )
     every = len(axes.settings_deg) > 1 and len(distinct) == len(np.unique(np.round(axes.points, 9) + 0.0, axis=0))
     best = angles[np.lexsort(preference)[0]]
-    return Leader(best, float(J[way, axis]), len(angles), len(distinct), every, minimum)
+    exact = judge.score(best)
+    return None if exact is None else Leader(best, exact, len(angles), len(distinct), every)
 
 
-def refine_leaders(problem: Problem, ranges: AngleRanges, leaders: list[Leader]) -> tuple[Family, ...]:
-    """Score leaders exactly and refine the minima, the winner twice; valleys of better ones are dropped."""
-    minima = [(score(problem, np.radians(leader.angles_deg)), leader) for leader in leaders if leader.minimum]
-    minima.sort(key=lambda pair: pair[0].J)
+def refine_leaders(problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Judge) -> tuple[Family, ...]:
+    """Refine the minima, the winner twice; valleys of better ones are dropped."""
     families: list[Family] = []
-    for grid_score, leader in minima:
+    for leader in sorted((leader for leader in leaders if leader.minimum), key=lambda leader: leader.score.J):
         if len(families) == FAMILIES:
             break
-        if not any(_same_valley(leader.angles_deg, grid_score.J, better) for better in families):
-            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2])
-            again = score(problem, np.radians(refined))
+        if not any(_same_valley(leader.angles_deg, leader.score.J, better) for better in families):
+            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2], judge)
+            again = judge.score(refined)
             # the rounder angles of the grid are as good
-            if again.J + again.J_error >= grid_score.J and not ranges.tolerance_deg:
-                families.append(_family(leader.angles_deg, grid_score, leader))
+            if again is None or (again.J + again.J_error >= leader.score.J and not ranges.tolerance_deg):
+                families.append(_family(leader.angles_deg, leader.score, leader))
             elif not any(_same_valley(refined, again.J, better) for better in families):
                 families.append(_family(refined, again, leader))
     for leader in leaders:
         if len(families) == FAMILIES:
             break
-        if not leader.minimum and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
-            families.append(_family(leader.angles_deg, score(problem, np.radians(leader.angles_deg)), leader))
+        if not leader.minimum and not any(_same_valley(leader.angles_deg, leader.score.J, x) for x in families):
+            families.append(_family(leader.angles_deg, leader.score, leader))
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
@@ -179,7 +213,7 @@ def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> t
 
 def _family(angles_deg: Array, exact: Score, leader: Leader) -> Family:
     word = "any axis" if leader.every_axis else f"{leader.axes} axes" if leader.axes > 1 else ""
-    return Family(_four(angles_deg), exact, leader.members, word, _four(leader.angles_deg))
+    return Family(_four(angles_deg), exact, leader.members, word)
 
 
 def _four(angles_deg: Array) -> tuple[float, float, float, float]:
@@ -194,8 +228,13 @@ def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
     return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)
 
 
-def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...]) -> Setting:
-    """The nearest minimum of J, rounded to 0.01 deg; angles that the task fixes stay, and an axis that is any."""
+def _refined(
+    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], judge: Judge
+) -> Setting:
+    """The nearest minimum of J that keeps the constraints, rounded to 0.01 deg.
+
+    Angles that the task fixes stay, and an axis that is any.
+    """
     limits = np.array([ranges.limits(name) for name in NAMES])
     free = limits[:, 1] > limits[:, 0]
     free[:2] &= not leader.every_axis
@@ -209,7 +248,7 @@ def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tupl
             setting[free] = moved
             if ranges.tolerance_deg:
                 return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
-            return quick_J(problem, np.radians(setting), nodes)
+            return judge.J(setting, nodes)
 
         start, step = angles[free], reach * ranges.step_deg
         shift = np.where(start + step <= limits[free, 1], step, -step)
@@ -226,6 +265,13 @@ def _refined(problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tupl
             },
         )
         angles[free] = found.x
-    rounded = np.round(angles[free] / FINEST_DEG) * FINEST_DEG
-    angles[free] = np.clip(rounded, limits[free, 0], limits[free, 1]).round(2)
-    return angles + 0.0  # -0.0 is 0.0
+    # of the settings around it the nearest: rounding may leave the constraints
+    below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
+    corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
+    corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
+    for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
+        setting = angles.copy()
+        setting[free] = corner
+        if np.isfinite(judge.J(setting, nodes)):
+            return setting + 0.0  # -0.0 is 0.0
+    return leader.angles_deg

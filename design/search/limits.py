@@ -1,7 +1,7 @@
-"""What a task demands of a setting whatever its J: no gap, blind cone or density beyond a limit.
+"""What a task demands of scan planes whatever their J: no gap between lines and no blind cone beyond a limit.
 
-Gaps between lines and blind cones are decided by the scan plane alone, so the search never looks at planes that break
-them. The lowest density depends on everything: settings are asked one by one, best J first.
+Both are decided by the plane alone, so the search never looks at planes that break them. What depends on the axis too
+stands in `design.search.constraints`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from numpy import ndarray
 from design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
 from design.errors import TaskError
 from design.objective.problem import Problem
-from design.objective.score import Score
 from design.search.grid_classes import Folded
 from design.task.task import Limits
 
@@ -51,11 +50,6 @@ def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Lim
     if limits.max_blind_cone_deg is not None:
         keep &= blind_cones_deg(problem, planes_rad) <= limits.max_blind_cone_deg + 1e-9
     return keep
-
-
-def keeps(score: Score, limits: Limits) -> bool:
-    """Whether a scored setting keeps the limits that depend on the axis too."""
-    return score.least >= (limits.min_density or 0) and score.blind_weight <= (limits.max_blind_weight or 1.0)
 
 
 def blind_cones_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:

@@ -1,8 +1,9 @@
-"""Products of all scan planes with all axes, made in pieces, of which only the lowest along each side is kept."""
+"""Products of all scan planes with all axes, made in pieces, of which only the lowest along each side stays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from numpy import ndarray
 from design.arrays import Array, Ints, Mask
 from design.concurrency.parallel import in_chunks
 from design.objective.named_objectives import Moment, Objective
+from design.search.constraints import Constraint
 
 PIECE = 128  # planes per piece of the product
 
@@ -24,41 +26,73 @@ def gathered(moment: Moment, weights: Float[ndarray, "... axes nodes"], g: Float
     return weights @ g if moment.gathered == "mean" else np.where(weights > 0, g, -np.inf).max(axis=1)
 
 
+@dataclass(frozen=True, slots=True)
+class Lowest:
+    """The lowest J along each side of the products.
+
+    Attributes:
+        by_plane: lowest J of a plane class, not flipped and flipped, over the axes of the grid, (2, planes).
+        its_class: axis class where that was, (2, planes).
+        its_flip: whether that axis is flipped, (2, planes).
+        by_axis: lowest J about an axis class, not flipped and flipped, over the planes of the grid, (2, axes).
+    """
+
+    by_plane: Array
+    its_class: Ints
+    its_flip: Ints
+    by_axis: Array
+
+
 def lowest(
-    objective: Objective, ways: list[BothWays], has_plane: Mask, has_axis: Mask
-) -> tuple[Array, Ints, Ints, Array]:
-    """Lowest J of every plane (with the axis it is about) and about every axis, for the flips that the grid holds.
+    objective: Objective,
+    ways: list[BothWays],
+    has_plane: Mask,
+    has_axis: Mask,
+    constraints: Sequence[Constraint] = (),
+) -> tuple[Lowest, Lowest]:
+    """Lowest J of every plane and about every axis: of all settings of the grid, and of those that keep constraints.
 
     Args:
         objective: joins the moments.
         ways: of each moment.
         has_plane: whether the grid has a plane class not flipped, and flipped, (2, planes).
         has_axis: the same of axes, (2, axes).
-
-    Returns:
-        As `Landscape`: by_plane, the class and the flip of its axis, by_axis.
+        constraints: what settings must keep; where none keeps them J is inf.
     """
-    planes, axes = has_plane.shape[1], has_axis.shape[1]
     closed_axis = np.where(has_axis, 0, np.inf).astype(np.float32)
     closed_plane = np.where(has_plane, 0, np.inf).astype(np.float32)
-    by_plane = np.empty((2, planes), np.float32)
-    its_class: Ints = np.empty((2, planes), np.intp)
-    its_flip: Ints = np.empty((2, planes), np.intp)
-    by_axis = np.full((2, axes), np.inf, np.float32)
-    for first in range(0, planes, PIECE):
-        piece = slice(first, min(first + PIECE, planes))
+    plain: list[_Piece] = []
+    kept: list[_Piece] = []
+    for first in range(0, has_plane.shape[1], PIECE):
+        piece = slice(first, min(first + PIECE, has_plane.shape[1]))
         pairs = [way(piece) for way in ways]
-        straight, turned = (objective.join(np.stack([pair[i] for pair in pairs])) for i in (0, 1))
-        parts = _in_parts(straight, turned, closed_plane[:, piece], closed_axis)
-        by_axis = np.minimum(by_axis, np.concatenate([part[3] for part in parts], axis=1))
-        starts = np.cumsum([0, *(part[3].shape[1] for part in parts)])[:-1]
-        lows = np.stack([part[0] for part in parts])
-        which = lows.argmin(axis=0)
-        flips, rows = np.indices(which.shape)
-        by_plane[:, piece] = lows[which, flips, rows]
-        its_class[:, piece] = np.stack([part[1] for part in parts])[which, flips, rows] + starts[which]
-        its_flip[:, piece] = np.stack([part[2] for part in parts])[which, flips, rows]
-    return by_plane.astype(float), its_class, its_flip, by_axis.astype(float)
+        both = [np.ascontiguousarray(objective.join(np.stack([pair[i] for pair in pairs]))) for i in (0, 1)]
+        plain.append(_lowest_of_piece(both, closed_plane[:, piece], closed_axis))
+        for constraint in constraints:
+            for J, broken in zip(both, constraint.broken(piece), strict=True):
+                J[broken] = np.inf
+        kept.append(_lowest_of_piece(both, closed_plane[:, piece], closed_axis) if constraints else plain[-1])
+    return _joined(plain), _joined(kept)
+
+
+_Piece = tuple[Array, Ints, Ints, Array]
+
+
+def _joined(pieces: list[_Piece]) -> Lowest:
+    by_plane, its_class, its_flip = (np.concatenate([piece[i] for piece in pieces], axis=1) for i in range(3))
+    by_axis = np.minimum.reduce([piece[3] for piece in pieces])
+    return Lowest(by_plane.astype(float), its_class, its_flip, by_axis.astype(float))
+
+
+def _lowest_of_piece(both: list[Array], closed_plane: Array, closed_axis: Array) -> _Piece:
+    parts = _in_parts(both[0], both[1], closed_plane, closed_axis)
+    starts = np.cumsum([0, *(part[3].shape[1] for part in parts)])[:-1]
+    lows = np.stack([part[0] for part in parts])
+    which = lows.argmin(axis=0)
+    flips, rows = np.indices(which.shape)
+    its_class = np.stack([part[1] for part in parts])[which, flips, rows] + starts[which]
+    its_flip = np.stack([part[2] for part in parts])[which, flips, rows]
+    return lows[which, flips, rows], its_class, its_flip, np.concatenate([part[3] for part in parts], axis=1)
 
 
 def _in_parts(

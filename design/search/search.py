@@ -11,13 +11,15 @@ from numpy import ndarray
 
 from design.errors import TaskError
 from design.left_out import LeftOut
+from design.objective.named_objectives import Moment, Objective
 from design.objective.problem import Problem
-from design.objective.score import score
 from design.search.coarse import Landscape, Progress, coarse_landscape
 from design.search.coarse_sweep import swept_landscape
+from design.search.constraints import NO_BLIND_WEIGHT, Judge
 from design.search.families import Family, best_leader, find_leaders, refine_leaders
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
-from design.search.limits import allowed_planes, keeps, planes_keep
+from design.search.limits import allowed_planes
+from design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
 from design.task.task import NAMES, AngleRanges, Limits
 
 LEADERS_STEP_DEG = 5.0
@@ -29,7 +31,9 @@ class SearchResult:
     """What the search found.
 
     Attributes:
-        best: families, best first.
+        best: families, best first; all keep the limits, and none has a hole where they can be avoided.
+        plain: the optimum of J alone, where holes are avoided and it has some.
+        least_blind: where every setting has holes that were to be avoided, the smallest share of weight in them.
         covered: grid settings that the answer stands for.
         evaluated: distinct values of J computed.
         seconds: time of the search and the rescoring.
@@ -40,6 +44,8 @@ class SearchResult:
     """
 
     best: tuple[Family, ...]
+    plain: Family | None
+    least_blind: float | None
     covered: int
     evaluated: int
     seconds: float
@@ -54,69 +60,116 @@ def search(
     progress: Progress = lambda _: None,
     limits: Limits = NONE,
 ) -> SearchResult:
-    """Find the best families of settings in the ranges of a task that keep its limits.
+    """Find the best families of settings in the ranges of a task that keep its limits and, if they can, have no hole.
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
     start = time.perf_counter()
-    mirrors = mirrors_of(problem.bearings_rad)
-    if problem.sweep is None:
-        axes, planes = fold_axes(ranges), allowed_planes(problem, fold_planes(ranges, mirrors), limits)
-        progress(f"{len(planes.first):,} different scan planes x {len(axes.first):,} axes, both ways round")
-        land, exact = coarse_landscape(problem, planes, axes, progress)
-    else:
-        mirrors, (axes, planes) = mirrors[:1], unfolded(ranges)
-        planes = allowed_planes(problem, planes, limits)
-        progress(f"{len(planes.first):,} scan planes x {len(axes.first):,} mountings of the servo")
-        land, exact = swept_landscape(problem, planes, axes, progress)
+    mirrors = mirrors_of(problem.bearings_rad)[: 2 if problem.sweep is None else 1]
+    fine = _grid(problem, ranges, limits)
+    progress(_looked_over(problem, fine))
+    avoid = ranges.holes == "avoid"
+    land, exact = _landscape(problem, fine, progress, limits, avoid)
+    holes_left = avoid and not np.isfinite(land.kept.by_plane).any()
+    least_blind = None
+    if holes_left:  # nothing is free of them: the lowest J of all, and what it misses is said
+        least_blind = _least_blind(problem, land, fine)
+        progress("no setting of the grid sees all of the region: the lowest J of all")
+        land, exact = _landscape(problem, fine, progress, limits, avoid_holes=False)
+        avoid = False
+    judge = Judge(problem, limits, avoid)
+    winner = best_leader(land, *fine, judge)
+    if winner is None:
+        raise TaskError(_none_keeps(problem, land, fine, limits))
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
-        leaders = find_leaders(land, planes, axes, mirrors)
+        leaders = find_leaders(land, *fine, mirrors, judge)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
-        coarse = ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG})
-        coarse_axes, coarse_planes = fold_axes(coarse), allowed_planes(problem, fold_planes(coarse, mirrors), limits)
-        coarse_land, _ = coarse_landscape(problem, coarse_planes, coarse_axes, progress)
-        leaders = [best_leader(land, planes, axes), *find_leaders(coarse_land, coarse_planes, coarse_axes, mirrors)]
-    progress("rescoring the leaders exactly, refining the minima")
-    families = _kept(refine_leaders(problem, ranges, leaders), problem, limits)
-    covered = len(axes.settings_deg) * len(planes.settings_deg)
-    different = _different(planes, axes)
+        coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
+        leaders = find_leaders(_landscape(problem, coarse, progress, limits, avoid)[0], *coarse, mirrors, judge)
+    progress("refining the minima")
+    families = refine_leaders(problem, ranges, [winner, *leaders], judge)
+    covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
+    different = _different(*fine)
     return SearchResult(
         best=families,
+        plain=_plain(problem, ranges, limits, land, fine, families[0]) if avoid else None,
+        least_blind=least_blind,
         covered=covered,
         evaluated=different,
         seconds=time.perf_counter() - start,
-        left_out=_left_out(ranges, covered, different, len(planes.first) - exact),
-        planes=_plane_table(planes, axes, land),
-        axes=np.column_stack([axes.settings_deg, land.by_axis[axes.flip.astype(int), axes.classes]]),
+        left_out=_left_out(ranges, covered, different, len(fine[0].first) - exact),
+        planes=_plane_table(*fine, land.plain),
+        axes=np.column_stack([fine[1].settings_deg, land.plain.by_axis[fine[1].flip.astype(int), fine[1].classes]]),
     )
 
 
-def _kept(families: tuple[Family, ...], problem: Problem, limits: Limits) -> tuple[Family, ...]:
-    """The families that keep the limits; where refining has left them, the setting of the grid stands again.
-
-    Raises:
-        TaskError: none does.
-    """
-    planes_rad = np.array([family.angles_rad[2:] for family in families])
-    within = planes_keep(problem, planes_rad, limits)
-    families = tuple(f if keep else _on_the_grid(problem, f) for f, keep in zip(families, within, strict=True))
-    kept = tuple(family for family in families if keeps(family.score, limits))
-    if not within.all():
-        kept = tuple(sorted(kept, key=lambda family: family.score.J))
-    if not kept:
-        least = max(family.score.least for family in families)
-        blind = min(family.score.blind_weight for family in families)
-        raise TaskError(
-            f"limits: none of the {len(families)} best families keeps them: min_density reaches {least}, "
-            f"max_blind_weight {blind:.2g}; a longer period helps, or a smaller region"
-        )
-    return kept
+Grid = tuple[Folded, Folded]
+"""Scan planes and axes."""
 
 
-def _on_the_grid(problem: Problem, family: Family) -> Family:
-    assert family.grid_deg is not None
-    return replace(family, angles_deg=family.grid_deg, score=score(problem, np.radians(family.grid_deg)))
+def _grid(problem: Problem, ranges: AngleRanges, limits: Limits) -> Grid:
+    if problem.sweep is None:
+        return allowed_planes(problem, fold_planes(ranges, mirrors_of(problem.bearings_rad)), limits), fold_axes(ranges)
+    axes, planes = unfolded(ranges)
+    return allowed_planes(problem, planes, limits), axes
+
+
+def _looked_over(problem: Problem, grid: Grid) -> str:
+    planes, axes = (len(side.first) for side in grid)
+    if problem.sweep is None:
+        return f"{planes:,} different scan planes x {axes:,} axes, both ways round"
+    return f"{planes:,} scan planes x {axes:,} mountings of the servo"
+
+
+def _landscape(
+    problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid_holes: bool
+) -> tuple[Landscape, int]:
+    make = coarse_landscape if problem.sweep is None else swept_landscape
+    return make(problem, *grid, progress, limits, avoid_holes)
+
+
+def _plain(
+    problem: Problem, ranges: AngleRanges, limits: Limits, land: Landscape, grid: Grid, best: Family
+) -> Family | None:
+    """The optimum of J alone, where it has a hole: what the answer is compared with."""
+    judge = Judge(problem, limits, avoid_holes=False)
+    leader = best_leader(land, *grid, judge, kept=False)
+    if leader is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
+        return None
+    plain = refine_leaders(problem, ranges, [leader], judge)[0]
+    return plain if plain.score.J < best.score.J else None
+
+
+def _least_blind(problem: Problem, land: Landscape, grid: Grid) -> float:
+    """The smallest share of weight that a setting of the grid leaves blind."""
+    planes, axes = grid
+    moment = Moment(problem.field, np.asarray)
+    blind = Objective("blind", problem.field, (moment,), lambda moments: np.asarray(moments[0]))
+    shared = zip(land.objective.moments, land.weights, strict=True)
+    weights = np.sum([each.share * w for each, w in shared if each.share], axis=0)
+    ways = (both_ways if problem.sweep is None else one_way)(moment, land.blind, weights)
+    low, _ = lowest(blind, [ways], planes.has | planes.own, axes.has)
+    least = replace(land, objective=blind, g=land.blind[None], weights=(weights,), constraints=(), plain=low, kept=low)
+    leader = best_leader(least, planes, axes, Judge(problem, NONE, avoid_holes=False))
+    assert leader is not None
+    return leader.score.blind_weight
+
+
+def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -> str:
+    """Why a search has no answer, with what the setting of the lowest J reaches."""
+    nearest = best_leader(land, *grid, Judge(problem, NONE, avoid_holes=False), kept=False)
+    assert nearest is not None
+    asked = ", ".join(
+        f"{name} = {value:g}"
+        for name, value in (("min_density", limits.min_density), ("max_blind_weight", limits.max_blind_weight))
+        if value is not None
+    )
+    return (
+        f"limits: {asked}: no setting of the grid keeps them; the one of the lowest J has min_density "
+        f"{nearest.score.least} and max_blind_weight {nearest.score.blind_weight:.2g}; a longer period helps, or a "
+        "smaller region"
+    )
 
 
 def _different(planes: Folded, axes: Folded) -> int:
@@ -125,11 +178,11 @@ def _different(planes: Folded, axes: Folded) -> int:
     return 2 * len(planes.first) * len(axes.first) - one_way
 
 
-def _plane_table(planes: Folded, axes: Folded, land: Landscape) -> Float[ndarray, "planes 5"]:
+def _plane_table(planes: Folded, axes: Folded, low: Lowest) -> Float[ndarray, "planes 5"]:
     """See `SearchResult.planes`."""
     flip = planes.flip.astype(int)
-    J = land.by_plane[flip, planes.classes]
-    its_class, its_flip = (side[flip, planes.classes] for side in land.its_axis)
+    J = low.by_plane[flip, planes.classes]
+    its_class, its_flip = (side[flip, planes.classes] for side in (low.its_class, low.its_flip))
     setting = np.full((2, len(axes.first)), -1)
     order = np.arange(len(axes.settings_deg))[::-1]  # the first setting of each class stays
     setting[axes.flip[order].astype(int), axes.classes[order]] = order

@@ -126,7 +126,7 @@ def _cells(field: Field, patch: int) -> tuple[Float[ndarray, "n 3"], Float[ndarr
 def _breaks(field: Field, axis: Vector) -> Float[ndarray, " n"]:
     """Polar angles at which a circle about `axis` touches an edge or passes a corner; 0 and pi too."""
     touched = _touched(_breaking(field), axis)
-    points = np.concatenate([touched[_is_edge(field, touched)], _edge_corners(field)])
+    points = np.concatenate([touched[_is_edge(field, touched)], edge_corners(field)])
     passing = np.arctan2(np.linalg.norm(np.cross(points, axis), axis=1), points @ axis)
     grid = np.linspace(0, np.pi, GRID + 1) if field.edges > MANY_EDGES else np.array([0.0, np.pi])
     return np.concatenate([grid, passing])
@@ -138,22 +138,25 @@ def _breaking(field: Field) -> Float[ndarray, "edges 4"]:
 
 
 @lru_cache(maxsize=64)
-def _edge_corners(field: Field) -> Float[ndarray, "n 3"]:
-    """Corners of the region, the same about every axis."""
+def edge_corners(field: Field) -> Float[ndarray, "n 3"]:
+    """Corners of the region, the same about every axis, shape (n, 3)."""
     corners = _corners(_breaking(field)[:MOST_CORNERED])
     return corners[_is_edge(field, corners)]
+
+
+def around(points: Float[ndarray, "n 3"]) -> Float[ndarray, "n looks 3"]:
+    """Directions on a small ring about each unit vector (n, 3): what lies on the sides of an edge that it is on."""
+    e1, e2, centre = (frames_about(points)[:, None, i] for i in range(3))
+    turn = (2 * np.pi * np.arange(LOOKS_AROUND) / LOOKS_AROUND + 0.1)[None, :, None]
+    ring = centre + LOOK_RAD * (np.cos(turn) * e1 + np.sin(turn) * e2)
+    return ring / np.linalg.norm(ring, axis=2, keepdims=True)
 
 
 def _is_edge(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
     """Whether the weight changes around points of edge planes: most crossings lie within a region, or outside all."""
     if not len(points):
         return np.zeros(0, dtype=bool)
-    frames = frames_about(points)
-    around = 2 * np.pi * np.arange(LOOKS_AROUND) / LOOKS_AROUND + 0.1
-    e1, e2, centre = (frames[:, None, i] for i in range(3))
-    ring = centre + LOOK_RAD * (np.cos(around)[None, :, None] * e1 + np.sin(around)[None, :, None] * e2)
-    ring /= np.linalg.norm(ring, axis=2, keepdims=True)
-    values = field.weight_at(ring.reshape(-1, 3)).reshape(len(points), -1)
+    values = field.weight_at(around(points).reshape(-1, 3)).reshape(len(points), -1)
     return np.ptp(values, axis=1) > 0
 
 

@@ -58,6 +58,9 @@ class AngleRanges(Record):
     beta_laser_deg: Angle = (-90.0, 90.0)
     step_deg: Number = Field(default=5.0, ge=0.5, le=45)
     tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
+    holes: Literal["avoid", "allow"] = Field(
+        default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
+    )
 
     @model_validator(mode="after")
     def _within_bounds(self) -> AngleRanges:

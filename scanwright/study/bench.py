@@ -124,13 +124,11 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
 
 
 def _family(entry: dict[str, Any]) -> Family:
-    grid = entry["grid_deg"]
     return Family(
         angles_deg=tuple(entry["angles_deg"]),
         score=Score(**entry["score"]),
         members=entry["members"],
         word=entry["word"],
-        grid_deg=None if grid is None else tuple(grid),
     )
 
 

@@ -1,0 +1,115 @@
+"""What pairs of scan plane and axis must keep whatever their J, asked of the whole grid at once.
+
+A setting is free of holes where its fan, a ball radius wider, reaches from the lowest polar angle of the region about
+the axis to the highest: two numbers of the plane, two of the axis, two comparisons a pair. A lowest density, a share
+that may be blind, and all that a sweep must not miss are sums over nodes: one more product each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from design.arrays import Array, Ints, Mask, Setting
+from design.density.beams import polar_of_planes
+from design.objective.problem import Problem
+from design.objective.score import Score, score, score_on
+from design.search.limits import planes_keep
+from design.task.task import Limits
+
+TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
+NO_BLIND_WEIGHT = 1e-9  # share of the weight: rounding of the same
+PIECE = 4096  # planes whose beams are looked at together
+
+
+class Constraint(Protocol):
+    """What pairs of planes and axes must keep."""
+
+    def broken(self, planes: slice) -> tuple[Mask, Mask]:
+        """Pairs of a piece of the planes with all axes that break it, straight and with the planes turned round."""
+        ...
+
+    def of(self, planes: slice | Ints, axes: slice) -> Constraint:
+        """The same of some planes and some axes."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class NoHole:
+    """Lowest and highest polar angle about the axis: of the fan and a ball, (planes, 2); of weight, (axes, 2)."""
+
+    fan_rad: Float[ndarray, "planes 2"]
+    region_rad: Float[ndarray, "axes 2"]
+
+    def broken(self, planes: slice) -> tuple[Mask, Mask]:
+        """See `Constraint`."""
+        low, high = self.fan_rad[planes, 0, None], self.fan_rad[planes, 1, None]
+        first, last = self.region_rad[:, 0] + TOUCHING_RAD, self.region_rad[:, 1] - TOUCHING_RAD
+        return (low > first) | (high < last), (np.pi - high > first) | (np.pi - low < last)
+
+    def of(self, planes: slice | Ints, axes: slice) -> NoHole:
+        """See `Constraint`."""
+        return NoHole(self.fan_rad[planes], self.region_rad[axes])
+
+
+@dataclass(frozen=True, slots=True)
+class AtMost:
+    """A sum over nodes that may not be more than `most`: of planes (planes, nodes) times axes (axes, nodes).
+
+    Turned round, a plane has its nodes in the opposite order; where nothing turns round both ways are the same.
+    """
+
+    of_planes: Array
+    of_axes: Array
+    most: float
+    turns: bool
+
+    def broken(self, planes: slice) -> tuple[Mask, Mask]:
+        """See `Constraint`."""
+        rows = self.of_planes[planes].astype(np.float32)
+        straight = rows @ self.of_axes.T > self.most
+        return straight, np.ascontiguousarray(rows[:, ::-1]) @ self.of_axes.T > self.most if self.turns else straight
+
+    def of(self, planes: slice | Ints, axes: slice) -> AtMost:
+        """See `Constraint`."""
+        return AtMost(self.of_planes[planes], self.of_axes[axes], self.most, self.turns)
+
+
+def fan_reach(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
+    """Lowest and highest polar angle that the fans of scan planes (n, 2) and a ball reach, shape (n, 2)."""
+    pieces = [planes_rad[i : i + PIECE] for i in range(0, len(planes_rad), PIECE)]
+    polar = [polar_of_planes(problem.bearings_rad, piece) for piece in pieces]
+    lowest = np.concatenate([p.min(axis=1) for p in polar]) - problem.ball_rad
+    return np.stack([lowest, np.concatenate([p.max(axis=1) for p in polar]) + problem.ball_rad], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """Scores settings in degrees, and refuses those that break what a search may not break."""
+
+    problem: Problem
+    limits: Limits
+    avoid_holes: bool
+
+    def score(self, angles_deg: Setting) -> Score | None:
+        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None where it is refused."""
+        found = score(self.problem, np.radians(angles_deg))
+        return found if self.keeps(found, angles_deg) else None
+
+    def J(self, angles_deg: Setting, nodes: int) -> float:
+        """J on a number of nodes; inf where the setting is refused."""
+        found = score_on(self.problem, np.radians(angles_deg), nodes)
+        return found.J if self.keeps(found, angles_deg) else np.inf
+
+    def keeps(self, found: Score, angles_deg: Setting) -> bool:
+        """Whether a scored setting keeps the limits and, where they are to be avoided, has no hole."""
+        blind = 0.0 if self.avoid_holes else self.limits.max_blind_weight
+        if blind is not None and found.blind_weight > blind + NO_BLIND_WEIGHT:
+            return False
+        if found.least < (self.limits.min_density or 0):
+            return False
+        return bool(planes_keep(self.problem, np.radians(angles_deg[None, 2:]), self.limits)[0])
