@@ -37,6 +37,7 @@ from design.density.beams import ScanLines
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
 from design.objective.ball_search import SETS
+from design.objective.holes import percent
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score, score, score_on
 from design.search.coarse import Progress
@@ -199,14 +200,14 @@ def table(rows: list[ComparisonRow]) -> list[str]:
     """Lines of text for a person, the heading first."""
     width = max(len(row.name) for row in rows)
     lines = [
-        f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>6}"
-        f" {'of weight':>9} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'USD':>7}"
+        f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>7}"
+        f" {'of weight':>13} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'USD':>7}"
     ]
     for row in rows:
         cost = "?" if row.cost_usd is None else f"{row.cost_usd:,.0f}"
         lines.append(
             f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f} {row.J_error:6.0e}"
-            f" {row.blind_fraction:6.1%} {row.blind_weight:9.1%} {row.gap_deg:9.3f} {row.layers:6}"
+            f" {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13} {row.gap_deg:9.3f} {row.layers:6}"
             f" {row.points_per_s:9,.0f} {cost:>7}"
         )
     return lines

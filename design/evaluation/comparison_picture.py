@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from design.evaluation.comparison import ComparisonRow
 from design.evaluation.density_picture import INK
+from design.objective.holes import percent
 
 LONG = {"color": "#555555"}
 SHORT = {"facecolor": "#dddddd", "hatch": "////", "edgecolor": "#777777", "linewidth": 0.0}
@@ -37,7 +38,7 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
         J.barh(place, -row.J, height=height, xerr=row.J_error, ecolor="#999999", **look)
         J.text(-row.J, place, f" {-row.J + 0.0:.2f}", va="center", fontsize=8)
         blind.barh(y, 100 * row.blind_weight, height=0.6, **look)
-        blind.text(100 * row.blind_weight, y, f" {row.blind_weight:.1%}", va="center", fontsize=8)
+        blind.text(100 * row.blind_weight, y, f" {percent(row.blind_weight)}", va="center", fontsize=8)
         gap.barh(y, row.gap_deg, height=0.6, **look)
         gap.text(row.gap_deg, y, f" {row.gap_deg:.3g}", va="center", fontsize=8)
         if row.cost_usd is not None:

@@ -17,6 +17,7 @@ from design.evaluation.coverage import Coverage, coverage, on_surfaces
 from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
 from design.evaluation.poles import PoleChances, parse_pole, pole_chances
 from design.objective.ball_search import BallScore, ball_score
+from design.objective.holes import Hole, holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.tolerance import rise_words, sensitivity
@@ -32,6 +33,7 @@ class Evaluation:
         angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
         score: J by the closed form.
         ball: J by the paper's ball search over simulated scans.
+        holes: where the region is blind.
         coverage: what is blind and what is masked.
         gaps: blind cones, gaps and crossings of scan lines.
         cap: the largest empty cap of a sweep; None for a spin, whose blind cones say it.
@@ -45,6 +47,7 @@ class Evaluation:
     angles_rad: Setting
     score: Score
     ball: BallScore
+    holes: tuple[Hole, ...]
     coverage: Coverage
     gaps: Gaps
     cap: BlindCone | None
@@ -57,12 +60,28 @@ class Evaluation:
         """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
         return simulated_beams(self.problem, self.angles_rad)
 
+    @property
+    def agree(self) -> bool:
+        """Whether J and its ball search differ by no more than both state."""
+        off = abs(self.score.J - self.ball.J)
+        return bool(off <= self.score.J_error + self.ball.J_error) or not np.isfinite(off)
+
+    def _doubts(self) -> list[str]:
+        if self.agree:
+            return []
+        off = abs(self.score.J - self.ball.J) / (self.score.J_error + self.ball.J_error)
+        return [
+            f"J and J_ball differ by {off:.1f} times what both state: do not trust this J, and please report the task"
+        ]
+
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
         return {
             "J": self.score.J,
             "J_error": self.score.J_error,
             "J_lower": self.score.J_lower,
+            "J_agrees_with_J_ball": self.agree,
+            "holes": [asdict(hole) for hole in self.holes],
             "J_ball": self.ball.J,
             "J_ball_error": self.ball.J_error,
             "blind_fraction": self.coverage.blind_fraction,
@@ -81,10 +100,16 @@ class Evaluation:
         """The same, a line for each figure."""
         J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
         lines = [
+            *self._doubts(),
+            *(
+                [f"hole           {hole.words()}" for hole in self.holes]
+                or ["holes          none: no direction that matters is blind"]
+            ),
             f"J              {J.J:.5f} +- {J.J_error:.1e}   mean of g(true count) over the start phase",
             f"J_lower        {J.J_lower:.5f}             g of the mean count: a lower bound",
             f"J_ball         {ball.J:.5f} +- {ball.J_error:.1e}   ball search over 8 simulated scans",
-            f"blind          {seen.blind_fraction:.2%} of the unmasked sphere, {J.blind_weight:.2%} of the weight",
+            f"blind          {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
+            "weight",
             f"masked         {seen.masked_fraction:.2%} of the sphere",
             f"min_density    {J.least} beams per ball, lowest in the weighted region at any start phase",
         ]
@@ -141,6 +166,7 @@ def evaluate(
         angles_rad=angles_rad,
         score=found,
         ball=ball_score(problem, angles_rad),
+        holes=holes(problem, angles_rad),
         coverage=coverage(problem, angles_rad),
         gaps=gaps(problem, angles_rad),
         cap=cap,

@@ -16,13 +16,13 @@ from numpy import ndarray
 
 from design.arrays import Array, Ints, Mask, Setting
 from design.density.beams import polar_of_planes
+from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import Problem
 from design.objective.score import Score, score, score_on
 from design.search.limits import planes_keep
 from design.task.task import Limits
 
 TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
-NO_BLIND_WEIGHT = 1e-9  # share of the weight: rounding of the same
 PIECE = 4096  # planes whose beams are looked at together
 
 

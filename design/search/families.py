@@ -56,17 +56,17 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class Leader:
-    """Settings of equal coarse J, shown by the one that builds best; no `minimum` is on the slope of a better one.
+    """Settings of equal coarse J, shown by the one that builds best.
 
-    `score` is the exact one of what is shown.
+    `score` is the exact one of what is shown; only minima have it: none is on the slope of a better one.
     """
 
     angles_deg: Setting
-    score: Score
+    J_coarse: float
+    score: Score | None
     members: int
     axes: int
     every_axis: bool
-    minimum: bool = True
 
 
 def find_leaders(
@@ -93,20 +93,23 @@ def find_leaders(
             break
         c, way, axis = (int(i) for i in np.unravel_index(int((left <= lowest + EQUAL).argmax()), left.shape))
         same = J[c] <= lowest + EQUAL
-        leader = _leader(J[c], planes, axes, c, way, axis, judge)
-        if leader is None:
-            J[c][same] = left[c][same] = np.inf
-            refused += 1
-            continue
-        looks += 1
         around = (u @ u[same].T).max(axis=2) >= np.cos(NEAR_RAD)
-        beaten = False
+        beaten, near = False, []
         for mirror in mirrors:
             for sign, there in ((1, around), (-1, around[::-1])):
                 beside = np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD
                 beaten |= bool((J[beside][:, there] < lowest - EQUAL).any())
-                left[beside] += np.where(there, np.inf, 0.0)
-        (slopes if beaten else minima).append(replace(leader, minimum=not beaten))
+                near.append((beside, there))
+        leader = _leader(J[c], planes, axes, c, way, axis)
+        exact = None if beaten else judge.score(leader.angles_deg)
+        if not beaten and exact is None:
+            J[c][same] = left[c][same] = np.inf
+            refused += 1
+            continue
+        looks += 1
+        (slopes if beaten else minima).append(replace(leader, score=exact))
+        for beside, there in near:
+            left[beside] += np.where(there, np.inf, 0.0)
         if not beaten:
             valley = around | around[::-1]
             left[:, valley] = np.where(left[:, valley] <= lowest + VALLEY_J, np.inf, left[:, valley])
@@ -131,9 +134,10 @@ def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Judge, kep
             lowest[c] = J.min()
             continue
         way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
-        leader = _leader(J, planes, axes, c, int(way), int(axis), judge)
-        if leader is not None:
-            return leader
+        leader = _leader(J, planes, axes, c, int(way), int(axis))
+        exact = judge.score(leader.angles_deg)
+        if exact is not None:
+            return replace(leader, score=exact)
         J[J.min() + EQUAL >= J] = np.inf
         lowest[c] = J.min()
         refused += 1
@@ -146,8 +150,8 @@ def _open(planes: Folded, axes: Folded, plane: int) -> Mask:
     return np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)])
 
 
-def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, judge: Judge) -> Leader | None:
-    """All grid settings that equal one entry by symmetry, shown by the one that builds best; None where it is refused.
+def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int) -> Leader:
+    """All grid settings that equal one entry by symmetry, shown by the one that builds best.
 
     `J` is that of the plane class about all axes, shape (2, axes); `way` is 1 where just one of plane and axis is
     flipped.
@@ -174,29 +178,32 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
     )
     every = len(axes.settings_deg) > 1 and len(distinct) == len(np.unique(np.round(axes.points, 9) + 0.0, axis=0))
     best = angles[np.lexsort(preference)[0]]
-    exact = judge.score(best)
-    return None if exact is None else Leader(best, exact, len(angles), len(distinct), every)
+    return Leader(best, float(J[way, axis]), None, len(angles), len(distinct), every)
 
 
-def refine_leaders(problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Judge) -> tuple[Family, ...]:
-    """Refine the minima, the winner twice; valleys of better ones are dropped."""
+def refine_leaders(
+    problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Judge, rounds: int = len(REFINE_ROUNDS)
+) -> tuple[Family, ...]:
+    """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
     families: list[Family] = []
-    for leader in sorted((leader for leader in leaders if leader.minimum), key=lambda leader: leader.score.J):
+    minima = [(leader.score, leader) for leader in leaders if leader.score is not None]
+    for exact, leader in sorted(minima, key=lambda pair: pair[0].J):
         if len(families) == FAMILIES:
             break
-        if not any(_same_valley(leader.angles_deg, leader.score.J, better) for better in families):
-            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else 2], judge)
+        if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
+            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else rounds], judge)
             again = judge.score(refined)
             # the rounder angles of the grid are as good
-            if again is None or (again.J + again.J_error >= leader.score.J and not ranges.tolerance_deg):
-                families.append(_family(leader.angles_deg, leader.score, leader))
+            if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
+                families.append(_family(leader.angles_deg, exact, leader))
             elif not any(_same_valley(refined, again.J, better) for better in families):
                 families.append(_family(refined, again, leader))
     for leader in leaders:
         if len(families) == FAMILIES:
             break
-        if not leader.minimum and not any(_same_valley(leader.angles_deg, leader.score.J, x) for x in families):
-            families.append(_family(leader.angles_deg, leader.score, leader))
+        if leader.score is None and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
+            found = judge.score(leader.angles_deg)
+            families += [] if found is None else [_family(leader.angles_deg, found, leader)]
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))

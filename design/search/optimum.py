@@ -13,6 +13,7 @@ from design.angles import AngleSet, standard_settings
 from design.arrays import Array
 from design.left_out import LeftOut
 from design.motion import Shortest
+from design.objective.holes import holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.coarse import Progress
@@ -76,11 +77,22 @@ class Optimum:
                 | {"note": family.word}
                 for family in self.search.best
             ],
+            "holes": [asdict(hole) for hole in holes(self.problem, self.search.best[0].angles_rad)],
+            "plain": None if self.search.plain is None else self._plain_facts(self.search.plain),
+            "least_blind_weight": self.search.least_blind,
             "standard": {name: {"J": s.J, "J_error": s.J_error} for name, s in self.standard.items()},
             "covered": self.search.covered,
             "evaluated": self.search.evaluated,
             "seconds": round(self.search.seconds, 3),
             "left_out": [asdict(entry) for entry in self.left_out],
+        }
+
+    def _plain_facts(self, plain: Family) -> dict[str, Any]:
+        return {
+            **{f"{name}_deg": angle for name, angle in zip(NAMES, plain.angles_deg, strict=True)},
+            "J": plain.score.J,
+            "J_error": plain.score.J_error,
+            "holes": [asdict(hole) for hole in holes(self.problem, plain.angles_rad)],
         }
 
     def lines(self) -> list[str]:
@@ -93,13 +105,34 @@ class Optimum:
             *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
         ]
 
+    def hole_lines(self) -> list[str]:
+        """Where the answer is blind, or what it costs that it is not."""
+        best, plain, least = self.search.best[0], self.search.plain, self.search.least_blind
+        found = [hole.words() for hole in holes(self.problem, best.angles_rad)]
+        if least is not None:
+            found.insert(
+                0, f"no setting of the grid sees all of the region: at least {percent(least)} of the weight is blind"
+            )
+        if found or plain is None:
+            return found or ["no direction that matters is blind"]
+        return [
+            "no direction that matters is blind to the first row; without asking for that J alone would take the last",
+            *(f"which is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
+            f"the first costs {self._price(best.score.J, plain.score.J)} against it",
+        ]
+
+    def _price(self, J: float, less: float) -> str:
+        if self.problem.objective.name == "log":
+            return f"{percent(-math.expm1(less - J))} of the beams per ball"
+        return f"{J - less:.2g} in J"
+
     def table(self) -> list[str]:
         """The best families, a line each, and what the best buys against the standard alignments."""
         lines = ["  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings"]
-        for family in self.search.best:
-            angles = "".join(f"{a:{width}.2f}" for a, width in zip(family.angles_deg, (11, 10, 13, 12), strict=True))
-            J = f"{family.score.J:9.4f}   {family.score.J_error:.0e}"
-            lines.append(f"{angles} {J} {family.members:9} {family.word}")
+        lines += [_row(family) for family in self.search.best]
+        if self.search.plain is not None:
+            lines.append(f"{_row(self.search.plain)} [J alone, blind]".replace("  [", " ["))
+        lines += self.hole_lines()
         best = self.search.best[0].score
         for name, other in self.standard.items():
             if self.problem.objective.name == "log":  # the one objective whose differences are ratios of densities
@@ -108,6 +141,11 @@ class Optimum:
             else:
                 lines.append(f"J = {other.J:.4f} +- {other.J_error:.0e} for {name}")
         return lines
+
+
+def _row(family: Family) -> str:
+    angles = "".join(f"{a:{width}.2f}" for a, width in zip(family.angles_deg, (11, 10, 13, 12), strict=True))
+    return f"{angles} {family.score.J:9.4f}   {family.score.J_error:.0e} {family.members:9} {family.word}"
 
 
 def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:

@@ -11,11 +11,12 @@ from numpy import ndarray
 
 from design.errors import TaskError
 from design.left_out import LeftOut
+from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.named_objectives import Moment, Objective
 from design.objective.problem import Problem
 from design.search.coarse import Landscape, Progress, coarse_landscape
 from design.search.coarse_sweep import swept_landscape
-from design.search.constraints import NO_BLIND_WEIGHT, Judge
+from design.search.constraints import Judge
 from design.search.families import Family, best_leader, find_leaders, refine_leaders
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.limits import allowed_planes
@@ -135,9 +136,9 @@ def _plain(
     """The optimum of J alone, where it has a hole: what the answer is compared with."""
     judge = Judge(problem, limits, avoid_holes=False)
     leader = best_leader(land, *grid, judge, kept=False)
-    if leader is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
+    if leader is None or leader.score is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
         return None
-    plain = refine_leaders(problem, ranges, [leader], judge)[0]
+    plain = refine_leaders(problem, ranges, [leader], judge, rounds=1)[0]
     return plain if plain.score.J < best.score.J else None
 
 
@@ -152,14 +153,14 @@ def _least_blind(problem: Problem, land: Landscape, grid: Grid) -> float:
     low, _ = lowest(blind, [ways], planes.has | planes.own, axes.has)
     least = replace(land, objective=blind, g=land.blind[None], weights=(weights,), constraints=(), plain=low, kept=low)
     leader = best_leader(least, planes, axes, Judge(problem, NONE, avoid_holes=False))
-    assert leader is not None
+    assert leader is not None and leader.score is not None
     return leader.score.blind_weight
 
 
 def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -> str:
     """Why a search has no answer, with what the setting of the lowest J reaches."""
     nearest = best_leader(land, *grid, Judge(problem, NONE, avoid_holes=False), kept=False)
-    assert nearest is not None
+    assert nearest is not None and nearest.score is not None
     asked = ", ".join(
         f"{name} = {value:g}"
         for name, value in (("min_density", limits.min_density), ("max_blind_weight", limits.max_blind_weight))

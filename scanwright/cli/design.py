@@ -66,10 +66,12 @@ def evaluate(
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
     if as_json:
         show_json({"task": loaded.task.name, "angles_deg": angles_deg, **found.facts()})
-        return
-    show(found.lines())
-    if cloud is not None:
-        print(f"wrote {len(beams):,} points to {cloud}")
+    else:
+        show(found.lines())
+        if cloud is not None:
+            print(f"wrote {len(beams):,} points to {cloud}")
+    if not found.agree:
+        raise typer.Exit(1)
 
 
 @app.command()

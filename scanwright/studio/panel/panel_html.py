@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from html import escape
 
+from design.objective.holes import percent
 from scanwright.serving.style import COLOUR_STOPS
 from scanwright.studio.panel.facts import WALL_M, Facts
 from scanwright.studio.view.coloured_sphere import LEAST_OF_HIGHEST
@@ -22,7 +23,7 @@ def facts_html(facts: Facts, log: bool) -> str:
         *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.standard.items()),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),
-        ("never seen", f"{facts.blind_weight:.2%}", "of the weight"),
+        ("never seen", percent(facts.blind_weight), "of the weight"),
         ("shortest turn", _period(facts), f"{facts.density} per ball"),
     ]
     cells = "".join(

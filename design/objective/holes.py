@@ -1,0 +1,124 @@
+"""Where a setting is blind in its region, and the same in words: what J alone does not tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from design.arrays import Setting, Vector
+from design.frames import R_world_rot
+from design.objective.problem import NODES, Problem
+from design.objective.quadrature import polar_rule
+from design.objective.score import blind_to_sweep
+from design.sphere.directions import weighted_samples
+
+NO_BLIND_WEIGHT = 1e-9  # share of the weight: what a fan and a region reach is rounded
+DIRECTIONS = 20_000  # of the region, for a sweep
+POINTS = (
+    "ahead",
+    "ahead on the left",
+    "to the left",
+    "behind on the left",
+    "behind",
+    "behind on the right",
+    "to the right",
+    "ahead on the right",
+)
+UPRIGHT_DEG = 80.0  # beyond it a heading has no meaning
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Directions that no start phase brings a beam to, as a cone, or a ring where `inner_deg` is above 0.
+
+    Attributes:
+        centre: unit vector in the world.
+        half_angle_deg: of the cone that holds it.
+        inner_deg: of the cone in its middle that is seen.
+        weight: share of the weight of the task.
+    """
+
+    centre: tuple[float, float, float]
+    half_angle_deg: float
+    inner_deg: float
+    weight: float
+
+    def words(self) -> str:
+        """What is blind, where, and how wide it is."""
+        x, y, z = self.centre
+        angle = (
+            f"{self.half_angle_deg:.2f} deg"
+            if self.inner_deg == 0
+            else (f"{self.inner_deg:.2f} to {self.half_angle_deg:.2f} deg")
+        )
+        wide = ""
+        if self.inner_deg == 0 and self.half_angle_deg < 20:
+            wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm across for each metre away"
+        return (
+            f"blind {heading(np.array(self.centre))}: {angle} about ({x:.3f}, {y:.3f}, {z:.3f}){wide}, "
+            f"{percent(self.weight)} of the weight"
+        )
+
+
+def holes(problem: Problem, angles_rad: Setting) -> tuple[Hole, ...]:
+    """Where the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] is blind in the region, the worst first.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    found = _of_spin(problem, angles_rad) if problem.sweep is None else _of_sweep(problem, angles_rad)
+    return tuple(sorted((hole for hole in found if hole.weight > NO_BLIND_WEIGHT), key=lambda hole: -hole.weight))
+
+
+def _of_spin(problem: Problem, angles_rad: Setting) -> list[Hole]:
+    rule, beam_polar, _ = polar_rule(problem, angles_rad, NODES)
+    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    out = []
+    for low, high in problem.blind_zones(beam_polar):
+        inside = (low < rule.polar_rad) & (rule.polar_rad < high)
+        weight = float(rule.fine[inside].sum() / rule.fine.sum())
+        about_back = low > 0 and np.pi - low < high  # the nearer end of the axis
+        inner, outer = (np.pi - high, np.pi - low) if about_back else (low, high)
+        out.append(
+            Hole(_three(-axis if about_back else axis), float(np.degrees(outer)), float(np.degrees(inner)), weight)
+        )
+    return out
+
+
+def _of_sweep(problem: Problem, angles_rad: Setting) -> list[Hole]:
+    """All that is blind, as one cone about its middle."""
+    samples = weighted_samples(problem.field, DIRECTIONS)
+    R = R_world_rot(angles_rad[0], angles_rad[1])
+    blind = blind_to_sweep(problem, samples.directions @ R, problem.beams_rot(angles_rad[2:]))
+    middle = samples.weights[blind] @ samples.directions[blind]
+    length = float(np.linalg.norm(middle))
+    if not length > 0:
+        return []
+    off = np.arccos(np.clip(samples.directions[blind] @ middle / length, -1, 1))
+    share = float(samples.weights[blind].sum() / samples.weights.sum())
+    return [Hole(_three(middle / length), float(np.degrees(off.max())), 0.0, share)]
+
+
+def heading(direction: Vector) -> str:
+    """A direction of the world in words: x is ahead, y to the left, z up."""
+    x, y, z = direction
+    up_deg = float(np.degrees(np.arctan2(z, np.hypot(x, y))))
+    if abs(up_deg) > UPRIGHT_DEG:
+        return "straight up" if up_deg > 0 else "straight down"
+    point = POINTS[round(float(np.degrees(np.arctan2(y, x))) / 45) % 8]
+    return point if abs(up_deg) < 0.5 else f"{point} and {abs(up_deg):.0f} deg {'up' if up_deg > 0 else 'down'}"
+
+
+def percent(share: float) -> str:
+    """A share in percent that is never written as nothing where there is something."""
+    if 0 < share < 1e-6:
+        return "below 0.0001%"
+    return f"{100 * share:.2g}%" if share < 0.1 else f"{share:.1%}"
+
+
+def _three(v: Float[ndarray, " 3"]) -> tuple[float, float, float]:
+    x, y, z = (float(value) + 0.0 for value in v)
+    return x, y, z
