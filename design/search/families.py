@@ -246,7 +246,7 @@ def _refined(
     free = limits[:, 1] > limits[:, 0]
     free[:2] &= not leader.every_axis
     angles = leader.angles_deg.copy()
-    if not free.any():
+    if not free.any() or not rounds:
         return angles
     for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
 
@@ -273,12 +273,13 @@ def _refined(
         )
         angles[free] = found.x
     # of the settings around it the nearest: rounding may leave the constraints
+    finest = rounds[-1][1]
     below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
     corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
     corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
     for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
         setting = angles.copy()
         setting[free] = corner
-        if np.isfinite(judge.J(setting, nodes)):
+        if np.isfinite(judge.J(setting, finest)):
             return setting + 0.0  # -0.0 is 0.0
     return leader.angles_deg

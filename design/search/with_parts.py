@@ -19,6 +19,7 @@ from design.density.ball_count import ball_count
 from design.density.beams import scan_at
 from design.errors import BuildError
 from design.objective.ball_search import start_phases
+from design.objective.holes import NO_BLIND_WEIGHT, Hole, holes, percent
 from design.objective.problem import Problem
 from design.objective.score import Score, score
 from design.search.coarse import Progress
@@ -62,6 +63,7 @@ class Chosen:
         family: its angles, and its J with what the parts hide.
         bare: its J without them.
         hidden: share of all beams of a full scan that the parts hide.
+        holes: where the region is blind behind what turns along.
         bounded: settings that a bound was computed for.
         built: settings whose solids were made.
         refused: why settings cannot be built, one line each.
@@ -71,6 +73,7 @@ class Chosen:
     family: Family
     bare: Score
     hidden: float
+    holes: tuple[Hole, ...]
     bounded: int
     built: int
     refused: tuple[str, ...]
@@ -80,11 +83,15 @@ class Chosen:
         """What was chosen, and what was not and why."""
         setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
         lines = [
-            f"built ({setting}): J = {self.family.score.J:.4f} with its parts, which hide {self.hidden:.1%} of the "
-            f"beams ({self.bare.J:.4f} without); of {self.bounded} settings bounded, {self.built} made, "
+            f"built ({setting}): J = {self.family.score.J:.4f} with its parts, which hide {percent(self.hidden)} of "
+            f"the beams ({self.bare.J:.4f} without); of {self.bounded} settings bounded, {self.built} made, "
             f"{len(self.refused)} refused",
             *(f"refused {reason}" for reason in self.refused),
         ]
+        lines += [f"with its parts {hole.words()}" for hole in self.holes]
+        blinded = self.family.score.blind_weight - sum(hole.weight for hole in self.holes)
+        if blinded > NO_BLIND_WEIGHT:
+            lines.append(f"with its parts about {percent(blinded)} of the weight is blind behind what stands still")
         if self.open:
             lines.append(f"{self.open} more families might be better with their parts: not made")
         return lines
@@ -104,11 +111,12 @@ def choose_with_parts(
         BuildError: none can be built within the limits of the task.
     """
     best: Chosen | None = None
+    avoid = ranges.holes == "avoid"
     refused: list[str] = []
     bounded = built = 0
     queue = sorted(families, key=lambda family: family.score.J)
     for place, family in enumerate(queue):
-        if best is not None and family.score.J >= best.family.score.J:
+        if best is not None and (_blind(best.family.score, avoid), best.family.score.J) <= (False, family.score.J):
             break
         if built == MOST_BUILT and best is not None:
             left = sum(other.score.J < best.family.score.J for other in queue[place:])
@@ -121,10 +129,11 @@ def choose_with_parts(
             if isinstance(bound, Refused):
                 refused.append(f"{_shown(angles_deg)}: {bound.reason}")
                 continue
-            bounds.append((_without(problem, bound, angles_deg).J, angles_deg))
+            bare = score(_seen(problem, bound), np.radians(angles_deg))
+            bounds.append((_blind(bare, avoid), bare.J, angles_deg))
         # the family's own setting stands upright: another one must be better by more than a thousandth
-        for J, angles_deg in sorted(bounds, key=lambda pair: round(pair[0], 3))[:1]:
-            if best is not None and best.family.score.J <= J:
+        for blind, J, angles_deg in sorted(bounds, key=lambda bound: (bound[0], round(bound[1], 3)))[:1]:
+            if best is not None and (_blind(best.family.score, avoid), best.family.score.J) <= (blind, J):
                 continue
             progress(f"parts of {_shown(angles_deg)}: what they hide")
             built += 1
@@ -137,9 +146,13 @@ def choose_with_parts(
                 refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
                 continue
             found = score_with(problem, np.radians(angles_deg), shadow)
-            if best is None or found.J < best.family.score.J:
+            if best is None or (_blind(found, avoid), found.J) < (
+                _blind(best.family.score, avoid),
+                best.family.score.J,
+            ):
                 chosen = replace(family, angles_deg=angles_deg, score=found)
-                best = Chosen(chosen, family.score, hidden, 0, 0, (), 0)
+                left_blind = holes(_seen(problem, shadow), np.radians(angles_deg))
+                best = Chosen(chosen, family.score, hidden, left_blind, 0, 0, (), 0)
     if best is None:
         raise BuildError(f"none of the {len(families)} best families can be built: {refused[0]}")
     return replace(best, bounded=bounded, built=built, refused=tuple(refused))
@@ -149,17 +162,22 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
     """J of a setting whose parts hide beams.
 
     What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
-    difference of two samplings on the same directions and phases. `least` and `blind_weight` are told without it.
+    difference of two samplings on the same directions and phases, and so is what it blinds. `least` is told without it.
     """
     visible = ~shadow.beams
-    seen = problem.with_beams(problem.bearings_rad[visible], problem.lines, problem.sweep)
+    seen = _seen(problem, shadow)
     plain = score(seen, angles_rad)
     if shadow.stator is None or not shadow.stator[visible].any():
         return plain
-    both = [_sampled(seen, angles_rad, shadow.stator[visible], index) for index in range(SETS)]
-    change = np.array([problem.objective.join(hidden) - problem.objective.join(bare) for hidden, bare in both])
+    sampled = [_sampled(seen, angles_rad, shadow.stator[visible], index) for index in range(SETS)]
+    change = np.array([problem.objective.join(both[0]) - problem.objective.join(both[1]) for both, _ in sampled])
     spread = float(4 * np.std(change, ddof=1) / SETS**0.5)
-    return replace(plain, J=plain.J + float(change.mean()), J_error=float(np.hypot(plain.J_error, spread)))
+    return replace(
+        plain,
+        J=plain.J + float(change.mean()),
+        J_error=float(np.hypot(plain.J_error, spread)),
+        blind_weight=plain.blind_weight + float(np.mean([blinded for _, blinded in sampled])),
+    )
 
 
 def equivalents(
@@ -182,16 +200,23 @@ def equivalents(
     return list(dict.fromkeys([found[0], *inside]))
 
 
-def _without(problem: Problem, shadow: Shadow, angles_deg: tuple[float, ...]) -> Score:
-    visible = ~shadow.beams
-    seen = problem.with_beams(problem.bearings_rad[visible], problem.lines, problem.sweep)
-    return score(seen, np.radians(angles_deg))
+def _seen(problem: Problem, shadow: Shadow) -> Problem:
+    """The same task for the beams that nothing hides that turns along."""
+    return problem.with_beams(problem.bearings_rad[~shadow.beams], problem.lines, problem.sweep)
+
+
+def _blind(found: Score, avoid_holes: bool) -> bool:
+    """Whether a setting has holes that are to be avoided: it then comes after all that have none."""
+    return avoid_holes and found.blind_weight > NO_BLIND_WEIGHT
 
 
 def _sampled(
     problem: Problem, angles_rad: Setting, stator: Bool[ndarray, "beams angles"], index: int
-) -> Float[ndarray, "2 moments"]:
-    """Moments with and without what stands still, over one set of directions at one start phase, (2, moments)."""
+) -> tuple[Float[ndarray, "2 moments"], float]:
+    """Moments with and without what stands still, over one set of directions at one start phase, (2, moments).
+
+    And the share of the weight that it blinds.
+    """
     if problem.sweep is None:
         joint = problem.lines.angles_rad + start_phases(problem.lines.count, problem.lines.step_rad)[2 * index]
     else:
@@ -200,15 +225,15 @@ def _sampled(
     column = np.rint(joint / (2 * np.pi / AXIS_STEPS)).astype(int) % AXIS_STEPS
     free = ~stator[:, column].T.ravel()  # line after line, as the scan
     out = []
+    blinded = 0.0
     for moment in problem.objective.moments:
         samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
-        pair = []
-        for beams in (scan[free], scan):
-            g = moment.g(problem.lines.repeats * ball_count(beams, samples.directions, problem.ball_rad))
-            highest = moment.gathered == "highest"
-            pair.append(g.max() if highest else samples.weights @ g / samples.weights.sum())
-        out.append(pair)
-    return np.array(out).T
+        counts = [ball_count(beams, samples.directions, problem.ball_rad) for beams in (scan[free], scan)]
+        share = samples.weights / samples.weights.sum()
+        blinded += moment.share * float(share @ ((counts[0] == 0) & (counts[1] > 0)))
+        g = [moment.g(problem.lines.repeats * count) for count in counts]
+        out.append([each.max() if moment.gathered == "highest" else share @ each for each in g])
+    return np.array(out).T, blinded
 
 
 def _shown(angles_deg: tuple[float, ...]) -> str:

@@ -26,6 +26,7 @@ from design.motion import Motion, Shortest, Spin, Sweep
 from design.record import Record
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
+from design.task.map_file import read_map
 from design.task.named_record import named_record, names_in, valid_record
 from design.task.shapes import (
     BoxRegion,
@@ -273,6 +274,7 @@ def check_products(task: Task, products: Catalogue, source: Path) -> None:
         ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
     except TaskError as error:
         raise TaskError(f"{source}: {field}: {error}") from error
+    _check_speed(task, products, source)
     if isinstance(task.motion, Sweep):
         reach = products.get(task.servo, Servo).angular_range_deg / 2
         if max(-task.motion.limits_deg[0], task.motion.limits_deg[1]) > reach:
@@ -286,6 +288,29 @@ def check_products(task: Task, products: Catalogue, source: Path) -> None:
         raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
 
 
+def fastest_rpm(task: Task, products: Catalogue) -> tuple[float, str]:
+    """How fast servo and slip ring of a task turn, and what says so: its field."""
+    servo = products.get(task.servo, Servo)
+    ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
+    bounds = [(servo.no_load_rpm, f"servo = '{servo.name}'")]
+    if ring is not None and ring.max_rpm is not None and not isinstance(task.motion, Sweep):
+        bounds.append((ring.max_rpm, f"slip_ring = '{ring.name}'"))
+    return min(bounds)
+
+
+def _check_speed(task: Task, products: Catalogue, source: Path) -> None:
+    motion = task.motion
+    if not isinstance(motion, Spin | Sweep):
+        return
+    rpm = 60 / motion.period_s if isinstance(motion, Spin) else motion.cruise_deg_s / 6
+    most, field = fastest_rpm(task, products)
+    if rpm > most:
+        raise TaskError(
+            f"{source}: motion.period_s = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} "
+            f"rpm at most, without a load: take {motion.period_s * rpm / most:.3g} or more"
+        )
+
+
 def _surface(placed: Placed, folder: Path) -> Surface:
     return cast_surface(folder / placed.file, placed.unit_m, placed.sensor_m, placed.rpy_deg, placed.step_deg)
 
@@ -293,34 +318,5 @@ def _surface(placed: Placed, folder: Path) -> Surface:
 def _table(region: MapRegion | MeshRegion, folder: Path) -> Array:
     """Weights of a map, or 1 where a mesh is hit and 0 where not."""
     if isinstance(region, MapRegion):
-        return _read_map(folder / region.file)
+        return read_map(folder / region.file)
     return np.isfinite(_surface(region, folder).range_m).astype(float)
-
-
-def _read_map(path: Path) -> Array:
-    try:
-        table = _map_table(path)
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
-        raise TaskError(f"{path}: cannot read the map: {error}") from error
-    if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
-        raise TaskError(f"{path}: a map is one table of real numbers")
-    if table.ndim != 2 or table.size == 0:
-        raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
-    if not np.isfinite(table).all() or (table < 0).any():
-        raise TaskError(f"{path}: a map holds weights: finite and not negative")
-    return table.astype(float)
-
-
-def _map_table(path: Path) -> Any:
-    if path.suffix == ".npy":
-        with path.open("rb") as file:  # an archive of tables would keep it open
-            return np.load(file, allow_pickle=False)
-    if path.suffix == ".csv":
-        text = path.read_text(encoding="utf-8")
-        return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
-    if path.suffix == ".png":
-        from matplotlib.image import imread
-
-        picture = imread(path)  # 0..1 already, (rows, columns[, channels])
-        return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
-    raise TaskError(f"{path}: a map is a .png, .csv or .npy file")

@@ -13,9 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from design.catalogue.catalogue import Catalogue
-from design.catalogue.products import SlipRing
 from design.errors import TaskError
-from design.motion import Spin, Sweep
 from design.record import explain
 from design.task.task import LoadedTask, Task, check_products
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting
@@ -86,7 +84,8 @@ class Crossing:
             task = _merged(base.task, chosen, name, self._own_files())
             products = Catalogue(base.products.products | self._own_products())
             check_products(task, products, base.source)
-            _check_motion(replace(base, task=task, products=products))
+            doubts = replace(base, task=task, products=products).warnings()
+            refused = doubts[0] if doubts else ""
         except ValidationError as error:
             refused = explain(error, name, Task)
         except TaskError as error:
@@ -133,25 +132,6 @@ def _with_period(motion: dict[str, Any], period: float | str) -> dict[str, Any]:
             raise TaskError("periods_s: 'shortest' is found for motion.mode = 'spin' only, this task sweeps")
         return motion | {"period_s": period}
     return {"mode": "shortest"} if period == "shortest" else {"mode": "spin", "period_s": period}
-
-
-def _check_motion(loaded: LoadedTask) -> None:
-    """Refuse what turns faster than its servo or its ring can, and what J cannot be told of."""
-    task, servo = loaded.task, loaded.servo
-    if loaded.warnings():
-        raise TaskError(loaded.warnings()[0])
-    if isinstance(task.motion, Spin):
-        rpm = 60 / task.motion.period_s
-        if task.slip_ring is not None:
-            ring = loaded.products.get(task.slip_ring, SlipRing)
-            if ring.max_rpm is not None and rpm > ring.max_rpm:
-                raise TaskError(f"slip_ring = '{ring.name}': turns at {ring.max_rpm:g} rpm at most, asked: {rpm:g}")
-    elif isinstance(task.motion, Sweep):
-        rpm = task.motion.cruise_deg_s / 6
-    else:
-        return
-    if rpm > servo.no_load_rpm:
-        raise TaskError(f"servo = '{servo.name}': turns at {servo.no_load_rpm:g} rpm without a load, asked: {rpm:g}")
 
 
 def _trimmed(loaded: LoadedTask) -> LoadedTask:

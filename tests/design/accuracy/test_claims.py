@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.design.claims import MOST_ERROR, contest, random_claim
+from benchmarks.design.claims import contest, random_claim
 from design.catalogue.catalogue import load_catalogue
-from design.objective import quadrature
 from design.objective import score as scoring
 from design.objective.problem import problem_of
 from design.objective.score import score
@@ -20,9 +19,10 @@ from design.search.coarse import coarse_landscape
 from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.optimum import directions_left_out
 from design.search.search import search
+from design.sphere import polar_rule
 from design.sphere.directions import Samples, spiral
 from design.sphere.polar_rule import breaks_of
-from design.task.task import LoadedTask, Task, load_task
+from design.task.task import Limits, LoadedTask, Task, load_task
 
 BAND = {"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}
 CONE = {"shape": "cone", "axis": [0.5, 0.2, -0.6], "half_angle_deg": 25}
@@ -45,18 +45,26 @@ def case(changes, angles=None):
     return problem, task.angles
 
 
-@pytest.mark.parametrize("seed", [seed for seed in range(18) if seed not in (4, 7)])  # as slow as all others together
-def test_a_stated_error_holds_and_is_small(seed):
-    claim = random_claim(np.random.default_rng(seed), largest_ball_deg=1.2)
-    assert claim.truth.J_error < MOST_ERROR / 10, "the reference is no reference here"
-    assert claim.off <= claim.score.J_error, claim
-    assert claim.score.J_error <= MOST_ERROR, claim
+KINDS = {
+    "painted regions": 11,
+    "a map": 24,
+    "a mask of cells": 10,
+    "a scene": 20,
+    "a scene, swept": 9,
+    "tiny regions": 57,
+    "swept": 8,
+    "stops": 18,
+    "kl": 36,
+    "homogeneity": 16,
+    "required": 14,
+    "worst": 2,
+}
 
 
-@pytest.mark.parametrize("index", [95, 249])
-def test_a_step_of_g_that_both_rules_miss_is_in_the_stated_error(index):
-    """Two of the three of 300 that the full version once found broken."""
-    claim = random_claim(np.random.default_rng([1, index]))
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_stated_error_holds(kind):
+    """Random tasks of every kind against counted beams: what the reference itself may be off is taken off."""
+    claim = random_claim(np.random.default_rng([7, KINDS[kind]]))
     assert claim.off <= claim.score.J_error, claim
 
 
@@ -83,9 +91,9 @@ def test_equivalent_settings_folded_and_not(sensor, monkeypatch):
     assert len(folded[0].first) * len(folded[1].first) < 0.3 * len(whole[0].first) * len(whole[1].first)
     lowest = []
     for axes, planes in (folded, whole):
-        land, _ = coarse_landscape(problem, planes, axes, lambda _: None)
-        by_plane = land.by_plane[planes.flip.astype(int), planes.classes]
-        lowest.append((by_plane, land.by_axis[axes.flip.astype(int), axes.classes]))
+        land, _ = coarse_landscape(problem, planes, axes, lambda _: None, Limits(), avoid_holes=False)
+        by_plane = land.plain.by_plane[planes.flip.astype(int), planes.classes]
+        lowest.append((by_plane, land.plain.by_axis[axes.flip.astype(int), axes.classes]))
     for of_folded, of_whole in zip(*lowest, strict=True):
         np.testing.assert_allclose(of_folded, of_whole, atol=1e-5)
 
@@ -132,7 +140,7 @@ def test_directions_of_weight_zero_looked_at_and_not(motion, monkeypatch):
     problem, _ = case({"weight": [BAND]} | motion)
     assert [entry.what for entry in directions_left_out(problem)] == ["directions of weight zero"]
     skipped = [score(problem, setting) for setting in SETTINGS]
-    monkeypatch.setattr(quadrature, "_weighted_segments", every_segment)
+    monkeypatch.setattr(polar_rule, "weighted_segments", every_segment)
     monkeypatch.setattr(scoring, "sample_set", every_direction)
     looked_at = [score(problem, setting) for setting in SETTINGS]
     for one, other in zip(skipped, looked_at, strict=True):
@@ -147,7 +155,7 @@ def test_masked_directions_left_out_or_looked_at_with_weight_zero(motion, monkey
     told = {entry.what for entry in directions_left_out(masked)}
     assert told == {"masked directions", "directions of weight zero"}
     left_out = [score(masked, setting) for setting in SETTINGS]
-    monkeypatch.setattr(quadrature, "_weighted_segments", every_segment)
+    monkeypatch.setattr(polar_rule, "weighted_segments", every_segment)
     monkeypatch.setattr(scoring, "sample_set", every_direction)
     for one, setting in zip(left_out, SETTINGS, strict=True):
         other = score(painted, setting)

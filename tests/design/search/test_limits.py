@@ -70,7 +70,10 @@ def test_the_best_within_limits_is_the_best_of_those_that_keep_them():
     "limits, words",
     [
         ({"max_line_gap_deg": 0.01}, "limits.max_line_gap_deg = 0.01: the scan planes of this task reach"),
-        ({"min_density": 5000}, "min_density reaches"),
+        (
+            {"min_density": 5000},
+            "min_density = 5000: no setting of the grid keeps them; the one of the lowest J has min_density",
+        ),
     ],
 )
 def test_limits_that_nothing_keeps_say_what_can_be_had(limits, words):

@@ -1,0 +1,45 @@
+"""Weights in a picture or a table: rows theta, columns phi."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from design.arrays import Array
+from design.errors import TaskError
+
+
+def read_map(path: Path) -> Array:
+    """Weights of cells, (rows, columns), of a PNG, CSV or NPY file.
+
+    Raises:
+        TaskError: it is no table of finite numbers that are not negative.
+    """
+    try:
+        table = _map_table(path)
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        raise TaskError(f"{path}: cannot read the map: {error}") from error
+    if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
+        raise TaskError(f"{path}: a map is one table of real numbers")
+    if table.ndim != 2 or table.size == 0:
+        raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
+    if not np.isfinite(table).all() or (table < 0).any():
+        raise TaskError(f"{path}: a map holds weights: finite and not negative")
+    return table.astype(float)
+
+
+def _map_table(path: Path) -> Any:
+    if path.suffix == ".npy":
+        with path.open("rb") as file:  # an archive of tables would keep it open
+            return np.load(file, allow_pickle=False)
+    if path.suffix == ".csv":
+        text = path.read_text(encoding="utf-8")
+        return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
+    if path.suffix == ".png":
+        from matplotlib.image import imread
+
+        picture = imread(path)  # 0..1 already, (rows, columns[, channels])
+        return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
+    raise TaskError(f"{path}: a map is a .png, .csv or .npy file")
