@@ -95,6 +95,13 @@ def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
 
 
+def slot(width: float, first: float, last: float, y: float, z_low: float, z_high: float) -> cq.Shape:
+    """Slot parallel to z with round ends, whose middles are at `first` and `last` along x."""
+    radius = width / 2
+    ends = [upright(radius, z_low, z_high, x, y) for x in (first, last)]
+    return box((first, y - radius, z_low), (last, y + radius, z_high)).fuse(*ends)
+
+
 def lathe(profile: ArrayLike) -> cq.Solid:
     """Solid of revolution about z of a polygon (n, 2) of (r, z); no edge of it may lie on the axis."""
     points = [cq.Vector(float(r), 0.0, float(z)) for r, z in np.asarray(profile, dtype=float)]

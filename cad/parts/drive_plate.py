@@ -67,13 +67,7 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, high + 1.0, x, y))
             cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, high + 1.0, x, y))
         for x in (-stack.slot_x, stack.slot_x):
-            cuts += [_slot(p, x, y, low, high) for _, y in stack.arms_y]
+            for _, y in stack.arms_y:
+                cuts.append(solids.slot(p.slot, x - TRAVEL, x + TRAVEL, y, low - 1.0, high + 1.0))
         plate = checked(body.cut(*cuts).clean())
     return plate.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
-
-
-def _slot(p: DrivePlate, x: float, y: float, low: float, high: float) -> cq.Shape:
-    half = p.slot / 2
-    ends = [solids.upright(half, low - 1.0, high + 1.0, x + side * TRAVEL, y) for side in (1.0, -1.0)]
-    middle = solids.box((x - TRAVEL, y - half, low - 1.0), (x + TRAVEL, y + half, high + 1.0))
-    return middle.fuse(*ends)

@@ -49,14 +49,9 @@ def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
     """Slots with round ends, along the radius."""
     if p.ear is None:
         return []
-    ear, radius, cuts = p.ear, p.ear.slot_width / 2, []
-    low, high = ear.low - 1.0, ear.high + 1.0
-    for first, last in ear.slots:
-        ends = [solids.upright(radius, low, high, r, 0.0) for r in (first, last)]
-        cuts.append(
-            solids.box((first, -radius, low), (last, radius, high)).fuse(*ends).moved(solids.about_axis(ear.azimuth))
-        )
-    return cuts
+    ear, width = p.ear, p.ear.slot_width
+    slots = [solids.slot(width, first, last, 0.0, ear.low - 1.0, ear.high + 1.0) for first, last in ear.slots]
+    return [slot.moved(solids.about_axis(ear.azimuth)) for slot in slots]
 
 
 def _journal_radius(p: AlignmentLinkage) -> float:
