@@ -47,7 +47,6 @@ class Deck:
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
-    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold what the mount carries
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
@@ -89,7 +88,6 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         t_world_rot=_triple(np.round(offset, 6)),
         back_centre=_triple(back),
         back_half=half,
-        rear_holes=holes,
         screw=screw,
         deck_holes=deck_holes,
         foot=_foot(pattern, screw),

@@ -17,11 +17,12 @@ import numpy as np
 from cad import outlines, solids
 from cad.layout.belt.stack import BeltStack
 from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, UNDER_MOUNT_HEAD, Deck
+from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
-from cad.screws import Screw, passing_hole
+from cad.screws import passing_hole
 from cad.solids import building
 
 OF_SERVO = (
@@ -77,11 +78,11 @@ def base_mount(layout: Layout) -> cq.Solid:
         foot = solids.prism(outlines.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
         body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
     with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
-        rails = [_rail(deck, mounted.screw, side) for side in (1.0, -1.0)]
-        feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in deck.rear_holes]
+        rails = [_rail(deck, mounted, side) for side in (1.0, -1.0)]
+        feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
         cuts = []
-        for x, y in deck.rear_holes:
+        for x, y in mounted.holes:
             cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
             cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
         for x, y in deck.deck_holes:
@@ -108,10 +109,10 @@ def _strut(deck: Deck) -> cq.Shape:
     return whole.cut(solids.box((-400.0, -400.0, cz - 0.3), (400.0, 400.0, cz + 400.0)))
 
 
-def _rail(deck: Deck, screw: Screw, side: float) -> cq.Solid:
-    x = side * deck.rear_holes[0][0]
+def _rail(deck: Deck, mounted: Mounted, side: float) -> cq.Solid:
+    x = side * mounted.holes[0][0]
     _, cy, cz = deck.back_centre
     y = deck.back_half[1] - 0.8
-    half = max(RAIL_HALF_WIDTH, screw.head_room + RAIL_WALL)
+    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + RAIL_WALL)
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

@@ -46,7 +46,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     belt = _belt(scanner, ring)
     hub = SPIGOT_DIAMETER / 2 + HUB_WALL
     alone = BeltStack(
-        h=hub_height(scanner.lidar, R, hub, 0.0, None),
+        h=hub_height(scanner.lidar, R, hub, 0.0),
         R_rot_laser=rows_of(R),
         ring_length=ring.length_mm,
         ring_radius=ring.outer_diameter_mm / 2,
