@@ -42,7 +42,6 @@ class Deck:
     normal: tuple[float, float, float]  # from the deck into the room
     along: tuple[float, float, float]  # world x
     centre: tuple[float, float, float]  # world origin
-    hangs: bool
     flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
@@ -83,7 +82,6 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         normal=_triple(normal),
         along=_triple(along),
         centre=_triple(centre),
-        hangs=hangs,
         flat=flat,
         t_world_rot=_triple(np.round(offset, 6)),
         back_centre=_triple(back),

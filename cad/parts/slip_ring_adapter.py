@@ -17,7 +17,7 @@ import cadquery as cq
 
 from cad import solids
 from cad.layout.direct.adapter import SlipRingAdapter, adapter_of
-from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD
+from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
 from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import screws
 from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
@@ -44,14 +44,14 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, adapter_of(scanner, stack)),
+        make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
         step=Step("Adapter on the servo", f"{how} {screws(SERVO_CASE)}"),
         shaped_by=(*ON_CASE, *RING),
     )
 
 
-def slip_ring_adapter(p: SlipRingAdapter) -> cq.Solid:
-    """Make the adapter.
+def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
+    """Make the adapter: the fork, or the base of a cage, and the arms.
 
     Raises:
         BuildError: a step did not give one valid solid.
@@ -59,10 +59,10 @@ def slip_ring_adapter(p: SlipRingAdapter) -> cq.Solid:
     stack = p.stack
     inner = stack.ring_radius + PLAY
     outer = inner + ARM
-    if p.cage is None:
+    if isinstance(p, SlipRingAdapter):
         body, top, reach = _fork(p, outer), p.front + SEAT_GAP + PLATE, stack.ring_length - 5.0
     else:
-        body, top, reach = cage_base(p.cage), p.cage.foot, stack.ring_length - UNDER_ROOF
+        body, top, reach = cage_base(p), p.foot, stack.ring_length - UNDER_ROOF
     arm_top = stack.ring_bottom + min(30.0, reach)
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms = [
