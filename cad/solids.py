@@ -1,13 +1,14 @@
 """The few kernel operations that the parts are made of, each checked. Millimetres, rotation frame.
 
-OCC calls empty and split results valid, so every step that can fail ends in `checked`.
+OCC calls empty and split results valid, so every step that can fail ends in the check of `building`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import cadquery as cq
 import numpy as np
@@ -19,33 +20,31 @@ from design.errors import BuildError
 
 
 @contextmanager
-def building(part: str, feature: str, parameter: str, value: object) -> Iterator[None]:
-    """Turn whatever the kernel throws inside into one line that names part, feature, parameter and value."""
+def building(part: str, feature: str, parameter: str, value: object) -> Iterator[Callable[[cq.Shape], cq.Solid]]:
+    """One step of making a part: it yields what returns the one valid solid that the step made.
+
+    Raises:
+        BuildError: the kernel throws inside, or the step split the part, emptied it, or left an invalid solid; one line
+            names part, feature, parameter and value.
+    """
+    step = f"{part}: {feature}: {parameter} = {value}"
     try:
-        yield
+        yield partial(_checked, step)
     except BuildError:
         raise
     except Exception as error:
-        raise BuildError(f"{part}: {feature}: {parameter} = {value}: the CAD kernel failed: {error}") from error
+        raise BuildError(f"{step}: the CAD kernel failed: {error}") from error
 
 
-def checked(shape: cq.Shape, part: str, feature: str, parameter: str, value: object) -> cq.Solid:
-    """Return the one valid solid that a step made.
-
-    Raises:
-        BuildError: the step split the part, emptied it, or left an invalid solid.
-    """
+def _checked(step: str, shape: cq.Shape) -> cq.Solid:
     solids = shape.Solids()
-    fault = None
     if len(solids) != 1:
         volumes = ", ".join(f"{solid.Volume():.3g}" for solid in solids)
-        fault = f"gives {len(solids)} bodies ({volumes} mm3) instead of one"
-    elif solids[0].Volume() <= 0:
-        fault = "gives no volume"
-    elif not solids[0].isValid():
-        fault = "gives an invalid solid"
-    if fault is not None:
-        raise BuildError(f"{part}: {feature}: {parameter} = {value}: {fault}")
+        raise BuildError(f"{step}: gives {len(solids)} bodies ({volumes} mm3) instead of one")
+    if solids[0].Volume() <= 0:
+        raise BuildError(f"{step}: gives no volume")
+    if not solids[0].isValid():
+        raise BuildError(f"{step}: gives an invalid solid")
     return solids[0]
 
 
@@ -83,11 +82,24 @@ def upright(radius: float, z_low: float, z_high: float, x: float = 0.0, y: float
     return cylinder(radius, (x, y, z_low), (0.0, 0.0, 1.0), z_high - z_low)
 
 
+def radial(radius: float, azimuth: float, z: float, start: float = 0.0, length: float = 80.0) -> cq.Solid:
+    """Cylinder away from the z axis, at an azimuth [rad] and a height, from a distance on."""
+    out = (math.cos(azimuth), math.sin(azimuth), 0.0)
+    return cylinder(radius, (start * out[0] + 0.0, start * out[1] + 0.0, z), out, length)  # no -0.0
+
+
 def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
     """Polygon (n, 2) extruded along z."""
     points = [cq.Vector(float(x), float(y), z_low) for x, y in np.asarray(outline, dtype=float)]
     wire = cq.Wire.makePolygon(points, close=True)
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
+
+
+def slot(width: float, first: float, last: float, y: float, z_low: float, z_high: float) -> cq.Shape:
+    """Slot parallel to z with round ends, whose middles are at `first` and `last` along x."""
+    radius = width / 2
+    ends = [upright(radius, z_low, z_high, x, y) for x in (first, last)]
+    return box((first, y - radius, z_low), (last, y + radius, z_high)).fuse(*ends)
 
 
 def lathe(profile: ArrayLike) -> cq.Solid:

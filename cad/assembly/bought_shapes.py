@@ -16,7 +16,7 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
 from cad.layout.names import BELT, RING_STATOR
 from cad.screws import SCREWS
-from cad.solids import building, checked
+from cad.solids import building
 from design.catalogue.products import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5
@@ -115,13 +115,13 @@ def _tube(inner: float, outer: float, low: float, high: float) -> cq.Solid:
 def capsule(stack: BeltStack) -> cq.Solid:
     """Body and flange, hollow where the rotor's stub comes out."""
     flange = stack.flange
-    with building(RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm):
+    with building(RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm) as checked:
         body = solids.upright(stack.ring_radius, stack.ring_bottom, stack.ring_top).fuse(
             solids.upright(flange.diameter_mm / 2, stack.disc_top, stack.flange_top)
         )
         low, high = stack.disc_top - 1.0, stack.flange_top + 1.0
         holes = [solids.upright(flange.hole_mm / 2, low, high, x, y) for x, y in flange_centres(stack)]
-        capsule = checked(body.cut(*holes), RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm)
+        capsule = checked(body.cut(*holes))
     return capsule.moved(solids.location(stack.turn()))
 
 
@@ -135,11 +135,11 @@ def belt(stack: BeltStack) -> cq.Solid:
     half = stack.belt.width_mm / 2
     low, high = stack.belt_middle - half, stack.belt_middle + half
     inner, outer = stack.tip_radius + BELT_GAP, stack.belt_radius + BELT_GAP
-    with building(BELT, "loop", "centre distance", stack.centre):
+    with building(BELT, "loop", "centre distance", stack.centre) as checked:
         loops = []
         for radius, beyond in ((outer, 0.0), (inner, 1.0)):
             ends = [solids.upright(radius, low - beyond, high + beyond, x) for x in (0.0, stack.centre)]
             middle = solids.box((0.0, -radius, low - beyond), (stack.centre, radius, high + beyond))
             loops.append(middle.fuse(*ends).clean())
-        back = checked(loops[0].cut(loops[1]), BELT, "loop", "centre distance", stack.centre)
+        back = checked(loops[0].cut(loops[1]))
     return back.moved(solids.location(stack.turn()))

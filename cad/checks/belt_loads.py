@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from cad.checks.check import Check, at_most, note, tidy
+from cad.checks.check import Check, at_most, horn_check, note, tidy
 from cad.geometry.inertia import Inertial
 from cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
 from cad.layout.belt.stack import BeltStack
-from cad.layout.loads import FAR_MM, RATED_AT_MM, Weight, noise_deg, rated_moment_nm
-from cad.layout.names import BEARING, BELT, SERVO
+from cad.layout.loads import FAR_MM, Weight, noise_deg
+from cad.layout.names import BEARING, BELT
 from design.scanner import Scanner
 
 
@@ -28,23 +28,15 @@ def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weig
     name, limit = stack.carrier.name, stack.carrier.static_load_n
     strand = pull.strand_n + pull.working_n / 2
     what = f"pull of the tighter strand of {stack.belt.name}, pre-load {pull.strand_n:.1f} N"
+    on_horn = f"tilt moment on the horn of {scanner.servo.name} by the belt's pull of {pull.shaft_n:.1f} N"
     tension = at_most("belt_tension", strand, stack.belt.working_tension_n, "N", BELT, what)
     return [
         at_most("bearing_load", max(upper, lower), limit, "N", BEARING, f"load across {name}, weight and belt"),
         note("bearing_axial", weight.along_n, "N", BEARING, f"load along {name}, which one of the two carries"),
         tension,
-        *_horn(scanner, pull.horn_nm, pull.shaft_n),
+        horn_check(scanner, pull.horn_nm, on_horn),
         _angle(scanner, stack, torque),
     ]
-
-
-def _horn(scanner: Scanner, moment_nm: float, pull_n: float) -> list[Check]:
-    servo, rated = scanner.servo, rated_moment_nm(scanner)
-    what = f"tilt moment on the horn of {servo.name} by the belt's pull of {pull_n:.1f} N"
-    if rated is None:
-        return [note("tilt_moment", moment_nm, "N m", SERVO, f"{what}, for which its maker gives no rating")]
-    what = f"{what}, rated {servo.radial_load_n:g} N at {RATED_AT_MM:g} mm"
-    return [at_most("tilt_moment", moment_nm, rated, "N m", SERVO, what)]
 
 
 def _angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Check:

@@ -7,7 +7,10 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Literal
 
+from cad.layout.loads import RATED_AT_MM, rated_moment_nm
+from cad.layout.names import SERVO
 from design.arrays import Array
+from design.scanner import Scanner
 
 Severity = Literal["pass", "note", "warning", "error"]
 
@@ -55,6 +58,19 @@ def note(kind: str, value: float | None, unit: str, where: str, what: str) -> Ch
     """A value to know."""
     shown = "not known" if value is None else f"{value:.3g} {unit}"
     return Check(kind, "note", None if value is None else tidy(value), None, unit, where, f"{where}: {what}: {shown}")
+
+
+def rated(kind: str, value: float, rating: float | None, unit: str, where: str, what: str, by: str = "") -> Check:
+    """A check against a maker's rating, with what that says; a value to know where the maker gives none."""
+    if rating is None:
+        return note(kind, value, unit, where, f"{what}, for which its maker gives no rating")
+    return at_most(kind, value, rating, unit, where, f"{what}{by}")
+
+
+def horn_check(scanner: Scanner, moment_nm: float, what: str) -> Check:
+    """The tilt moment on the servo's horn against its rating."""
+    by = f", rated {scanner.servo.radial_load_n:g} N at {RATED_AT_MM:g} mm" if scanner.servo.radial_load_n else ""
+    return rated("tilt_moment", moment_nm, rated_moment_nm(scanner), "N m", SERVO, what, by)
 
 
 def spot(point: Array) -> str:

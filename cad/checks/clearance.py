@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Mapping
 
-import manifold3d
 import numpy as np
 import shapely
 
@@ -32,13 +31,6 @@ def clearance_checks(assembly: Assembly) -> list[Check]:
     meet = {frozenset({name, body.meets}) for name, body in assembly.bodies.items() if body.meets}
     turning = assembly.turning()
     return [turning_check(assembly.outlines(), turning, meet), together_check(assembly.meshes(), turning)]
-
-
-def distance_over_a_turn(one: TriMesh, other: TriMesh) -> float:
-    """Least distance of a turning and a standing body at any axis angle; 0 where they meet."""
-    if _holds(one, other) or _holds(other, one):
-        return 0.0
-    return _distance(_image(one), _image(other))
 
 
 def turning_check(
@@ -67,7 +59,7 @@ def turning_check(
 def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Check:
     """No room shared by bodies that move together; arguments as for `turning_check`."""
     most, where = 0.0, "parts that move together"
-    bodies = {name: _manifold(mesh) for name, mesh in meshes.items()}
+    bodies = {name: mesh.manifold() for name, mesh in meshes.items()}
     names = sorted(meshes)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
@@ -174,7 +166,3 @@ def _apart(one: TriMesh, other: TriMesh) -> bool:
         one.vertices.min(axis=0) - other.vertices.max(axis=0), other.vertices.min(axis=0) - one.vertices.max(axis=0)
     )
     return bool(gap.max() > 0)
-
-
-def _manifold(mesh: TriMesh) -> manifold3d.Manifold:
-    return manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))

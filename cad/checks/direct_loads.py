@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 
-from cad.checks.check import Check, at_most, note
+from cad.checks.check import Check, at_most, horn_check, rated
 from cad.layout.direct.cage import share_weight
 from cad.layout.direct.loads import Supported
 from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import FAR_MM, RATED_AT_MM, Weight, noise_deg, rated_moment_nm
+from cad.layout.loads import FAR_MM, Weight, noise_deg
 from cad.layout.names import BEARING, SERVO, SERVO_SHAFT
 from design.scanner import Scanner
 
@@ -24,20 +24,11 @@ def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[C
 
 
 def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Check]:
-    servo, rated = scanner.servo, rated_moment_nm(scanner)
-    checks = []
-    what = f"tilt moment on the horn of {servo.name}"
-    if rated is None:
-        what = f"{what}, for which its maker gives no rating"
-        checks.append(note("tilt_moment", shared.horn_moment_nm, "N m", SERVO, what))
-    else:
-        what = f"{what}, rated {servo.radial_load_n:g} N at {RATED_AT_MM:g} mm"
-        checks.append(at_most("tilt_moment", shared.horn_moment_nm, rated, "N m", SERVO, what))
-    what = f"load along the axis of {servo.name}"
-    if servo.axial_load_n is None:
-        checks.append(note("axial_load", weight.along_n, "N", SERVO, f"{what}, for which its maker gives no rating"))
-    else:
-        checks.append(at_most("axial_load", weight.along_n, servo.axial_load_n, "N", SERVO, what))
+    servo, axial = scanner.servo, f"load along the axis of {scanner.servo.name}"
+    checks = [
+        horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}"),
+        rated("axial_load", weight.along_n, servo.axial_load_n, "N", SERVO, axial),
+    ]
     if stack.bearing is not None:
         what = f"load across {stack.bearing.name}"
         limit = stack.bearing.static_load_n

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import manifold3d
 import numpy as np
 
 from cad.checks.check import Check, spot, tidy
@@ -44,8 +43,7 @@ def islands_check(name: str, mesh: TriMesh, pose: PrintPose) -> Check:
 
 def islands_of(mesh: TriMesh) -> list[Island]:
     """Islands of a closed mesh that lies on the plane z = 0, from below."""
-    body = manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
-    found = []
+    body, found = mesh.manifold(), []
     below = body.slice(LAYER / 2)
     for height in np.arange(1.5 * LAYER, float(mesh.vertices[:, 2].max()), LAYER):
         layer = body.slice(float(height))

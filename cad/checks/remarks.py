@@ -8,14 +8,13 @@ from cad.checks.mechanics import load_checks
 from cad.findings import PartFinding
 from cad.geometry.inertia import Inertial
 from cad.layout.belt.stack import BeltStack
-from cad.layout.deck import Deck
 from cad.layout.direct.cage import share_weight
 from cad.layout.direct.stack import DirectStack
-from cad.layout.drive import DriveLayout
+from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from cad.layout.names import BASE_MOUNT, SERVO_SHAFT
-from cad.screws import SCREWS, passing_hole
+from cad.screws import passing_hole
 from design.catalogue.products import Printer, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
@@ -43,7 +42,7 @@ def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial
     else:
         found += _tilt_moment(scanner, layout.stack, bodies)
     if layout.deck.flat:
-        found.append(_held_by_screws(scanner, layout.deck))
+        found.append(_held_by_screws(scanner, layout.drive.mounted))
     for product in products_of(scanner, layout.drive):
         found += unverified(product, assembly)
     return tuple(found)
@@ -103,12 +102,12 @@ def _tilt_moment(scanner: Scanner, stack: DirectStack, bodies: dict[str, Inertia
     return [PartFinding("tilt_moment", "warning", SERVO_SHAFT, message)]
 
 
-def _held_by_screws(scanner: Scanner, deck: Deck) -> PartFinding:
-    screw = SCREWS[scanner.servo.case_screw]
-    named = ", ".join(f"({x:g}, {y:g})" for x, y in deck.rear_holes)
+def _held_by_screws(scanner: Scanner, mounted: Mounted) -> PartFinding:
+    hole = passing_hole(mounted.screw, scanner.printer)
+    named = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
     message = (
         f"{BASE_MOUNT}: left out, the axis stands upright: hold {scanner.servo.name} by its rear holes with 4 x "
-        f"{screw.name} from below through the deck, {passing_hole(screw, scanner.printer):g} mm holes at "
+        f"{mounted.screw.name} from below through the deck, {hole:g} mm holes at "
         f"{named} mm from the axis; leave room for the plugs"
     )
     return PartFinding("servo_on_deck", "note", BASE_MOUNT, message)

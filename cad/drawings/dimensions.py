@@ -64,7 +64,7 @@ def ordinates(pen: Pen, values: dict[float, float], edge: float, *, below: bool,
         points = [(y, x) if below else (x, y) for x, y in path]
         own = pen.dimension(
             ORDINATE_X if below else ORDINATE_Y,
-            "-<>" if words.startswith("-") else "<>",
+            "<>" if sign > 0 and value >= 0 else words,  # of a negative one some readers tell the sign, some do not
             points[5],
             defpoint=(0.0, 0.0),
             defpoint2=points[6],

@@ -9,7 +9,7 @@ from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
-from cad.geometry.holes import rounds_of
+from cad.layout.all_joints import joints_of
 from cad.layout.fits import OnSheet
 from design.catalogue.products import Printer
 from design.scanner import Scanner
@@ -41,9 +41,10 @@ def drawing_of(
     config_hash: str,
 ) -> Sheet:
     """The sheet of one part."""
-    spec, solid = assembly.parts[name], assembly.made[name]
+    spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    part = part_of(solid, rounds_of(solid), lidar_axis, spec.sheet)
+    own = [joint for joint in joints_of(assembly.layout) if joint.part == name]
+    part = part_of(assembly.made[name], lidar_axis, spec.sheet, own)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),

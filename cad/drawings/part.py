@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
 
 from cad.drawings.patterns import Pattern, on_axis, patterns_of
-from cad.drawings.slots import Slot, slots_of
-from cad.geometry.holes import Round
+from cad.geometry.holes import Round, rounds_of
 from cad.layout.fits import OnSheet, ToleratedDiameter
+from cad.layout.joints import Joint
 from design.arrays import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
@@ -28,7 +29,7 @@ class Part:
     Attributes:
         solid: rotation frame, moved so that the axis it is measured from is x = y = 0.
         patterns: its holes beside the axis.
-        slots: its slots, equal ones together.
+        slots: width and length of equal ones, and their middles.
         axial: its cylinders about the axis that it is measured from.
         datum: height of the lowest point.
         lidar_axis: z of the lidar that it carries; None for other parts.
@@ -37,7 +38,7 @@ class Part:
 
     solid: cq.Solid
     patterns: list[Pattern]
-    slots: list[list[Slot]]
+    slots: list[tuple[tuple[float, float], list[Array]]]
     axial: list[Round]
     datum: float
     lidar_axis: Array | None
@@ -49,26 +50,22 @@ class Part:
         return "" if fit is None else f"  {fit.tolerance}"
 
 
-def part_of(solid: cq.Solid, rounds: list[Round], lidar_axis: Array | None, said: OnSheet) -> Part:
-    """Read a solid, whose cylinders are known; its fits are those that one of its cylinders has."""
+def part_of(solid: cq.Solid, lidar_axis: Array | None, said: OnSheet, joints: Iterable[Joint]) -> Part:
+    """Read a solid; its slots are those of its joints, its fits those that one of its cylinders has."""
     away = (-said.axis[0], -said.axis[1], 0.0)
     if any(away):
-        solid, rounds = solid.translate(cq.Vector(*away)), [_moved(item, away) for item in rounds]
+        solid = solid.translate(cq.Vector(*away))
+    rounds = rounds_of(solid)
     axial = [item for item in rounds if on_axis(item)]
     fits = tuple(fit for fit in said.fits if any(is_of(fit, item) for item in axial))
     datum = float(solid.BoundingBox().zmin)
-    return Part(solid, patterns_of(rounds), slots_of(solid), axial, datum, lidar_axis, fits)
+    slots = [(joint.slot_mm, [np.array(axis.start) + away for axis in joint.axes]) for joint in joints if joint.slot_mm]
+    return Part(solid, patterns_of(rounds), slots, axial, datum, lidar_axis, fits)
 
 
 def is_of(fit: ToleratedDiameter, item: Round) -> bool:
     """Whether a fit is meant for a cylinder."""
     return fit.hole == item.hole and abs(fit.diameter - item.diameter) < SAME_SIZE
-
-
-def _moved(item: Round, by: tuple[float, float, float]) -> Round:
-    """The cylinder somewhere else, to the digits that cylinders have."""
-    low, high = ((end[0] + by[0], end[1] + by[1], end[2] + by[2]) for end in (item.low, item.high))
-    return replace(item, low=low, high=high)
 
 
 def parallel(a: Array, b: Array) -> bool:

@@ -38,17 +38,21 @@ class Pattern:
     def words(self) -> str:
         """The call-out."""
         hole = self.holes[0]
-        count = f"{len(self.holes)}x " if len(self.holes) > 1 else ""
         depth = "THRU" if hole.through else f"x {number(hole.length)} DEEP"
         circle = f" ON Ø{number(self.circle)}" if self.circle else ""
         heads = f", Ø{number(self.heads)} FOR HEADS" if self.heads else ""
-        return f"{count}Ø{number(hole.diameter)} {depth}{circle}{heads}"
+        return f"{counted(len(self.holes))}Ø{number(hole.diameter)} {depth}{circle}{heads}"
 
 
 def number(value: float) -> str:
     """A length or an angle as drawings write it: two decimals at most, no trailing zeros."""
     text = f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
+
+
+def counted(count: int) -> str:
+    """How often, where it is more than once, before the words for one."""
+    return f"{count}x " if count > 1 else ""
 
 
 def patterns_of(rounds: list[Round]) -> list[Pattern]:

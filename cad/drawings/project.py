@@ -159,10 +159,9 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
             groups.append(([], []))
         low, high = sorted(float((end - starts[i]) @ alongs[i]) for end in ends)
         groups[i][hidden].append((low, high))
-    for start, along, (seen, behind) in zip(starts, alongs, groups, strict=False):
-        seen = _union(seen)
-        for hidden, spans in ((False, seen), (True, _minus(_union(behind), seen))):
-            for low, high in spans:
+    for start, along, spans in zip(starts, alongs, groups, strict=False):
+        for hidden, shown in _shown(*spans):
+            for low, high in shown:
                 if high - low > SHORTEST:
                     yield Chain((_point(start + low * along), _point(start + high * along)), hidden)
 
@@ -177,10 +176,9 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
             groups.append((centre, radius, ([], [])))
         turns = math.floor(low / (2 * math.pi)) * 2 * math.pi
         groups[i][2][hidden].extend(_within_turn(low - turns, high - turns))
-    for centre, radius, (seen, behind) in groups:
-        seen = _union(seen)
-        for hidden, spans in ((False, seen), (True, _minus(_union(behind), seen))):
-            for low, high in _closed(spans):
+    for centre, radius, spans in groups:
+        for hidden, shown in _shown(*spans):
+            for low, high in _closed(shown):
                 if (high - low) * radius > SHORTEST:
                     yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, hidden)
 
@@ -201,6 +199,12 @@ def _closed(spans: list[Span]) -> list[Span]:
     if len(spans) > 1 and spans[0][0] < 1e-3 and spans[-1][1] > 2 * math.pi - 1e-3:
         return [*spans[1:-1], (spans[-1][0], spans[0][1] + 2 * math.pi)]
     return spans
+
+
+def _shown(seen: list[Span], behind: list[Span]) -> tuple[tuple[bool, list[Span]], ...]:
+    """Whether hidden, and what is drawn so: of what lies behind only what nothing seen covers."""
+    seen = _union(seen)
+    return (False, seen), (True, _minus(_union(behind), seen))
 
 
 def _union(spans: Iterable[Span]) -> list[Span]:

@@ -102,17 +102,12 @@ def _lidar_shapes(scanner: Scanner) -> list[tuple[str, str]]:
     lidar = scanner.lidar
     x, y, height = lidar.body_mm
     low, high = lidar.window_z_mm
-    return [
-        (_origin((0.0, 0.0, (low / 2 - lidar.optical_height_mm) / 1000)), _box((x, y, low))),
-        (
-            _origin((0.0, 0.0, ((low + high) / 2 - lidar.optical_height_mm) / 1000)),
-            _cylinder(lidar.window_radius_mm, high - low),
-        ),
-        (
-            _origin((0.0, 0.0, ((high + height) / 2 - lidar.optical_height_mm) / 1000)),
-            _cylinder(min(x, y) / 2 - 1.5, height - high),
-        ),
-    ]
+    shapes = {  # by the middle of their height above the base
+        low / 2: _box((x, y, low)),
+        (low + high) / 2: _cylinder(lidar.window_radius_mm, high - low),
+        (high + height) / 2: _cylinder(min(x, y) / 2 - 1.5, height - high),
+    }
+    return [(_origin((0.0, 0.0, (z - lidar.optical_height_mm) / 1000)), shape) for z, shape in shapes.items()]
 
 
 def _origin(xyz: Sequence[float] | Array) -> str:

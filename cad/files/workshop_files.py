@@ -16,7 +16,7 @@ from cad.files.threemf import threemf_bytes
 from cad.findings import PartFinding
 from cad.geometry.mesh import TriMesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
-from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.labels.fit_coupon import fit_coupon
 from cad.layout.all_joints import joints_of
 from cad.layout.layout import config_hash
 from cad.layout.names import FIT_COUPON
@@ -54,7 +54,7 @@ def export_scanner(
     progress("writing print files")
     files, left_out = _prints(scanner, made.meshes, assembly.metal(), digest)
     progress("making the fit coupon")
-    coupon = fit_coupon(coupon_of(scanner, assembly.layout.stack))
+    coupon = fit_coupon(scanner, assembly.layout.stack)
     files |= _print_file(scanner, FIT_COUPON, checked_mesh(coupon, FIT_COUPON), digest)
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest)

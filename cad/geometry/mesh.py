@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cadquery as cq
+import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
@@ -35,6 +36,10 @@ class TriMesh:
         """Enclosed volume [mm3]."""
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+    def manifold(self) -> manifold3d.Manifold:
+        """For booleans and slices, in single precision."""
+        return manifold3d.Manifold(manifold3d.Mesh(self.vertices.astype(np.float32), self.faces.astype(np.uint32)))
 
     def is_closed(self) -> bool:
         """Whether every edge is shared by exactly two triangles that run it in opposite directions."""

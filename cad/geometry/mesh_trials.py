@@ -57,13 +57,13 @@ def _off(solid: cq.Solid) -> tuple[float, int]:
         if face.geomType() == "PLANE":
             continue
         surface = BRep_Tool.Surface_s(face.wrapped)  # where it is in space: the place of the face is in it
-        nodes = np.array([_xyz(mesh.Node(i + 1).Transformed(place.Transformation())) for i in range(mesh.NbNodes())])
-        at = np.array([(mesh.UVNode(i + 1).X(), mesh.UVNode(i + 1).Y()) for i in range(mesh.NbNodes())])
+        nodes = np.array([mesh.Node(i + 1).Transformed(place.Transformation()).Coord() for i in range(mesh.NbNodes())])
+        at = np.array([mesh.UVNode(i + 1).Coord() for i in range(mesh.NbNodes())])
         corners = np.array([mesh.Triangle(i + 1).Get() for i in range(mesh.NbTriangles())]) - 1
         groups = [corners[:, which] for which in ([0, 1], [1, 2], [2, 0], [0, 1, 2])]
         middles = np.concatenate([nodes[group].mean(axis=1) for group in groups])
         places = np.concatenate([at[group].mean(axis=1) for group in groups])
-        there = np.array([_xyz(surface.Value(u, v)) for u, v in places])
+        there = np.array([surface.Value(u, v).Coord() for u, v in places])
         at_most = np.linalg.norm(middles - there, axis=1)  # the nearest point of the surface may be another one
         for i in np.argsort(-at_most):
             if at_most[i] <= worst:
@@ -71,7 +71,3 @@ def _off(solid: cq.Solid) -> tuple[float, int]:
             nearest = GeomAPI_ProjectPointOnSurf(gp_Pnt(*middles[i]), surface)
             worst = max(worst, min(at_most[i], nearest.LowerDistance() if nearest.NbPoints() else np.inf))
     return float(worst), count
-
-
-def _xyz(point: object) -> tuple[float, float, float]:
-    return point.X(), point.Y(), point.Z()  # type: ignore[attr-defined]

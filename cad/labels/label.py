@@ -5,6 +5,9 @@ before, with room for it and a wall behind it, its lines as level as the face al
 configuration alone; where no face can be read, a hidden one that mates with nothing takes the label, and where there
 is none either, the part goes without. The label is the last cut: drawings, screws and moving parts know nothing of it.
 The lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
+
+No flat named beside each part: on the best that a linkage has, the plate's underside, 13 of 16 random settings have
+room in sight, the search finds it on all 16.
 """
 
 from __future__ import annotations
@@ -209,9 +212,8 @@ def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: 
         BuildError: the grooves spoil the part.
     """
     grooves = [(place.flat, place.outlines(lines, groove.width)) for place, lines in words]
-    with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]):
-        cut = engrave(solid, grooves, groove.depth)
-        cut = solids.checked(cut, "label", "lettering", "lines", [lines.lines for _, lines in words])
+    with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]) as checked:
+        cut = checked(engrave(solid, grooves, groove.depth))
     return cut, checked_mesh(cut, "label")
 
 

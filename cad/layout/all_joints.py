@@ -39,7 +39,7 @@ def joints_of(layout: Layout) -> list[Joint]:
     joints = [*drive, _clamp(layout), *_of_lidar(layout), *_on_deck(layout)]
     if isinstance(layout.counterweight, Counterweight):
         joints.append(_bar(layout.counterweight))
-    return sorted(joints, key=lambda joint: joint.slotted)
+    return sorted(joints, key=lambda joint: joint.slot_mm is not None)
 
 
 def _clamp(layout: Layout) -> Joint:
@@ -95,7 +95,7 @@ def _on_deck(layout: Layout) -> Iterator[Joint]:
 
 def _bar(bar: Counterweight) -> Joint:
     """The counterweight on the ear of the hub, from below."""
-    ear = bar.ear
+    ear, slide = bar.ear, bar.ear.slots[0]
     x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
     return Joint(
         names.ALIGNMENT_LINKAGE,
@@ -105,5 +105,5 @@ def _bar(bar: Counterweight) -> Joint:
         upright_axes(((at * x, at * y) for at in bar.screws), ear.low, 1.0),
         grip_mm=ear.high - ear.low,
         thread_mm=bar.section[1],
-        slotted=True,
+        slot_mm=(ear.slot_width, slide[1] - slide[0] + ear.slot_width),
     )

@@ -42,12 +42,10 @@ class Deck:
     normal: tuple[float, float, float]  # from the deck into the room
     along: tuple[float, float, float]  # world x
     centre: tuple[float, float, float]  # world origin
-    hangs: bool
     flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
-    rear_holes: tuple[tuple[float, float], ...]  # x, y of the four that hold what the mount carries
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
@@ -84,12 +82,10 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         normal=_triple(normal),
         along=_triple(along),
         centre=_triple(centre),
-        hangs=hangs,
         flat=flat,
         t_world_rot=_triple(np.round(offset, 6)),
         back_centre=_triple(back),
         back_half=half,
-        rear_holes=holes,
         screw=screw,
         deck_holes=deck_holes,
         foot=_foot(pattern, screw),

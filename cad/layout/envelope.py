@@ -156,7 +156,7 @@ def exact(R: Array) -> Array:
     return np.where(np.abs(R) < 1e-12, 0.0, R)
 
 
-def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None) -> float:
+def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None) -> float:
     """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
     envelope = envelope_of(lidar, sub_plate)
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]

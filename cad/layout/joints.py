@@ -60,7 +60,7 @@ class Joint:
         grip_mm: what the shank passes before it holds.
         thread_mm: of thread, or of material before the nut.
         thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
-        slotted: whether they may slide, in slots.
+        slot_mm: width and length of the slots that they may slide in, if not holes.
     """
 
     part: str
@@ -71,7 +71,7 @@ class Joint:
     grip_mm: float
     thread_mm: float
     thread: Thread | None = None
-    slotted: bool = False
+    slot_mm: tuple[float, float] | None = None
 
     @property
     def count(self) -> int:

@@ -31,7 +31,7 @@ from cad.parts.linkage_hub import hub, hub_cuts
 from cad.parts.part_spec import PartSpec, Step
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
-from cad.solids import building, checked
+from cad.solids import building
 from design.errors import BuildError
 
 OF_LIDAR = (
@@ -122,12 +122,12 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", _tilt(p)):
         laser = solids.location(p.stack.R())
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
-        neck = neck_corners(p, attempt) @ p.stack.R()
-        beside = [*fan, *fins_beside(p.top, p.body, p.cables, neck)]
+        corners = neck_corners(p, attempt)
+        beside = [*fan, *fins_beside(p.top, p.body, p.cables, corners @ p.stack.R())]
         marked = [*_holes(p), *_plate_marks(p)]
         return Shapes(
             plate=_plate(p).moved(laser),
-            neck=_neck(p, attempt),
+            neck=solids.hull(corners),
             room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p))],
             beside=[shape.moved(laser) for shape in beside],
             hub=hub(p),
@@ -137,15 +137,15 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
 
 def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
-    with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt):
-        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck), ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt)
+    with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt) as checked:
+        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
     with building(ALIGNMENT_LINKAGE, "free room of lidar, cables and fan", "tilt", tilt):
         # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
         body = _largest(body.cut(*shapes.room, *shapes.beside))
-    with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm"):
-        body = checked(body.fuse(shapes.hub).cut(*shapes.room), ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm")
-    with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm"):
-        linkage = checked(body.cut(*shapes.holes).clean(), ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm")
+    with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm") as checked:
+        body = checked(body.fuse(shapes.hub).cut(*shapes.room))
+    with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
+        linkage = checked(body.cut(*shapes.holes).clean())
     bottom = linkage.BoundingBox().zmin
     if abs(bottom - stack.hub_bottom) > 1e-3:
         raise BuildError(
@@ -159,20 +159,11 @@ def _tilt(p: AlignmentLinkage) -> str:
     return f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
 
 
-def _neck(p: AlignmentLinkage, attempt: int) -> cq.Solid:
-    return solids.hull(neck_corners(p, attempt))
-
-
 def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
     """What must stay free so that the lidar can be put in along its own z: body and cables, swept upwards."""
-    (x0, y0, _), (x1, y1, _) = p.body
-    room = [solids.box((x0, y0, p.top), (x1, y1, FAR))]
-    if p.ears is not None:
-        (x0, y0, _), (x1, y1, _) = p.ears
-        room.append(solids.box((x0, y0, p.top), (x1, y1, FAR)))
-    for (cx0, cy0, cz0), (cx1, cy1, _) in p.cables:
-        room.append(solids.box((cx0, cy0, cz0), (cx1, cy1, FAR)))
-    return room
+    over = [box for box in (p.body, p.ears) if box is not None]
+    boxes = [*(((x, y, p.top), high) for (x, y, _), high in over), *p.cables]
+    return [solids.box(low, (x, y, FAR)) for low, (x, y, _) in boxes]
 
 
 def _plate(p: AlignmentLinkage) -> cq.Shape:

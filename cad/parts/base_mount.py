@@ -9,7 +9,6 @@ the foot on the deck.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import cadquery as cq
@@ -18,13 +17,13 @@ import numpy as np
 from cad import outlines, solids
 from cad.layout.belt.stack import BeltStack
 from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, UNDER_MOUNT_HEAD, Deck
+from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
-from cad.screws import Screw, passing_hole
-from cad.solids import building, checked
-from design.arrays import Array
+from cad.screws import passing_hole
+from cad.solids import building
 
 OF_SERVO = (
     "servo.case_min_mm",
@@ -37,18 +36,6 @@ RAIL_HALF_WIDTH = 4.0  # least
 RAIL_WALL = 1.3  # of a rail beside the heads of its screws
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BaseMount:
-    """Lengths in mm."""
-
-    deck: Deck
-    rear: float  # z of the case's rear face
-    ears: float  # z of the planes around the rear holes
-    screw: Screw
-    hole: float  # diameter, of the case screws
-    deck_hole: float
 
 
 def mount_spec(layout: Layout) -> PartSpec | None:
@@ -69,77 +56,63 @@ def mount_spec(layout: Layout) -> PartSpec | None:
     return PartSpec(
         name=BASE_MOUNT,
         turns=False,
-        make=partial(base_mount, mount_of(layout)),
+        make=partial(base_mount, layout),
         step=step,
         shaped_by=() if isinstance(layout.stack, BeltStack) else OF_SERVO,
         angles="rot",
     )
 
 
-def mount_of(layout: Layout) -> BaseMount:
-    """Parameters of the mount of one scanner."""
-    mounted, deck, printer = layout.drive.mounted, layout.deck, layout.scanner.printer
-    return BaseMount(
-        deck=deck,
-        rear=mounted.rear,
-        ears=mounted.ears,
-        screw=mounted.screw,
-        hole=passing_hole(mounted.screw, printer),
-        deck_hole=passing_hole(deck.screw, printer),
-    )
-
-
-def base_mount(p: BaseMount) -> cq.Solid:
+def base_mount(layout: Layout) -> cq.Solid:
     """Make the mount.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    deck = p.deck
+    deck, mounted, printer = layout.deck, layout.drive.mounted, layout.scanner.printer
+    hole, deck_hole = passing_hole(mounted.screw, printer) / 2, passing_hole(deck.screw, printer) / 2
     axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
-    frame = deck.rotation()
-    on_deck = solids.location(frame, deck.centre)
-    back = np.array(deck.back_centre)
-    with building(BASE_MOUNT, "strut and foot", "deck normal", axis):
+    on_deck = solids.location(deck.rotation(), deck.centre)
+    back = deck.back_centre[2]
+    with building(BASE_MOUNT, "strut and foot", "deck normal", axis) as checked:
         foot = solids.prism(outlines.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
-        body: cq.Shape = _back_plate(p).fuse(foot, _strut(p, frame))
-        body = checked(body, BASE_MOUNT, "strut and foot", "deck normal", axis)
-    with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis):
-        rails = [_rail(p, side) for side in (1.0, -1.0)]
-        feet = [solids.upright(FOOT_RADIUS, p.rear - 1.0, p.ears, x, y) for x, y in deck.rear_holes]
+        body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
+    with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
+        rails = [_rail(deck, mounted, side) for side in (1.0, -1.0)]
+        feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
         cuts = []
-        for x, y in deck.rear_holes:
-            cuts.append(solids.upright(p.hole / 2, back[2] - 20.0, p.ears + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, back[2] - 400.0, p.ears - UNDER_MOUNT_HEAD, x, y))
+        for x, y in mounted.holes:
+            cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
+            cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
         for x, y in deck.deck_holes:
-            cuts.append(solids.upright(p.deck_hole / 2, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
-        return checked(body.cut(*cuts).clean(), BASE_MOUNT, "rails and screw holes", "deck normal", axis)
+            cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
+        return checked(body.cut(*cuts).clean())
 
 
-def _back_plate(p: BaseMount) -> cq.Solid:
-    x, y = p.deck.back_half
-    _, cy, cz = p.deck.back_centre
+def _back_plate(deck: Deck) -> cq.Solid:
+    x, y = deck.back_half
+    _, cy, cz = deck.back_centre
     return solids.prism(outlines.octagon(x, y, 3.0, cy), cz - BACK_THICKNESS, cz)
 
 
-def _strut(p: BaseMount, frame: Array) -> cq.Shape:
+def _strut(deck: Deck) -> cq.Shape:
     """Hull of back plate and a pad in the foot, behind the front of the back plate."""
-    x, y = p.deck.back_half
-    _, cy, cz = p.deck.back_centre
+    x, y = deck.back_half
+    _, cy, cz = deck.back_centre
     plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
     pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
     layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
     for z in (0.8, FOOT_THICKNESS - 0.9):
-        layers.append(np.column_stack([pad, np.full(8, z)]) @ frame.T + np.array(p.deck.centre))
+        layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
     whole = solids.hull(np.concatenate(layers))
     return whole.cut(solids.box((-400.0, -400.0, cz - 0.3), (400.0, 400.0, cz + 400.0)))
 
 
-def _rail(p: BaseMount, side: float) -> cq.Solid:
-    x = side * p.deck.rear_holes[0][0]
-    _, cy, cz = p.deck.back_centre
-    y = p.deck.back_half[1] - 0.8
-    half = max(RAIL_HALF_WIDTH, p.screw.head_room + RAIL_WALL)
+def _rail(deck: Deck, mounted: Mounted, side: float) -> cq.Solid:
+    x = side * mounted.holes[0][0]
+    _, cy, cz = deck.back_centre
+    y = deck.back_half[1] - 0.8
+    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + RAIL_WALL)
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

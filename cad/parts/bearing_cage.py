@@ -37,7 +37,7 @@ from cad.layout.joints import ALL_SCREWS, screws
 from cad.layout.names import BEARING_CAGE, CAGE_BASE, SERVO_CASE
 from cad.parts.part_spec import ON_CASE, PartSpec, Step
 from cad.screws import Trap
-from cad.solids import building, checked
+from cad.solids import building
 from design.scanner import Scanner
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
@@ -84,7 +84,7 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
     """
     stack = p.stack
     size = f"{p.bearing.outer_mm:g}"
-    with building(BEARING_CAGE, "bell", "outer_mm", size):
+    with building(BEARING_CAGE, "bell", "outer_mm", size) as checked:
         seat = p.bearing.outer_mm / 2 + p.fit / 4
         lip = p.bearing.outer_mm / 2 - CAGE_LIP
         rim = p.bearing.outer_mm / 2 + CAGE_SEAT_WALL
@@ -101,16 +101,14 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
             (stack.cage_inner, roof),
             (stack.cage_inner, p.foot),
         ]
-        body: cq.Shape = checked(solids.lathe(profile), BEARING_CAGE, "bell", "outer_mm", size)
-    with building(BEARING_CAGE, "windows and screw holes", "outer_mm", size):
+        body: cq.Shape = checked(solids.lathe(profile))
+    with building(BEARING_CAGE, "windows and screw holes", "outer_mm", size) as checked:
         cuts = _windows(p) if stack.ring_length > 0 else []
         for azimuth in p.legs:
-            out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-            centre = np.array([0.0, 0.0, (p.foot + p.high) / 2])
-            cuts.append(solids.cylinder(p.cage_hole / 2, centre, out, 80.0))
-            head = centre + (stack.cage_inner + UNDER_CAGE_HEAD) * out
-            cuts.append(solids.cylinder(CAGE_SCREW.head_room, head, out, 80.0))
-        return checked(body.cut(*cuts).clean(), BEARING_CAGE, "windows and screw holes", "outer_mm", size)
+            middle, heads = (p.foot + p.high) / 2, stack.cage_inner + UNDER_CAGE_HEAD
+            cuts.append(solids.radial(p.cage_hole / 2, azimuth, middle))
+            cuts.append(solids.radial(CAGE_SCREW.head_room, azimuth, middle, heads))
+        return checked(body.cut(*cuts).clean())
 
 
 def cage_base(p: BearingCage) -> cq.Solid:
@@ -121,15 +119,15 @@ def cage_base(p: BearingCage) -> cq.Solid:
     """
     stack = p.stack
     last = min(y for _, y in p.holes) - FOOT_RADIUS - 1.5
-    with building(CAGE_BASE, "plate and boss", "case_holes_mm", p.holes):
+    with building(CAGE_BASE, "plate and boss", "case_holes_mm", p.holes) as checked:
         reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
         tail = solids.box((-p.half_x, last, p.low), (p.half_x, 0.0, p.high if reaches_out else p.foot))
         around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         body = body.cut(solids.upright(p.opening, p.low - 1.0, p.high + 1.0))
-        body = checked(body, CAGE_BASE, "plate and boss", "case_holes_mm", p.holes)
-    with building(CAGE_BASE, "feet and screw holes", "case_holes_mm", p.holes):
+        body = checked(body)
+    with building(CAGE_BASE, "feet and screw holes", "case_holes_mm", p.holes) as checked:
         feet = [solids.upright(FOOT_RADIUS, p.ears, p.low + 1.0, x, y) for x, y in p.holes]
         body = body.fuse(*feet)
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.front, p.high + 1.0)]
@@ -137,12 +135,11 @@ def cage_base(p: BearingCage) -> cq.Solid:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, p.high + 1.0, x, y))
             cuts.append(_head_room(p, x, y))
         for azimuth in p.legs:
-            out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-            start = (stack.cage_inner - SCREW_DEPTH) * out + [0.0, 0.0, (p.foot + p.high) / 2]
-            cuts.append(solids.cylinder(p.thread.hole / 2, start, out, SCREW_DEPTH + 1.0))
+            middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
+            cuts.append(solids.radial(p.thread.hole / 2, azimuth, middle, start, SCREW_DEPTH + 1.0))
             if p.thread.trap is not None:
                 cuts.append(_slot(p, p.thread.trap, azimuth))
-        return checked(body.cut(*cuts).clean(), CAGE_BASE, "feet and screw holes", "case_holes_mm", p.holes)
+        return checked(body.cut(*cuts).clean())
 
 
 def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:

@@ -37,7 +37,7 @@ from cad.layout.fits import OnSheet, printed_seat
 from cad.layout.names import BEARING_TOWER
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Trap
-from cad.solids import building, checked
+from cad.solids import building
 from design.scanner import Scanner
 
 BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
@@ -80,17 +80,13 @@ def bearing_tower(p: BearingTower) -> cq.Solid:
     """
     stack = p.stack
     size = f"{stack.carrier.outer_mm:g}"
-    with building(BEARING_TOWER, "tube, shelf and foot", "outer_mm", size):
-        body = checked(
-            _tube(p).fuse(_foot(p), *_shelf(p)).cut(_inside(p)), BEARING_TOWER, "tube, shelf and foot", "outer_mm", size
-        )
-    with building(BEARING_TOWER, "holes and mark", "outer_mm", size):
-        made = checked(body.cut(*_holes(p)).clean(), BEARING_TOWER, "holes", "outer_mm", size).moved(
-            solids.location(stack.turn())
-        )
+    with building(BEARING_TOWER, "tube, shelf and foot", "outer_mm", size) as checked:
+        body = checked(_tube(p).fuse(_foot(p), _shelf(p)).cut(_inside(p)))
+    with building(BEARING_TOWER, "holes and mark", "outer_mm", size) as checked:
+        made = checked(body.cut(*_holes(p)).clean()).moved(solids.location(stack.turn()))
         edge = (stack.plate_y[1], stack.tower_radius, -stack.plate_y[0], stack.tower_radius)[stack.quarter]
         groove = solids.prism(outlines.diamond(GROOVE, edge), stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0)
-        return checked(made.cut(groove).clean(), BEARING_TOWER, "mark", "outer_mm", size)
+        return checked(made.cut(groove).clean())
 
 
 def _tube(p: BearingTower) -> cq.Solid:
@@ -145,7 +141,7 @@ def _foot(p: BearingTower) -> cq.Shape:
     return plate.fuse(cone.intersect(around))
 
 
-def _shelf(p: BearingTower) -> list[cq.Shape]:
+def _shelf(p: BearingTower) -> cq.Shape:
     """A plate around the tube's top, forked around the servo's case; servo's frame."""
     stack = p.stack
     low, high = stack.plate_y
@@ -156,7 +152,7 @@ def _shelf(p: BearingTower) -> list[cq.Shape]:
     back = -stack.tower_radius
     outline = [[-MARKED, low], [end, low], [end, high], [-MARKED, high], [back, 12.0], [back, -12.0]]
     whole = solids.prism(outline, bottom, top)
-    return [whole.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))]
+    return whole.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))
 
 
 def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:
@@ -183,11 +179,9 @@ def _holes(p: BearingTower) -> list[cq.Solid]:
             if p.foot.trap is not None:
                 cuts.append(_corner_slot(p.foot.trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
     for azimuth in disc_azimuths(stack):
-        out = (math.cos(azimuth), math.sin(azimuth), 0.0)
-        height = stack.disc_top - DISC / 2
-        cuts.append(solids.cylinder(p.disc_hole / 2, (0.0, 0.0, height), out, 80.0))
-        start = tuple((stack.chamber_radius + UNDER_HEAD) * c for c in out[:2])
-        cuts.append(solids.cylinder(DISC_SCREW.head_room, (*start, height), out, 80.0))
+        height, heads = stack.disc_top - DISC / 2, stack.chamber_radius + UNDER_HEAD
+        cuts.append(solids.radial(p.disc_hole / 2, azimuth, height))
+        cuts.append(solids.radial(DISC_SCREW.head_room, azimuth, height, heads))
     ring = stack.collar_low + BOSS / 2
     cuts.append(solids.cylinder(WINDOW / 2, (0.0, 0.0, ring), (-1.0, 0.0, 0.0), 80.0))
     return cuts

@@ -16,7 +16,7 @@ from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
 from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building, checked
+from cad.solids import building
 from design.left_out import LeftOut
 
 
@@ -53,8 +53,7 @@ def counterweight(p: Counterweight) -> cq.Solid:
         BuildError: a step did not give one valid solid.
     """
     half, low, high = p.section[0] / 2, p.ear.high, p.ear.high + p.section[1]
-    with building(COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm"):
-        bar: cq.Shape = solids.box((p.start, -half, low), (p.end, half, high))
+    with building(COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm") as checked:
         threads = [solids.upright(SCREW.core / 2, low - 1.0, high + 1.0, at, 0.0) for at in p.screws]
-        bar = checked(bar.cut(*threads), COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm")
+        bar = checked(solids.box((p.start, -half, low), (p.end, half, high)).cut(*threads))
     return bar.moved(solids.about_axis(p.ear.azimuth))

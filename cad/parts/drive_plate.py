@@ -18,7 +18,7 @@ from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
 from cad.layout.names import DRIVE_PLATE, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building, checked
+from cad.solids import building
 from design.scanner import Scanner
 
 OF_SERVO = (
@@ -57,23 +57,17 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
     stack = p.stack
     low, high = stack.tower_top, stack.tower_top + PLATE
     y0, y1 = stack.plate_y
-    with building(DRIVE_PLATE, "plate and feet", "case_holes_mm", p.holes):
+    with building(DRIVE_PLATE, "plate and feet", "case_holes_mm", p.holes) as checked:
         plate = solids.prism(outlines.octagon(stack.plate_x, (y1 - y0) / 2, 3.0, (y0 + y1) / 2), low, high)
         feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]
-        body = checked(plate.fuse(*feet), DRIVE_PLATE, "plate and feet", "case_holes_mm", p.holes)
-    with building(DRIVE_PLATE, "opening, holes and slots", "case_holes_mm", p.holes):
+        body = checked(plate.fuse(*feet))
+    with building(DRIVE_PLATE, "opening, holes and slots", "case_holes_mm", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.ears - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, high + 1.0, x, y))
             cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, high + 1.0, x, y))
         for x in (-stack.slot_x, stack.slot_x):
-            cuts += [_slot(p, x, y, low, high) for _, y in stack.arms_y]
-        plate = checked(body.cut(*cuts).clean(), DRIVE_PLATE, "opening, holes and slots", "case_holes_mm", p.holes)
+            for _, y in stack.arms_y:
+                cuts.append(solids.slot(p.slot, x - TRAVEL, x + TRAVEL, y, low - 1.0, high + 1.0))
+        plate = checked(body.cut(*cuts).clean())
     return plate.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
-
-
-def _slot(p: DrivePlate, x: float, y: float, low: float, high: float) -> cq.Shape:
-    half = p.slot / 2
-    ends = [solids.upright(half, low - 1.0, high + 1.0, x + side * TRAVEL, y) for side in (1.0, -1.0)]
-    middle = solids.box((x - TRAVEL, y - half, low - 1.0), (x + TRAVEL, y + half, high + 1.0))
-    return middle.fuse(*ends)

@@ -49,14 +49,9 @@ def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
     """Slots with round ends, along the radius."""
     if p.ear is None:
         return []
-    ear, radius, cuts = p.ear, p.ear.slot_width / 2, []
-    low, high = ear.low - 1.0, ear.high + 1.0
-    for first, last in ear.slots:
-        ends = [solids.upright(radius, low, high, r, 0.0) for r in (first, last)]
-        cuts.append(
-            solids.box((first, -radius, low), (last, radius, high)).fuse(*ends).moved(solids.about_axis(ear.azimuth))
-        )
-    return cuts
+    ear, width = p.ear, p.ear.slot_width
+    slots = [solids.slot(width, first, last, 0.0, ear.low - 1.0, ear.high + 1.0) for first, last in ear.slots]
+    return [slot.moved(solids.about_axis(ear.azimuth)) for slot in slots]
 
 
 def _journal_radius(p: AlignmentLinkage) -> float:
@@ -89,16 +84,14 @@ def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
     cuts = []
     for azimuth in p.clamp_azimuths:
         out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        centre = np.array([0.0, 0.0, stack.clamp])
-        cuts.append(solids.cylinder(p.clamp_thread.hole / 2, centre, out, 80.0))
-        cuts.append(solids.cylinder(CLAMP_DRIVER / 2, centre + (stack.hub_radius - SPOT_FACE) * out, out, 80.0))
-        if (
-            p.clamp_thread.trap is not None
-        ):  # from within the bore, where the shaft holds the nut in and the screw pushes it out
+        cuts.append(solids.radial(p.clamp_thread.hole / 2, azimuth, stack.clamp))
+        cuts.append(solids.radial(CLAMP_DRIVER / 2, azimuth, stack.clamp, stack.hub_radius - SPOT_FACE))
+        # from within the bore, where the shaft holds the nut in and the screw pushes it out
+        if p.clamp_thread.trap is not None:
             frame = np.stack([[-out[1], out[0], 0.0], [0.0, 0.0, 1.0], out], axis=1)
             outline = outlines.polygon(p.clamp_thread.trap.corner, 6, math.pi / 2)
             pocket = solids.prism(outline, 0.0, clamp_trap_floor_mm(p, p.clamp_thread.trap))
-            cuts.append(pocket.moved(solids.location(frame, centre)))
+            cuts.append(pocket.moved(solids.location(frame, (0.0, 0.0, stack.clamp))))
     return cuts
 
 

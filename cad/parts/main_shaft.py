@@ -16,7 +16,7 @@ from cad.layout.belt.stack import BeltStack
 from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
 from cad.layout.names import MAIN_SHAFT
 from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
-from cad.solids import building, checked
+from cad.solids import building
 from design.scanner import Scanner
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
@@ -47,21 +47,16 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    size, top = f"{stack.tube_diameter:g} mm", stack.hub_bottom - UNDER_HUB
-    with building(MAIN_SHAFT, "body", "shaft diameter", size):
-        radius = stack.shaft_diameter / 2
+    radius, top = stack.shaft_diameter / 2, stack.hub_bottom - UNDER_HUB
+    with building(MAIN_SHAFT, "body", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
-        body = body.fuse(
-            solids.upright(stack.collar_radius, stack.tower_top, stack.teeth_low),
-            solids.upright(radius, top - 0.5, stack.spigot_top),
-        )
-        body = checked(body, MAIN_SHAFT, "body", "shaft diameter", size)
-    with building(MAIN_SHAFT, "bore, windows and flat", "bore", f"{stack.shaft_bore:g} mm"):
+        collar = solids.upright(stack.collar_radius, stack.tower_top, stack.teeth_low)
+        body = checked(body.fuse(collar, solids.upright(radius, top - 0.5, stack.spigot_top)))
+    with building(MAIN_SHAFT, "bore, windows and flat", "bore", f"{stack.shaft_bore:g} mm") as checked:
         end = top - WEB
-        flat = (-2 * radius, stack.flat, stack.hub_bottom)
         cuts = [
             solids.upright(stack.shaft_bore / 2, stack.shaft_bottom - 1.0, end),
             solids.cylinder(WINDOW / 2, (-stack.tube_diameter, 0.0, end - WINDOW / 2), (1.0, 0.0, 0.0), 99.0),
-            solids.box(flat, (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
+            solids.box((-2 * radius, stack.flat, stack.hub_bottom), (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
         ]
-        return checked(body.cut(*cuts).clean(), MAIN_SHAFT, "bore, windows and flat", "bore", stack.shaft_bore)
+        return checked(body.cut(*cuts).clean())

@@ -11,7 +11,6 @@ half of the sliding fit: what they stand off their axes turns the angle once per
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 
 import cadquery as cq
@@ -25,31 +24,15 @@ from cad.layout.fits import OnSheet, no_wider
 from cad.layout.joints import horn_centres, screws
 from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
 from cad.parts.part_spec import HORN, PartSpec, Step
-from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
-from cad.solids import building, checked
-from design.catalogue.products import Servo
-from design.errors import BuildError
+from cad.screws import SCREWS, passing_hole, thread_in_part
+from cad.solids import building
+from design.catalogue.products import Printer
 from design.scanner import Scanner
 
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
 GIVE_MM = 2.0  # of a strand, when the pre-load is felt
 OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pulley:
-    """Lengths in mm."""
-
-    stack: BeltStack
-    fit: float  # diametral clearance of a sliding fit
-    thread: Thread  # of the grub screws
-    screw: Screw  # of the horn
-    hole: float  # diameter
-    servo: Servo
-    foot_radius: float  # of what lies on the horn
-    boss_radius: float  # of the horn's
-    boss_height: float
 
 
 def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
@@ -63,7 +46,7 @@ def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     return PartSpec(
         name=SHAFT_PULLEY,
         turns=True,
-        make=partial(shaft_pulley, pulley_of(scanner, stack)),
+        make=partial(shaft_pulley, stack, scanner.printer),
         step=Step("Pulley and belt on the shaft", words),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
@@ -85,101 +68,67 @@ def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     return PartSpec(
         name=DRIVE_PULLEY,
         turns=False,
-        make=partial(drive_pulley, pulley_of(scanner, stack)),
+        make=partial(drive_pulley, stack, scanner.printer),
         step=Step("Drive pulley, and the servo beside the shaft", words),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
-        sweep=partial(drive_envelope, pulley_of(scanner, stack)),
+        sweep=partial(drive_envelope, stack),
     )
 
 
-def pulley_of(scanner: Scanner, stack: BeltStack) -> Pulley:
-    """Parameters of both pulleys of one scanner.
-
-    Raises:
-        BuildError: the heads of the horn's screws leave no wall below the teeth, or around the horn's boss.
-    """
-    servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.horn_screw]
-    root = stack.tip_radius - stack.belt.tooth_height_mm
-    if servo.horn_circle_mm / 2 + screw.head_room + printer.min_wall_mm > root:
-        raise BuildError(
-            f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}: the heads of the {screw.name} screws "
-            f"of {servo.name} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
-        )
-    boss = servo.horn_boss_diameter_mm / 2
-    if servo.horn_circle_mm / 2 - screw.head_room - printer.min_wall_mm < boss:
-        raise BuildError(
-            f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}: the heads of the {screw.name} screws "
-            f"of {servo.name} leave no wall around its boss of {2 * boss:g} mm"
-        )
-    return Pulley(
-        stack=stack,
-        fit=printer.fit_clearance_mm,
-        thread=thread_in_part(GRUB, printer, room_for_nut=False),
-        screw=screw,
-        hole=passing_hole(screw, printer),
-        servo=servo,
-        foot_radius=pulley_foot_radius(servo),
-        boss_radius=boss,
-        boss_height=servo.horn_boss_height_mm,
-    )
-
-
-def shaft_pulley(p: Pulley) -> cq.Solid:
+def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the pulley on the shaft.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack = p.stack
-    with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth):
+    bore, grub = (
+        stack.tube_diameter / 2 + printer.fit_clearance_mm / 4,
+        thread_in_part(GRUB, printer, room_for_nut=False),
+    )
+    with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
         boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
-        body = checked(_toothed(stack, None, boss), SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth)
-    with building(SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter):
-        bore = solids.upright(stack.tube_diameter / 2 + p.fit / 4, stack.teeth_low - 1.0, stack.pulley_top + 1.0)
-        middle = np.array([0.0, 0.0, stack.pulley_top - BOSS / 2])
-        grubs = []
-        for azimuth in np.radians(GRUBS_DEG):
-            out = (math.cos(azimuth), math.sin(azimuth), 0.0)
-            grubs.append(solids.cylinder(p.thread.hole / 2, middle, out, 80.0))
-        cut = body.cut(bore, *grubs).clean()
-        return checked(cut, SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter)
+        body = checked(_toothed(stack, None, boss))
+    with building(SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter) as checked:
+        cuts = [solids.upright(bore, stack.teeth_low - 1.0, stack.pulley_top + 1.0)]
+        for azimuth in GRUBS_DEG:
+            cuts.append(solids.radial(grub.hole / 2, math.radians(azimuth), stack.pulley_top - BOSS / 2))
+        return checked(body.cut(*cuts).clean())
 
 
-def drive_pulley(p: Pulley) -> cq.Solid:
+def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the pulley on the horn.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack, horn = p.stack, p.stack.horn
-    with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth):
-        foot = solids.upright(p.foot_radius, horn, stack.teeth_low + 0.5)
-        body = checked(_toothed(stack, foot, None), DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth)
-    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.servo.horn_circle_mm):
+    servo, horn, top = stack.servo, stack.horn, stack.teeth_top + 1.0
+    screw, boss = SCREWS[servo.horn_screw], servo.horn_boss_diameter_mm / 2
+    with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
+        foot = solids.upright(pulley_foot_radius(servo), horn, stack.teeth_low + 0.5)
+        body = checked(_toothed(stack, foot, None))
+    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
         cuts = []
-        for x, y in horn_centres(p.servo).tolist():
-            cuts.append(solids.upright(p.hole / 2, horn - 1.0, stack.teeth_top + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, stack.pulley_seat, stack.teeth_top + 1.0, x, y))
-        if p.boss_radius > 0:
-            cuts.append(solids.upright(p.boss_radius + p.fit / 4, horn - 1.0, horn + p.boss_height + 0.5))
-        cut = body.cut(*cuts).clean()
-        made = checked(cut, DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", p.servo.horn_circle_mm)
+        for x, y in horn_centres(servo).tolist():
+            cuts.append(solids.upright(passing_hole(screw, printer) / 2, horn - 1.0, top, x, y))
+            cuts.append(solids.upright(screw.head_room, stack.pulley_seat, top, x, y))
+        if boss > 0:
+            radius = boss + printer.fit_clearance_mm / 4
+            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
+        made = checked(body.cut(*cuts).clean())
     return made.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 
 
-def drive_envelope(p: Pulley) -> cq.Solid:
+def drive_envelope(stack: BeltStack) -> cq.Solid:
     """What the pulley on the horn fills while it turns about its own axis."""
-    stack = p.stack
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
-    foot = solids.upright(p.foot_radius, stack.horn, low + 0.5)
-    with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth):
+    foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
+    with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
         whole = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
         )
-        swept = checked(whole, DRIVE_PULLEY, "sweep", "teeth", stack.teeth)
+        swept = checked(whole)
     return swept.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 
 

@@ -9,7 +9,6 @@ not depend on the scan plane: one shaft serves every linkage.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import cadquery as cq
@@ -21,22 +20,11 @@ from cad.layout.joints import horn_centres, screws
 from cad.layout.names import SERVO_HORN, SERVO_SHAFT
 from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
 from cad.screws import SCREWS, passing_hole
-from cad.solids import building, checked
-from design.catalogue.products import Servo
+from cad.solids import building
+from design.catalogue.products import Printer, Servo
 from design.scanner import Scanner
 
 SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ServoShaft:
-    """Lengths in mm."""
-
-    stack: DirectStack
-    servo: Servo
-    boss_radius: float  # of the pocket
-    boss_depth: float
-    hole: float  # diameter
 
 
 def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
@@ -51,7 +39,7 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
     return PartSpec(
         name=SERVO_SHAFT,
         turns=True,
-        make=partial(servo_shaft, shaft_of(scanner, stack)),
+        make=partial(servo_shaft, stack, scanner.servo, scanner.printer),
         step=Step("Shaft on the horn", words),
         process="turned" if turned else "printed",
         material=TURNED_FROM if turned else "",
@@ -61,47 +49,30 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
     )
 
 
-def shaft_of(scanner: Scanner, stack: DirectStack) -> ServoShaft:
-    """Parameters of the shaft of one scanner."""
-    servo = scanner.servo
-    return ServoShaft(
-        stack=stack,
-        servo=servo,
-        boss_radius=servo.horn_boss_diameter_mm / 2 + 0.2,
-        boss_depth=servo.horn_boss_height_mm + 0.5,
-        hole=passing_hole(SCREWS[servo.horn_screw], scanner.printer),
-    )
-
-
-def servo_shaft(p: ServoShaft) -> cq.Solid:
+def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
     """Make the shaft.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack = p.stack
-    horn, radius = stack.horn, stack.shaft_diameter / 2
-    with building(SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm"):
-        body: cq.Shape = solids.upright(stack.flange_radius, horn, horn + stack.flange_thickness)
+    horn, flange, radius = stack.horn, stack.horn + stack.flange_thickness, stack.shaft_diameter / 2
+    with building(SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm") as checked:
+        body: cq.Shape = solids.upright(stack.flange_radius, horn, flange)
         if stack.collar_radius > radius:
             body = body.fuse(solids.upright(stack.collar_radius, horn, horn + stack.collar_height))
-        body = body.fuse(solids.upright(radius, horn, stack.spigot_top))
-        body = checked(body, SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm")
-    with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.servo.horn_circle_mm):
-        low = (-2 * radius, stack.flat, stack.hub_bottom)
-        cuts = [solids.box(low, (2 * radius, 2 * radius, stack.spigot_top + 1.0)), *_holes(p), _index_groove(p)]
-        if p.boss_radius > 0.2:
-            cuts.append(solids.upright(p.boss_radius, horn - 1.0, horn + p.boss_depth))
+        body = checked(body.fuse(solids.upright(radius, horn, stack.spigot_top)))
+    with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", servo.horn_circle_mm) as checked:
+        hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
+        cuts = [
+            solids.box((-2 * radius, stack.flat, stack.hub_bottom), (2 * radius, 2 * radius, stack.spigot_top + 1.0))
+        ]
+        cuts += [solids.upright(hole, horn - 1.0, flange + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
+        cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, flange + 1.0))  # index groove
+        if boss > 0:
+            cuts.append(solids.upright(boss + 0.2, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
         if stack.bearing is not None:
             cuts.append(_waist(stack))
-        return checked(
-            body.cut(*cuts).clean(), SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", p.servo.horn_circle_mm
-        )
-
-
-def _holes(p: ServoShaft) -> list[cq.Solid]:
-    low, high = p.stack.horn - 1.0, p.stack.horn + p.stack.flange_thickness + 1.0
-    return [solids.upright(p.hole / 2, low, high, float(x), float(y)) for x, y in horn_centres(p.servo)]
+        return checked(body.cut(*cuts).clean())
 
 
 def _waist(stack: DirectStack) -> cq.Solid:
@@ -112,8 +83,3 @@ def _waist(stack: DirectStack) -> cq.Solid:
     high = low + WAIST + slope
     outer = radius + 1.0
     return solids.lathe([[outer, low], [waist, low], [waist, low + WAIST], [outer, high + 1.0]])
-
-
-def _index_groove(p: ServoShaft) -> cq.Solid:
-    low, high = p.stack.horn - 1.0, p.stack.horn + p.stack.flange_thickness + 1.0
-    return solids.prism(outlines.diamond(0.6, p.stack.flange_radius), low, high)

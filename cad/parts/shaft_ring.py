@@ -7,7 +7,6 @@ grub screws 90 deg apart; a driver reaches them through the window of the tower.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 
 import cadquery as cq
@@ -18,18 +17,10 @@ from cad.layout.hub import BEARING_STEP
 from cad.layout.joints import screws
 from cad.layout.names import MAIN_SHAFT, SHAFT_RING
 from cad.parts.part_spec import PartSpec, Step
-from cad.screws import Thread, thread_in_part
-from cad.solids import building, checked
+from cad.screws import thread_in_part
+from cad.solids import building
+from design.catalogue.products import Printer
 from design.scanner import Scanner
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ShaftRing:
-    """Lengths in mm."""
-
-    stack: BeltStack
-    fit: float  # diametral clearance of a sliding fit
-    thread: Thread
 
 
 def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
@@ -42,37 +33,23 @@ def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     return PartSpec(
         name=SHAFT_RING,
         turns=True,
-        make=partial(shaft_ring, shaft_ring_of(scanner, stack)),
+        make=partial(shaft_ring, stack, scanner.printer),
         step=Step("Ring under the bearings", words),
     )
 
 
-def shaft_ring_of(scanner: Scanner, stack: BeltStack) -> ShaftRing:
-    """Parameters of the ring of one scanner."""
-    printer = scanner.printer
-    return ShaftRing(
-        stack=stack, fit=printer.fit_clearance_mm, thread=thread_in_part(GRUB, printer, room_for_nut=False)
-    )
-
-
-def shaft_ring(p: ShaftRing) -> cq.Solid:
+def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the ring.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack = p.stack
-    size = f"{stack.tube_diameter:g} mm"
-    with building(SHAFT_RING, "ring", "shaft diameter", size):
+    thread = thread_in_part(GRUB, printer, room_for_nut=False)
+    with building(SHAFT_RING, "ring", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         low, high = stack.collar_low, stack.collar_low + BOSS
         body = solids.upright(stack.boss_radius, low, high).fuse(
             solids.upright(stack.collar_radius, low, high + BEARING_STEP)
         )
-        bore = solids.upright((stack.tube_diameter + p.fit) / 2, low - 1.0, high + 2.0)
-        grubs = [_radial(p, math.radians(azimuth)) for azimuth in GRUBS_DEG]
-        return checked(body.cut(bore, *grubs).clean(), SHAFT_RING, "ring", "shaft diameter", size)
-
-
-def _radial(p: ShaftRing, azimuth: float) -> cq.Solid:
-    start = (0.0, 0.0, p.stack.collar_low + BOSS / 2)
-    return solids.cylinder(p.thread.hole / 2, start, (math.cos(azimuth), math.sin(azimuth), 0.0), 80.0)
+        bore = solids.upright((stack.tube_diameter + printer.fit_clearance_mm) / 2, low - 1.0, high + 2.0)
+        grubs = [solids.radial(thread.hole / 2, math.radians(azimuth), low + BOSS / 2) for azimuth in GRUBS_DEG]
+        return checked(body.cut(bore, *grubs).clean())

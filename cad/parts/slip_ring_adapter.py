@@ -17,13 +17,13 @@ import cadquery as cq
 
 from cad import solids
 from cad.layout.direct.adapter import SlipRingAdapter, adapter_of
-from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD
+from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
 from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import screws
 from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
 from cad.parts.bearing_cage import cage_base
 from cad.parts.part_spec import ON_CASE, PartSpec, Step
-from cad.solids import building, checked
+from cad.solids import building
 from design.scanner import Scanner
 
 RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
@@ -44,14 +44,14 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, adapter_of(scanner, stack)),
+        make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
         step=Step("Adapter on the servo", f"{how} {screws(SERVO_CASE)}"),
         shaped_by=(*ON_CASE, *RING),
     )
 
 
-def slip_ring_adapter(p: SlipRingAdapter) -> cq.Solid:
-    """Make the adapter.
+def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
+    """Make the adapter: the fork, or the base of a cage, and the arms.
 
     Raises:
         BuildError: a step did not give one valid solid.
@@ -59,31 +59,25 @@ def slip_ring_adapter(p: SlipRingAdapter) -> cq.Solid:
     stack = p.stack
     inner = stack.ring_radius + PLAY
     outer = inner + ARM
-    if p.cage is None:
+    if isinstance(p, SlipRingAdapter):
         body, top, reach = _fork(p, outer), p.front + SEAT_GAP + PLATE, stack.ring_length - 5.0
     else:
-        body, top, reach = cage_base(p.cage), p.cage.foot, stack.ring_length - UNDER_ROOF
+        body, top, reach = cage_base(p), p.foot, stack.ring_length - UNDER_ROOF
     arm_top = stack.ring_bottom + min(30.0, reach)
-    with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius):
-        root = min(inner - 4.0, outer - 4.0)
+    with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms = [
-            solids.box(
-                (min(side * root, side * outer), -ARM_HALF_WIDTH, top - 1.0),
-                (max(side * root, side * outer), ARM_HALF_WIDTH, arm_top),
-            )
-            for side in (1, -1)
+            solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, arm_top))
+            for low, high in ((inner - 4.0, outer), (-outer, 4.0 - inner))
         ]
         body = body.fuse(*arms).cut(solids.upright(inner, stack.ring_bottom - 1.0, arm_top + 9.0))
-        body = checked(body, SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius)
-    with building(SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius):
+        body = checked(body)
+    with building(SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         tie = (stack.ring_bottom + arm_top) / 2
-        cuts = []
-        for side in (1, -1):
-            edges = sorted((side * (outer - 1.5), side * (outer + 5.0)))
-            cuts.append(solids.box((edges[0], -99.0, tie - 3.0), (edges[1], 99.0, tie + 3.0)))
-        return checked(
-            body.cut(*cuts).clean(), SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius
-        )
+        cuts = [
+            solids.box((low, -99.0, tie - 3.0), (high, 99.0, tie + 3.0))
+            for low, high in ((outer - 1.5, outer + 5.0), (-outer - 5.0, 1.5 - outer))
+        ]
+        return checked(body.cut(*cuts).clean())
 
 
 def _fork(p: SlipRingAdapter, outer: float) -> cq.Shape:
@@ -93,7 +87,7 @@ def _fork(p: SlipRingAdapter, outer: float) -> cq.Shape:
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5
-    with building(SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes):
+    with building(SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes) as checked:
         tail = solids.box((-p.half_x, last, low), (p.half_x, first, top))
         prongs = solids.box((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top))
         feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]
@@ -101,4 +95,4 @@ def _fork(p: SlipRingAdapter, outer: float) -> cq.Shape:
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, top + 1.0, x, y))
             cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, top + 1.0, x, y))
-        return checked(tail.fuse(prongs, *feet).cut(*cuts), SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes)
+        return checked(tail.fuse(prongs, *feet).cut(*cuts))

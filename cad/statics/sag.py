@@ -58,11 +58,7 @@ def linkage_sag(
         modulus_mpa: of the material.
         density_g_cm3: of the material.
     """
-
-    def on_grid(edge: float) -> tuple[Array, Array]:
-        return _on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3)
-
-    coarse, fine = on_grid(EDGES[0]), on_grid(EDGES[1])
+    coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
     # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
     errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse, fine, strict=True)]
     return Sag(*fine, *errors)

@@ -101,16 +101,21 @@ def reference(problem: Problem, angles_rad: Setting) -> Reference:
     breaks = breaks_of(problem.field, axis, np.concatenate([polar - problem.ball_rad, polar + problem.ball_rad]))
     J = []
     for order in ORDERS:
-        x, w = roots_legendre(order)
-        s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
-        a, b = breaks[:-1, None], breaks[1:, None]
-        t = (a + (b - a) * np.sin(s / 2) ** 2).ravel()
-        width = ((b - a) * np.sin(s) * w * np.pi / 4).ravel()
+        t, width = smooth_pieces(breaks, order)
         weight = width * np.sin(t) * problem.field.on_circles(axis, t)[0]
         seen = weight > 0
         g = zones(t[seen], polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
         J.append(float(weight[seen] @ g / weight[seen].sum()))
     return Reference(J[1], abs(J[1] - J[0]))
+
+
+def smooth_pieces(breaks: Float[ndarray, " n"], order: int) -> tuple[Array, Array]:
+    """Gauss-Legendre nodes between each two breaks, with their widths, for pieces that end in square roots."""
+    x, w = roots_legendre(order)
+    s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
+    a, b = breaks[:-1, None], breaks[1:, None]
+    t = a + (b - a) * np.sin(s / 2) ** 2
+    return t.ravel(), ((b - a) * np.sin(s) * w * np.pi / 4).ravel()
 
 
 def by_segments(problem: Problem, angles_rad: Setting, nodes: int) -> float:

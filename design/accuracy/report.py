@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +11,10 @@ from matplotlib.figure import Figure
 
 from design.accuracy.methods import Point, Reference, as_log, best_points, measure_methods
 from design.accuracy.stress import StressRow, stress_rows
+from design.accuracy.trials import GREYS, MARKS, write_table
 from design.objective.problem import problem_of
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
-
-MARKS = "osD^vP*X"
-GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
 
 
 def write_method_points(path: Path, points: list[Point], truth: Reference) -> None:
@@ -30,13 +27,13 @@ def write_method_points(path: Path, points: list[Point], truth: Reference) -> No
         numbers += [float(np.median(seconds)), min(seconds), max(seconds), point.peak_mb]
         cells = ["" if np.isnan(n) else f"{n:.6g}" for n in numbers]
         rows.append([point.method, point.setting, *cells, str(front).lower(), point.failed])
-    _write(path, header.split(), rows)
+    write_table(path, header.split(), rows)
 
 
 def write_rows(path: Path, rows: list[StressRow]) -> None:
     """The stress table."""
     header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
-    _write(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
+    write_table(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
 
 
 def work_precision_picture(path: Path, points: list[Point], truth: Reference, title: str) -> None:
@@ -62,13 +59,6 @@ def work_precision_picture(path: Path, points: list[Point], truth: Reference, ti
     axis.legend(fontsize=8)
     axis.set_title(title, fontsize=11)
     figure.savefig(path, dpi=110, metadata={"Software": None})
-
-
-def _write(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.accuracy.methods import smooth_pieces
 from design.arrays import Array
 from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density.spin import mean_count, zones
@@ -69,11 +70,7 @@ def _integral(bearings: Array, plane: tuple[float, float], turns: float, ball: f
     polar, _ = polar_and_azimuth(beam_directions_rot(bearings, *plane))
     marks = np.concatenate([[0, np.pi], polar - ball, polar + ball])
     breaks = np.unique(np.clip(np.abs(marks), 0, np.pi))
-    x, w = np.polynomial.legendre.leggauss(PIECE_NODES)
-    s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
-    a, b = breaks[:-1, None], breaks[1:, None]
-    t = (a + (b - a) * np.sin(s / 2) ** 2).ravel()
-    width = ((b - a) * np.sin(s) * w * np.pi / 4).ravel()
+    t, width = smooth_pieces(breaks, PIECE_NODES)
     return float(2 * np.pi * (width * np.sin(t)) @ mean_count(t, polar, scan_lines(turns, 1.0), ball))
 
 
@@ -191,15 +188,8 @@ def _refusals(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
     rows = [_row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
-    rows.append(
-        _row(
-            "everything masked",
-            "refused",
-            1,
-            _refused(lambda: problem.with_objective(log(field_of(hidden))), angles),
-            0,
-        )
-    )
+    masked = _refused(lambda: problem.with_objective(log(field_of(hidden))), angles)
+    rows.append(_row("everything masked", "refused", 1, masked, 0))
     try:
         AllRegion.model_validate({"shape": "all", "value": float("nan")})
         refused = 0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -75,13 +75,20 @@ def best_trials(trials: Sequence[Trial]) -> list[bool]:
 def write_trials(path: Path, trials: Sequence[Trial]) -> None:
     """One row per trial."""
     header = "choice method setting error unit seconds_median seconds_min seconds_max size on_front chosen"
+    rows = []
+    for t, best in zip(trials, best_trials(trials), strict=True):
+        seconds = [f"{s:.4g}" for s in (t.median_s, t.seconds[0], t.seconds[-1])]
+        marks = [str(best).lower(), str(t.chosen).lower()]
+        rows.append([t.choice, t.method, t.setting, f"{t.error:.4g}", t.unit, *seconds, t.size, *marks])
+    write_table(path, header.split(), rows)
+
+
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """A CSV file."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header.split())
-        for t, best in zip(trials, best_trials(trials), strict=True):
-            seconds = [f"{s:.4g}" for s in (t.median_s, t.seconds[0], t.seconds[-1])]
-            marks = [str(best).lower(), str(t.chosen).lower()]
-            writer.writerow([t.choice, t.method, t.setting, f"{t.error:.4g}", t.unit, *seconds, t.size, *marks])
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:

@@ -11,14 +11,13 @@ what the axis does between two samples without a trace in them.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
-from scipy.interpolate import BSpline, CubicSpline, PPoly
+from scipy.interpolate import BSpline, PPoly
 from scipy.linalg import solveh_banded
 
 from design.arrays import Floats
@@ -177,71 +176,3 @@ def _samples_per_step(position: Float64[ndarray, " n"], step_rad: float) -> floa
     if not step_rad:
         return 0.0
     return float((position.size - 1) * step_rad / np.abs(np.diff(position)).sum())
-
-
-@dataclass(frozen=True, slots=True)
-class OrderPoint:
-    """One way to go between encoder samples: its error against the truth and its price.
-
-    Attributes:
-        method: name.
-        rms_deg: error over the whole log; `worst_deg` the largest.
-        rms_mm_at_10m: the same at the end of a 10 m beam across the axis.
-        prepare_s: once for the log.
-        ns_per_beam: for each beam asked.
-    """
-
-    method: str
-    rms_deg: float
-    worst_deg: float
-    rms_mm_at_10m: float
-    prepare_s: float
-    ns_per_beam: float
-
-
-def interpolation_orders(log: JointLog, truth_rad: Callable[[Floats], Floats], beams: int) -> Iterator[OrderPoint]:
-    """Error against run time of interpolation orders and of the smoothing spline.
-
-    Args:
-        log: encoder samples.
-        truth_rad: the angle [rad] at seconds since the first sample.
-        beams: how many times to ask, evenly over the log.
-    """
-    seconds = (log.time_ns - log.time_ns[0]) / 1e9
-    after_ns = np.linspace(0, log.time_ns[-1] - log.time_ns[0], beams).astype(np.int64)
-    asked_ns = log.time_ns[0] + after_ns
-    true = truth_rad(after_ns / 1e9)
-
-    def held() -> AxisCurve:
-        rows = np.zeros((seconds.size - 1, 4))
-        rows[:, 0] = log.position_rad[:-1]
-        return AxisCurve(log.time_ns, rows)
-
-    def cubic() -> AxisCurve:
-        return AxisCurve(log.time_ns, np.ascontiguousarray(CubicSpline(seconds, log.position_rad).c[::-1].T))
-
-    def smoothed() -> AxisCurve:
-        return axis_curve(log, held=False)[0]
-
-    ways = {
-        "order 0, last sample": held,
-        "order 1, straight": lambda: straight(log),
-        "order 3, through samples": cubic,
-        "smoothed": smoothed,
-    }
-    for method, prepare in ways.items():
-        start = time.perf_counter()
-        curve = prepare()
-        ready = time.perf_counter()
-        angle = curve.angle_at(asked_ns)
-        done = time.perf_counter()
-        off = angle - true
-        rms = float(np.sqrt(np.mean(off**2)))
-        yield OrderPoint(
-            method=method,
-            rms_deg=float(np.degrees(rms)),
-            worst_deg=float(np.degrees(np.abs(off).max())),
-            rms_mm_at_10m=rms * 10_000,
-            prepare_s=ready - start,
-            ns_per_beam=(done - ready) / beams * 1e9,
-        )

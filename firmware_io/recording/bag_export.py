@@ -6,7 +6,7 @@ import dataclasses
 import json
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -77,42 +77,31 @@ def export_bag(recording: Path, out: Path) -> Exported:
 def _ros1(recording: Path, part: Path) -> Exported:
     store = get_typestore(Stores.ROS1_NOETIC)
     with open_bag(recording) as bag, foreign(f"{part}: cannot write", Writer1, part) as writer:
-        known, unknown = _known(bag.topics, store)
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=store, latching=int(topic == NOTE_TOPIC))
-            for topic, kind in (_note_topic(bag) | known).items()
-        }
-        written = _copied(
-            _noted(bag, set(known), store),
-            lambda message: writer.write(
-                connections[message.topic],
-                message.receive_ns,
-                store.serialize_ros1(_of_store(message.body, store), connections[message.topic].msgtype),
-            ),
-        )
-    return Exported(written, unknown)
+        return _copied(bag, writer, store, store.serialize_ros1, {"latching": 1})
 
 
 def _ros2(recording: Path, out: Path) -> Exported:
     store = get_typestore(Stores.ROS2_HUMBLE)
     bag_out = foreign(f"{out}: cannot write", Writer2, out, version=_VERSION, storage_plugin=StoragePlugin.SQLITE3)
     with open_bag(recording) as bag, bag_out as writer:
-        known, unknown = _known(bag.topics, store)
-        connections = {
-            topic: writer.add_connection(
-                topic, kind, typestore=store, offered_qos_profiles=[_LATCHED] * (topic == NOTE_TOPIC)
-            )
-            for topic, kind in (_note_topic(bag) | known).items()
-        }
-        written = _copied(
-            _noted(bag, set(known), store),
-            lambda message: writer.write(
-                connections[message.topic],
-                message.receive_ns,
-                store.serialize_cdr(_of_store(message.body, store), connections[message.topic].msgtype),
-            ),
-        )
-    return Exported(written, unknown)
+        return _copied(bag, writer, store, store.serialize_cdr, {"offered_qos_profiles": [_LATCHED]})
+
+
+def _copied(
+    bag: Bag, writer: Any, store: Typestore, serialize: Callable[[Any, str], Any], latched: Mapping[str, Any]
+) -> Exported:
+    """All messages of a recording to a writer of either kind; `latched` are the options of a topic for late comers."""
+    known, unknown = _known(bag.topics, store)
+    connections = {
+        topic: writer.add_connection(topic, kind, typestore=store, **(latched if topic == NOTE_TOPIC else {}))
+        for topic, kind in (_note_topic(bag) | known).items()
+    }
+    written: Counter[str] = Counter()
+    for message in _noted(bag, set(known), store):
+        to = connections[message.topic]
+        writer.write(to, message.receive_ns, serialize(_of_store(message.body, store), to.msgtype))
+        written[message.topic] += 1
+    return Exported(dict(written), unknown)
 
 
 def _note_topic(bag: Bag) -> dict[str, str]:
@@ -127,14 +116,6 @@ def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
             text: Any = store.types[NOTE_TYPE]
             yield Message(NOTE_TOPIC, message.receive_ns, text(data=json.dumps(note, sort_keys=True)))
         yield message
-
-
-def _copied(messages: Iterable[Message], write: Callable[[Message], None]) -> dict[str, int]:
-    written: Counter[str] = Counter()
-    for message in messages:
-        write(message)
-        written[message.topic] += 1
-    return dict(written)
 
 
 def _known(topics: Mapping[str, str], store: Typestore) -> tuple[dict[str, str], dict[str, str]]:

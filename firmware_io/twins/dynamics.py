@@ -31,7 +31,9 @@ from numpy import ndarray
 from scipy.integrate import BDF, LSODA, Radau
 
 from design.arrays import Floats
-from firmware_io.servo.dynamixel.registers import motor_of
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
+from firmware_io.servo.dynamixel.registers import RPM
 
 Mode = Literal["off", "share", "velocity", "position"]
 
@@ -93,22 +95,23 @@ class Plant:
 
 def plant_of(model: str) -> Plant:
     """The plant of a model: torque, speed and play from its maker, loop gains from its control table's defaults."""
-    motor = motor_of(model)
     ax = model == "AX-12A"
+    servo = load_catalogue().get(model, Servo)
+    no_load_rad_s, play_deg = servo.no_load_rpm * RPM, servo.backlash_deg
+    if play_deg is None:
+        play_deg = 0.5 if ax else 0.333  # assumed
     count_rad = math.radians(300 / 1024 if ax else 360 / 4096)
     return Plant(
-        stall_torque_nm=motor.stall_torque_nm,
-        no_load_rad_s=motor.no_load_rad_s,
+        stall_torque_nm=servo.stall_torque_nm,
+        no_load_rad_s=no_load_rad_s,
         inertia_kg_m2=2e-3 if ax else 4e-3,  # assumed: rotors of 0.3 and 1 g cm2, geared 254:1 and 200:1
-        friction_nm=(0.015 if ax else 0.05) * motor.stall_torque_nm,  # assumed
-        backlash_rad=math.radians(0.5 if ax else 0.333)
-        if motor.backlash_rad is None
-        else motor.backlash_rad,  # assumed
+        friction_nm=(0.015 if ax else 0.05) * servo.stall_torque_nm,  # assumed
+        backlash_rad=math.radians(play_deg),
         stiffness_nm_rad=100.0 if ax else 300.0,  # assumed: plastic and metal teeth
         impact_s_rad=20.0,  # assumed
         sensor_lag_s=0.030 if ax else 0.004,  # assumed: potentiometer with filter, encoder
-        velocity_p=0.5 / motor.no_load_rad_s,  # assumed, with the next one: some 20 rad/s of bandwidth
-        velocity_i=20.0 / motor.no_load_rad_s,
+        velocity_p=0.5 / no_load_rad_s,  # assumed, with the next one: some 20 rad/s of bandwidth
+        velocity_i=20.0 / no_load_rad_s,
         position_p=1 / (32 * count_rad) if ax else 4 / (1023 * count_rad),  # slope 32; P gain 32, which is 4 per count
         margin_rad=count_rad if ax else 0.0,
         punch=32 / 1023 if ax else 0.0,

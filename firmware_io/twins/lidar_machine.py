@@ -54,24 +54,12 @@ class Identity:
     intensity: bool = True
 
 
-def _field(model: str, range_mm: tuple[int, int], ares: int, steps: tuple[int, int, int], rpm: int) -> Parameters:
-    return Parameters(
-        model=model,
-        range_min_mm=range_mm[0],
-        range_max_mm=range_mm[1],
-        steps_per_turn=ares,
-        first_step=steps[0],
-        front_step=steps[1],
-        last_step=steps[2],
-        rpm=rpm,
-    )
-
-
+# Parameters: model, range [mm], steps per turn, first, last and front step, rpm
 IDENTITIES = {
     known.parameters.model: known
     for known in (
         Identity(
-            parameters=_field("URG-04LX", (20, 5600), 1024, (44, 384, 725), 600),
+            parameters=Parameters("URG-04LX", 20, 5600, 1024, 44, 725, 384, 600),
             product="SOKUIKI Sensor URG-04LX",
             firmware="3.1.04(02/Aug./2007)",
             serial_number="H0706400",
@@ -83,7 +71,7 @@ IDENTITIES = {
             intensity=False,
         ),
         Identity(
-            parameters=_field("UTM-30LX", (23, 60000), 1440, (0, 540, 1080), 2400),
+            parameters=Parameters("UTM-30LX", 23, 60000, 1440, 0, 1080, 540, 2400),
             product="SOKUIKI Sensor TOP-URG UTM-30LX",
             firmware="P.1.05(17/Apr./2009)",
             serial_number="00903971",
@@ -92,7 +80,7 @@ IDENTITIES = {
             too_near=2,
         ),
         Identity(
-            parameters=_field("UXM-30LX-E", (100, 100000), 1440, (0, 380, 760), 1200),
+            parameters=Parameters("UXM-30LX-E", 100, 100000, 1440, 0, 760, 380, 1200),
             product="SOKUIKI Sensor Tough-URG UXM-30LX-E",
             firmware="0.3.01(11/Mar./2010)",
             serial_number="H0909106",
@@ -102,7 +90,7 @@ IDENTITIES = {
             too_near=0,
         ),
         Identity(  # no capture: product, serial number and mode are made up
-            parameters=_field("UST-10LX", (20, 30000), 1440, (0, 540, 1080), 2400),
+            parameters=Parameters("UST-10LX", 20, 30000, 1440, 0, 1080, 540, 2400),
             product="SOKUIKI Sensor UST-10LX",
             firmware="4.0.2-A",
             serial_number="H1300001",

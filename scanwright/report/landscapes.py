@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from design.angles import AngleSet, standard_settings
 from design.arrays import Array
-from design.evaluation.landscape_picture import draw_landscape
+from design.evaluation.landscape_picture import LandscapePanel, draw_landscape
 from scanwright.report.data_uri import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")
@@ -33,7 +33,7 @@ def landscape(rows: Array, names: tuple[str, str], angles: AngleSet, label: str)
     first = 2 if names == PLANE else 0
     built = tuple(getattr(angles.angles_deg, name) for name in names)
     standard = {name: tuple(np.degrees(setting[first : first + 2])) for name, setting in standard_settings().items()}
-    draw_landscape(axis, names, rows, built, standard, label)
+    draw_landscape(axis, LandscapePanel(names, rows, built, standard, label))
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})

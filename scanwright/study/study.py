@@ -16,7 +16,7 @@ from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.errors import TaskError, suggest
 from design.motion import LONGEST_S
 from design.record import Record
-from design.task.named_record import named_record, names_in
+from design.task.named_record import named_record
 from design.task.task import AngleRanges, Limits, LoadedTask, load_task
 from scanwright.study.front import COLUMNS
 
@@ -117,11 +117,6 @@ def load_study(path: Path) -> LoadedStudy:
     if twice is not None:
         raise TaskError(f"{source}: tasks: two of them have the name '{twice}': rename one in its file")
     return LoadedStudy(study, source, tasks, products)
-
-
-def shipped_studies() -> list[str]:
-    """Names of the studies that come with the package."""
-    return names_in(SHIPPED)
 
 
 def _task(source: Path, name: str) -> LoadedTask:

@@ -9,7 +9,7 @@ import pytest
 from cad.geometry import mesh_trials as meshes
 from design.accuracy.trials import Trial, best_trials
 from firmware_io.twins.dynamics import plant_of
-from scanwright.trials import axis as axis
+from scanwright.trials import axis
 from scanwright.trials import solver as solvers
 
 
@@ -40,6 +40,13 @@ def test_a_tighter_tolerance_of_the_integrator_is_nearer(monkeypatch):
         errors = [t.error for t in found if t.method == method]
         assert errors == sorted(errors, reverse=True) and errors[-1] < 1e-5
     assert [t.setting for t in found if t.chosen] == ["1e-06"]
+
+
+def test_the_orders_between_samples_are_ordered(monkeypatch):
+    monkeypatch.setattr(axis, "BEAMS", 20_000)
+    held, line, cubic, smoothed = (trial.error for trial in axis.axis_trials(lambda _: None))
+    assert smoothed < line / 3 and line < held / 3
+    assert cubic > line  # through the samples means through their steps
 
 
 def test_the_command_reports_every_choice_and_the_chosen_one(command, monkeypatch, tmp_path):

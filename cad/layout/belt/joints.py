@@ -9,7 +9,7 @@ from dataclasses import replace
 from cad.layout import names
 from cad.layout.belt import plate as of_plate
 from cad.layout.belt.plate import plate_of
-from cad.layout.belt.stack import BOSS, DISC, GRUB, GRUBS_DEG, PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, BeltStack
+from cad.layout.belt.stack import BOSS, DISC, GRUB, GRUBS_DEG, PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
 from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_HEAD, disc_azimuths, flange_centres, tower_of
 from cad.layout.joints import (
     CASE_EAR,
@@ -85,5 +85,5 @@ def _of_servo(scanner: Scanner, stack: BeltStack) -> Iterator[Joint]:
         grip_mm=PLATE,
         thread_mm=SHELF if thread.trap is None else PLATE_GRIP,
         thread=thread,
-        slotted=True,
+        slot_mm=(plate.slot, plate.slot + 2 * TRAVEL),
     )

@@ -18,7 +18,8 @@ from cad.layout.belt.stack import (
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
 from cad.layout.hub import HUB_WALL
 from cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
-from design.catalogue.products import Bearing, Belt, Servo, SlipRing
+from cad.screws import SCREWS
+from design.catalogue.products import Bearing, Belt, Printer, Servo, SlipRing
 from design.errors import BuildError
 from design.scanner import Scanner
 
@@ -35,7 +36,8 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     """Lay out the scanner of a capsule ring.
 
     Raises:
-        BuildError: no bearing or belt of the catalogue fits the capsule, or the lidar would hang upside down.
+        BuildError: no bearing or belt of the catalogue fits the capsule, the heads of the horn's screws leave no wall,
+            or the lidar would hang upside down.
     """
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
     assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
@@ -44,7 +46,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     belt = _belt(scanner, ring)
     hub = SPIGOT_DIAMETER / 2 + HUB_WALL
     alone = BeltStack(
-        h=hub_height(scanner.lidar, R, hub, 0.0, None),
+        h=hub_height(scanner.lidar, R, hub, 0.0),
         R_rot_laser=rows_of(R),
         ring_length=ring.length_mm,
         ring_radius=ring.outer_diameter_mm / 2,
@@ -67,6 +69,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     while replace(alone, teeth=teeth).tip_radius - belt.tooth_height_mm < alone.boss_radius + 1.0:
         teeth += TEETH_STEP
     alone = replace(alone, teeth=teeth)
+    _check_heads(alone, scanner.printer)
     least = _least_centre(alone, servo)
     stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
     if not stock:
@@ -117,6 +120,22 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
             f"{BEARING_TOWER}: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
             f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
         )
+
+
+def _check_heads(stack: BeltStack, printer: Printer) -> None:
+    """The heads of the horn's screws leave a wall below the teeth, and around the horn's boss."""
+    servo = stack.servo
+    screw = SCREWS[servo.horn_screw]
+    place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
+    heads = f"the heads of the {screw.name} screws of {servo.name}"
+    middle, beside = servo.horn_circle_mm / 2, screw.head_room + printer.min_wall_mm
+    if middle + beside > stack.tip_radius - stack.belt.tooth_height_mm:
+        raise BuildError(
+            f"{place}: {heads} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
+        )
+    boss = servo.horn_boss_diameter_mm
+    if middle - beside < boss / 2:
+        raise BuildError(f"{place}: {heads} leave no wall around its boss of {boss:g} mm")
 
 
 def _least_centre(stack: BeltStack, servo: Servo) -> float:

@@ -1,10 +1,10 @@
-"""Every number of the slip-ring adapter: its fork on the servo's ears, or the base of a cage. No kernel."""
+"""Every number of the slip-ring adapter's fork on the servo's ears. No kernel."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.layout.direct.cage import FOOT_RADIUS, BearingCage, cage_of, plate_half_x
+from cad.layout.direct.cage import FOOT_RADIUS, plate_half_x
 from cad.layout.direct.stack import DirectStack
 from cad.layout.names import SLIP_RING_ADAPTER
 from cad.screws import SCREWS, Screw, passing_hole
@@ -24,11 +24,10 @@ class SlipRingAdapter:
     screw: Screw
     hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
-    cage: BearingCage | None
 
 
 def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
-    """Parameters of the adapter of one scanner.
+    """Parameters of the adapter of one scanner whose axis no bearing carries: with one it is the base of its cage.
 
     Raises:
         BuildError: the case has no four holes beside the turning flange.
@@ -55,5 +54,4 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
         screw=screw,
         hole=hole,
         holes=(*rows[0], *rows[-1]),
-        cage=cage_of(scanner, stack),
     )

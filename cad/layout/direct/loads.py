@@ -36,7 +36,6 @@ class Supported:
     """How horn and bearing share the weight."""
 
     horn_moment_nm: float
-    horn_force_n: float
     bearing_force_n: float
     slope_rad: float  # of the shaft at the hub
 
@@ -89,9 +88,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float) -> Suppor
     held = b**3 / (3 * EI) + waist * b**2 + 1 / cage_n_per_m
     R = pushed / held
     slope = (F * (2 * L * b - b**2) - R * b**2) / (2 * EI) + moment * b / EI + waist * (F * L + moment - R * b)
-    return Supported(
-        horn_moment_nm=abs(F * L + moment - R * b), horn_force_n=abs(R - F), bearing_force_n=R, slope_rad=abs(slope)
-    )
+    return Supported(horn_moment_nm=abs(F * L + moment - R * b), bearing_force_n=R, slope_rad=abs(slope))
 
 
 def hanging(weight: Weight, stack: DirectStack) -> Supported:
@@ -100,7 +97,7 @@ def hanging(weight: Weight, stack: DirectStack) -> Supported:
     EI = ALUMINIUM_PA * _second_moment(stack.shaft_diameter)
     across, moment = weight.across_n, weight.along_n * weight.off_axis_m
     slope = (across * (weight.lever_m * free - free**2 / 2) + moment * free) / EI
-    return Supported(weight.moment_nm, across, 0.0, slope)
+    return Supported(weight.moment_nm, 0.0, slope)
 
 
 def waist_nm_per_rad(stack: DirectStack) -> float:

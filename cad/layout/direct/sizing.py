@@ -29,9 +29,8 @@ def direct_stack(scanner: Scanner) -> DirectStack:
     R = lidar_pose(scanner)
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
-    h = hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius, None)
     alone = DirectStack(
-        h=h,
+        h=hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius),
         R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,

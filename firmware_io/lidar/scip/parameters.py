@@ -16,7 +16,7 @@ from firmware_io.lidar.scip.protocol import Integers, Window
 StampAt = Literal["step_0", "rear"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Parameters:
     """A sensor's PP reply.
 

@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import NoReturn, Self
 
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
 from design.errors import DeviceError, DeviceFaultError
 from firmware_io.servo.dynamixel.bus import ServoAnswer, ServoBus
-from firmware_io.servo.dynamixel.registers import ControlTable, Register, Setting, motor_of
+from firmware_io.servo.dynamixel.registers import RPM, ControlTable, Register, Setting
 from firmware_io.servo.dynamixel.setup import find_servo, prepare, set_kept
 from firmware_io.servo.guard import SILENCE_S, Guard
 
@@ -56,11 +58,6 @@ class ServoState:
     voltage_V: float  # noqa: N815 - volts
     temperature_degC: float  # noqa: N815
 
-    @property
-    def moving(self) -> bool:
-        """Whether a speed is measured that is not 0."""
-        return abs(self.velocity_rad_s) > 0
-
 
 @dataclass(frozen=True, slots=True)
 class _Order:
@@ -89,7 +86,7 @@ class DynamixelServo:
         self.baud, self.port = bus.baud, bus.port
         self.step_rad = table.position.unit
         self._bus, self._table, self._warnings = bus, table, warnings
-        self._fastest_rad_s = motor_of(table.model).no_load_rad_s
+        self._fastest_rad_s = load_catalogue().get(table.model, Servo).no_load_rpm * RPM
         self._mode: tuple[Setting, ...] = ()
         self._order: _Order | None = None
         self._known: ServoState | None = None  # the last state with a position, from which turns are counted

@@ -11,8 +11,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo as Servo
 from design.errors import DeviceError
 
 RPM = 2 * math.pi / 60
@@ -136,28 +134,6 @@ class ControlTable:
         """One value out of the block."""
         start = register.address - self.block.address
         return register.decode(block[start : start + register.size])
-
-
-@dataclass(frozen=True, slots=True)
-class Motor:
-    """What the motor and gear of a model can do at 12 V.
-
-    Attributes:
-        stall_torque_nm: at the horn; load is given as a fraction of it.
-        no_load_rad_s: fastest turn of the horn.
-        backlash_rad: play of the gear at the horn; None where the maker does not tell.
-    """
-
-    stall_torque_nm: float
-    no_load_rad_s: float
-    backlash_rad: float | None
-
-
-def motor_of(model: str) -> Motor:
-    """The motor of a model of the catalogue."""
-    servo = load_catalogue().get(model, Servo)
-    backlash_rad = None if servo.backlash_deg is None else math.radians(servo.backlash_deg)
-    return Motor(servo.stall_torque_nm, servo.no_load_rpm * RPM, backlash_rad)
 
 
 _DELAY_NS = 2000.0  # return delay counts 2 us

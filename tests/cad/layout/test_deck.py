@@ -9,7 +9,7 @@ from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.layout import drive_of, layout_of
-from cad.parts.base_mount import base_mount, mount_of
+from cad.parts.base_mount import base_mount
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.deck_holes import Circle, Rectangle
@@ -52,7 +52,7 @@ def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count
     stack = direct_stack(scanner)
     layout = layout_of(scanner)
     where = layout.deck
-    mesh = checked_mesh(base_mount(mount_of(layout)), "base_mount")
+    mesh = checked_mesh(base_mount(layout), "base_mount")
     turn = scanner.angles.T_world_rot(0.0)[:3, :3]
     world = mesh.vertices @ turn.T + np.array(where.t_world_rot)
     assert np.abs(world[:, 2]).min() < 1e-6

@@ -3,8 +3,8 @@
 A made part's hole is a screw hole if its diameter is that of a screw with the printer's clearance and both its ends are
 open, or if its diameter is one that a screw holds on to (the core of a thread, the seat of an insert, the way into a
 trapped nut). What lies behind it on the same axis decides: a thread (the screw's own diameter, or such a hole in a
-part), a hole to pass through to a nut, or the spigot that a grub screw clamps; nothing means the robot's deck. Screws
-in slots, which are no round holes, cannot be read.
+part), a hole to pass through to a nut, or the spigot that a grub screw clamps; nothing means the robot's deck. Slots
+are read from the half cylinders of their ends.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 
 from cad.assembly.make import make_parts
 from cad.geometry.holes import Piercing, rounds_of
@@ -171,7 +172,7 @@ SETTINGS = {
 def test_the_declared_joints_are_those_that_the_solids_have(scanner):
     assembly = make_parts(scanner)
     read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
-    assert {key for key, joint in declared.items() if not joint.slotted and key[0] != "deck"} == read.keys()
+    assert {key for key, joint in declared.items() if joint.slot_mm is None and key[0] != "deck"} == read.keys()
     for key, ((fixing, screw, trap), holes) in read.items():
         joint = declared[key]
         assert (joint.fixing, joint.screw.name, joint.count, joint.traps) == (fixing, screw, len(holes), trap), key
@@ -192,12 +193,27 @@ def _is_on(axis, hole):
     return off < 0.01 and abs(abs(np.array(axis.along) @ hole.direction) - 1) < 1e-6
 
 
+def half_cylinders(solid, radius):
+    """Where the axes of upright faces of half a turn are, x and y."""
+    surfaces = [BRepAdaptor_Surface(face.wrapped) for face in solid.Faces() if face.geomType() == "CYLINDER"]
+    halves = [s for s in surfaces if abs(s.LastUParameter() - s.FirstUParameter() - np.pi) < 1e-3]
+    axes = [half.Cylinder().Axis() for half in halves if abs(half.Cylinder().Radius() - radius) < 1e-6]
+    return [np.array(axis.Location().Coord()[:2]) for axis in axes if abs(axis.Direction().Z()) > 1 - 1e-9]
+
+
 def test_screws_in_slots_stand_in_the_middle_of_them():
     scanner = SETTINGS["a belt"]
     assembly = make_parts(scanner)
-    slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slotted}
+    slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slot_mm}
     assert slotted.keys() == {("drive_plate", "bearing_tower"), ("alignment_linkage", "counterweight")}
-    for (_, onto), joint in slotted.items():
+    for (part, onto), joint in slotted.items():
+        width, length = joint.slot_mm
+        ends = half_cylinders(assembly.made[part], width / 2)
+        assert len(ends) == 2 * joint.count
+        for axis in joint.axes:
+            one, other = sorted(ends, key=lambda end: np.linalg.norm(end - axis.start[:2]))[:2]
+            np.testing.assert_allclose((one + other) / 2, axis.start[:2], atol=1e-6)
+            assert np.linalg.norm(one - other) == pytest.approx(length - width, abs=1e-6)
         threads = [hole for hole in rounds_of(assembly.made[onto]) if abs(hole.diameter - joint.screw.core) < 0.01]
         assert joint.count == len([axis for axis in joint.axes for hole in threads if _is_on(axis, hole)])
 

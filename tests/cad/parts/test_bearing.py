@@ -17,8 +17,9 @@ from cad.geometry.mesh import checked_mesh
 from cad.layout.direct.cage import cage_of, stiffness_n_per_m
 from cad.layout.direct.loads import bearing_for, supported, waist_nm_per_rad
 from cad.layout.direct.sizing import direct_stack
-from cad.layout.layout import config_hash
+from cad.layout.layout import config_hash, layout_of
 from cad.layout.loads import Weight
+from cad.parts.all_parts import parts_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing, Servo
@@ -230,3 +231,13 @@ def test_a_cage_of_thicker_wall_is_stiffer():
     cage = cage_of(scanner, direct_stack(scanner))
     assert 1e5 < stiffness_n_per_m(cage) < 1e7
     assert stiffness_n_per_m(replace(cage, opening=cage.opening + 5)) < stiffness_n_per_m(cage)
+
+
+@pytest.mark.parametrize("servo", ["XM430-W350", "MX-28"])
+def test_under_a_cage_the_adapter_asks_for_no_holes_of_a_fork(servo):
+    """Their ears leave a fork no two pairs behind the flange; the base of a cage stands on others."""
+    layout = layout_of(scanner_for(0, 55, 30, -50, servo=servo))
+    (adapter,) = [part for part in parts_of(layout) if part.name == "slip_ring_adapter"]
+    assert checked_mesh(adapter.make(), adapter.name).is_closed()
+    with pytest.raises(BuildError, match=r"slip_ring_adapter: fork: case_holes_mm"):
+        parts_of(layout_of(scanner_for(0, 0, 30, -50, servo=servo)))

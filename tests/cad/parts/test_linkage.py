@@ -20,9 +20,9 @@ from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_r
 from cad.layout.layout import drive_of, layout_of
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
-from cad.parts.base_mount import base_mount, mount_of
-from cad.parts.sub_plate import sub_plate, sub_plate_of
-from cad.solids import box, building, checked
+from cad.parts.base_mount import base_mount
+from cad.parts.sub_plate import sub_plate
+from cad.solids import box, building
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import SlipRing
@@ -97,7 +97,7 @@ def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha,
     scanner = scanner_for(alpha, beta, lidar)
     stack = direct_stack(scanner)
     bodies = {
-        "plate": sub_plate(sub_plate_of(scanner, stack)),
+        "plate": sub_plate(scanner, stack, stack.sub_plate),
         "linkage": alignment_linkage(linkage_of(scanner, stack)),
     }
     base = stack.R() @ [0, 0, -scanner.lidar.optical_height_mm]
@@ -143,11 +143,9 @@ def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
     scanner = scanner_for(alpha_laser, beta_laser, alpha_rot=alpha, beta_rot=beta)
     stack = direct_stack(scanner)
     deck = deck_of(scanner, drive_of(scanner))
-    height = deck.t_world_rot[2] * (-1 if deck.hangs else 1)
-    assert height > rotor_radius(scanner.lidar, stack.sub_plate)
     a, b = np.radians([alpha, beta])
-    u_z = np.cos(a) * np.cos(b)
-    assert deck.hangs == (u_z < -1e-6)
+    hangs = np.cos(a) * np.cos(b) < -1e-6
+    assert deck.t_world_rot[2] * (-1 if hangs else 1) > rotor_radius(scanner.lidar, stack.sub_plate)
     # the deck's centre, seen from the world, is the world's origin
     R = scanner.angles.T_world_rot(0.0)[:3, :3]
     np.testing.assert_allclose(R @ np.array(deck.centre) + deck.t_world_rot, 0, atol=1e-5)
@@ -156,7 +154,7 @@ def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
 @pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 0.01), (179.99, 0), (0, -90), (66, -52), (135, 45), (-24, 20)])
 def test_a_mount_for_any_axis(alpha_rot, beta_rot):
     scanner = scanner_for(30, -30, alpha_rot=alpha_rot, beta_rot=beta_rot)
-    solid = base_mount(mount_of(layout_of(scanner)))
+    solid = base_mount(layout_of(scanner))
     assert checked_mesh(solid, "base_mount").is_closed()
 
 
@@ -196,11 +194,12 @@ def test_no_kernel_exception_reaches_the_user_bare():
     ):
         raise RuntimeError("BRep_API: command not done")
     split = box((0, 0, 0), (3, 1, 1)).cut(box((1, -1, -1), (2, 2, 2)))
-    with pytest.raises(BuildError, match=r"part: slot: width = 1: gives 2 bodies"):
-        checked(split, "part", "slot", "width", 1)
+    two = pytest.raises(BuildError, match=r"part: slot: width = 1: gives 2 bodies")
+    with two, building("part", "slot", "width", 1) as checked:
+        checked(split)
     empty = box((0, 0, 0), (1, 1, 1)).cut(box((-1, -1, -1), (2, 2, 2)))
-    with pytest.raises(BuildError, match=r"gives 0 bodies"):
-        checked(empty, "part", "slot", "width", 1)
+    with pytest.raises(BuildError, match=r"gives 0 bodies"), building("part", "slot", "width", 1) as checked:
+        checked(empty)
 
 
 def test_the_mount_offset_needs_no_kernel():

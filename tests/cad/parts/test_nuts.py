@@ -12,7 +12,7 @@ from cad.checks.remarks import without_traps
 from cad.files.bom import items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
-from cad.labels.fit_coupon import coupon_of, fit_coupon
+from cad.labels.fit_coupon import fit_coupon
 from cad.layout.all_joints import joints_of
 from cad.layout.direct.cage import cage_of, has_room
 from cad.layout.direct.sizing import direct_stack
@@ -124,7 +124,7 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
 
 def test_the_coupon_of_such_a_profile_has_pockets(made):
     scanner = replace(made.scanner, printer=PRINTER)
-    coupon, trap = fit_coupon(coupon_of(scanner, made.result.assembly.layout.stack)), trap_of(M3, PRINTER)
+    coupon, trap = fit_coupon(scanner, made.result.assembly.layout.stack), trap_of(M3, PRINTER)
     holes = [hole for hole in rounds_of(coupon) if hole.hole and abs(hole.diameter - trap.hole) < 1e-6]
     under = sorted((h for h in holes if h.length < 4.0), key=lambda hole: hole.low[0])
     assert len(under) == 5 and {round(hole.length, 6) for hole in under} == {round(5.0 - trap.depth, 6)}

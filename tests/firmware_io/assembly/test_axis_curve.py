@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_io.assembly.axis_curve import SmoothAxis, axis_curve, interpolation_orders, smooth
+from firmware_io.assembly.axis_curve import SmoothAxis, axis_curve, smooth
 from firmware_io.samples import JointLog, straight
 
 START = 1_700_000_000_000_000_000
@@ -127,12 +127,3 @@ def test_straight_pieces_are_the_log(times, asked):
     log = JointLog(START + np.array(times), np.cos(np.arange(len(times)) * 9.0) * 7)
     for asked_ns in (START + np.array(asked), log.time_ns):
         np.testing.assert_allclose(straight(log).angle_at(asked_ns), log.angle_at(asked_ns), rtol=0, atol=1e-9)
-
-
-def test_the_orders_are_ordered():
-    log, truth = turning(20, duration_s=36)
-    held, line, cubic, smoothed = interpolation_orders(log, truth, beams=20_000)
-    assert smoothed.rms_deg < line.rms_deg / 3
-    assert line.rms_deg < held.rms_deg / 3
-    assert cubic.rms_deg > line.rms_deg  # through the samples means through their steps
-    assert line.rms_mm_at_10m == pytest.approx(np.radians(line.rms_deg) * 10_000)

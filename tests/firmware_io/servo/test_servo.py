@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo as Servo
+from design.catalogue.products import Servo
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo import guard
 from firmware_io.servo.dynamixel import bus as servo_bus
 from firmware_io.servo.dynamixel import serial_line
 from firmware_io.servo.dynamixel.bus import ServoBus
 from firmware_io.servo.dynamixel.driver import nearest_turn, open_servo
-from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register, motor_of
+from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register
 from firmware_io.twins.servo_packets import packet_2, status
 
 REGISTERS = [
@@ -87,7 +87,7 @@ def test_counts_as_the_manual_writes_them():
     assert ax.load.decode((1024 + 512).to_bytes(2, "little")) == pytest.approx(-0.512)
     assert (mx_1.block.address, mx_1.block.size) == (36, 8)
     assert (mx_2.block.address, mx_2.block.size) == (126, 21)
-    assert ax.wheel_speed.unit * 1023 == pytest.approx(motor_of("AX-12A").no_load_rad_s)
+    assert ax.wheel_speed.unit * 1023 == pytest.approx(load_catalogue().get("AX-12A", Servo).no_load_rpm * RPM)
 
 
 def test_tables_agree_with_the_catalogue():

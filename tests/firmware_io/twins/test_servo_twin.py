@@ -277,7 +277,6 @@ def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
             assert abs(state.position_rad - true_rad(twin, state.time_ns)) < slack_rad(servo, state)
         assert states[-1].position_rad < -3.5  # on and on, through the encoder's end
         assert states[-1].velocity_rad_s == pytest.approx(-RATE, rel=0.02)
-        assert states[-1].moving
         servo.hold()
         until(lambda: not turns(twin))
         assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(12.0), 30)

@@ -16,13 +16,14 @@ from hypothesis import strategies as st
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
+from design.task.named_record import names_in
 from design.task.task import Limits, load_task
 from scanwright.study.candidate import addresses, bounds_of, record_digest, search_record, winner_task
 from scanwright.study.crossing import Crossing, _with_period
 from scanwright.study.front import COLUMNS, Front, costs
 from scanwright.study.results import open_results
 from scanwright.study.run import StudyRun
-from scanwright.study.study import load_study, shipped_studies
+from scanwright.study.study import SHIPPED, load_study
 from scanwright.study.table import FIELDS, write_answer, write_tables
 from scanwright.study.units import Crew
 
@@ -252,6 +253,6 @@ def test_a_product_of_the_study_goes_with_its_winners(tmp_path):
 
 
 def test_every_shipped_study_can_be_read():
-    assert "fleet" in shipped_studies()
-    for name in shipped_studies():
+    assert "fleet" in names_in(SHIPPED)
+    for name in names_in(SHIPPED):
         load_study(Path(name))
