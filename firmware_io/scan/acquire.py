@@ -102,7 +102,7 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     )  # loads the message types: half a second that must not fall into the recording
     with ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar))
-        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo))
+        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id))
         check_model(plan.angles, lidar)
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():

@@ -26,6 +26,7 @@ class ScanPlan:
         intensity: whether the sensor is asked for intensities.
         stamp_at: which moment of a turn the sensor's stamps mean.
         ports: where the devices are.
+        servo_id: number of the servo on its bus; None if it is alone there.
         recording: file to write.
         attached: files kept inside it, name -> text.
     """
@@ -36,6 +37,7 @@ class ScanPlan:
     intensity: bool
     stamp_at: StampAt
     ports: Ports
+    servo_id: int | None
     recording: Path
     attached: dict[str, str]
 
@@ -61,6 +63,7 @@ def plan_scan(
     turns: int = 1,
     lidar: str | None = None,
     servo: str | None = None,
+    servo_id: int | None = None,
     recording: Path | None = None,
     intensity: bool = False,
     stamp_at: StampAt = "step_0",
@@ -72,6 +75,7 @@ def plan_scan(
         turns: full scans.
         lidar: address; None for the emulated or the plugged-in one, as for `servo`.
         servo: port.
+        servo_id: its number on the bus; None if it is alone there.
         recording: None for one in `out`, named by date and time.
         intensity: ask for intensities.
         stamp_at: which moment of a turn the sensor's stamps mean.
@@ -100,6 +104,7 @@ def plan_scan(
         intensity=intensity,
         stamp_at=stamp_at,
         ports=find_ports(out, lidar, servo),
+        servo_id=servo_id,
         recording=recording or out / "recordings" / f"{datetime.now():%Y%m%d-%H%M%S}.mcap",
         attached={path.name: path.read_text(encoding="utf-8") for path in kept},
     )

@@ -22,6 +22,11 @@ class StampAt(Enum):
     rear = "rear"
 
 
+ServoId = Annotated[
+    int | None, typer.Option(min=0, max=252, metavar="ID", help="Number of the servo, where several share its bus.")
+]
+
+
 @app.command()
 def emulate(
     out: BuildFolder,
@@ -61,6 +66,7 @@ def scan(
     turns: Annotated[int, typer.Option(help="Full scans.")] = 1,
     lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    servo_id: ServoId = None,
     recording: Annotated[
         Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
     ] = None,
@@ -86,6 +92,7 @@ def scan(
         turns=turns,
         lidar=lidar,
         servo=servo,
+        servo_id=servo_id,
         recording=recording,
         intensity=intensity,
         stamp_at=stamp_at.value,
@@ -114,12 +121,27 @@ def doctor(
     out: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Build folder of the scanner.")] = None,
     lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    servo_id: ServoId = None,
+    fix: Annotated[
+        bool,
+        typer.Option("--fix", help="Set what keeps the servo from working well; keeps the old settings in a file."),
+    ] = False,
+    restore: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Set the servo back to what --fix found, and stop.")
+    ] = None,
 ) -> None:
-    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. Nothing turns."""
-    from firmware_io.scan.doctor import examine
+    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
+    from itertools import chain
 
+    from firmware_io.scan import doctor as examination
+
+    if restore is not None:
+        findings = examination.restore(restore, servo)
+    else:
+        fixed = examination.fix(out, servo, servo_id) if fix else iter(())
+        findings = chain(fixed, examination.examine(out, lidar, servo, servo_id))
     wrong = False
-    for finding in examine(out, lidar, servo):
+    for finding in findings:
         print(f"{finding.verdict:8} {finding.says}", flush=True)
         wrong |= finding.verdict == "wrong"
     raise typer.Exit(1 if wrong else 0)

@@ -349,8 +349,8 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     """
     bus = ServoBus(port)
     try:
-        table, found_id = find_servo(bus, model, servo_id)
-        return DynamixelServo(bus, table, found_id, prepare(bus, table, found_id))
+        found = find_servo(bus, model, servo_id, unmute=True)
+        return DynamixelServo(bus, found.table, found.id, prepare(bus, found.table, found.id))
     except BaseException:
         bus.close()
         raise

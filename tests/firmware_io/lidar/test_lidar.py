@@ -198,11 +198,17 @@ def test_what_a_sensor_cannot_do_is_told():
 
 
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
-    with pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
         open_lidar(str(tmp_path / "ttyACM7"))
-    with pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: look at address"):
         open_lidar("127.0.0.1:1")
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port), pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match="this is no serial port"):
+        open_lidar("/dev/null")
+    with (
+        LidarTwin("UTM-30LX", look) as twin,
+        open_lidar(twin.port),
+        pytest.raises(DeviceError, match="another program has it open"),
+    ):
         open_lidar(twin.port)
 
 

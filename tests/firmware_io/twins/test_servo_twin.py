@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from pyax12.connection import Connection
 
 from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from firmware_io.servo.dynamixel import bus
+from firmware_io import serial_port
 from firmware_io.servo.dynamixel.driver import open_servo
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo import ServoTwin
@@ -355,12 +355,14 @@ def test_opening_sets_what_it_relies_on_and_says_so():
             assert (servo.id, servo.baud) == (42, 115200)
             notes = " ".join(servo.warnings())
             assert (
-                "register 20 was -500" in notes and "register 10 was 1" in notes and "return delay was 500 us" in notes
+                "homing_offset (register 20) was -500" in notes
+                and "drive_mode (register 10) was 1" in notes
+                and "return_delay_time (register 9) was 250 (500 us)" in notes
             )
             assert (memory[20], memory[68], memory[10], memory[9]) == (0, 2, 0, 0)
         with open_servo(twin.port, servo_id=42) as servo:
             assert servo.warnings() == ()
-        with pytest.raises(DeviceError, match="servo 42 is a XM430-W350, not a MX-64R"):
+        with pytest.raises(DeviceError, match="the model of servo 42 is XM430-W350, not MX-64R"):
             open_servo(twin.port, "MX-64R")
 
 
@@ -368,7 +370,9 @@ def test_a_locked_memory_is_said():
     with ServoTwin("MX-64R") as twin:
         twin.memory[47] = 1
         with open_servo(twin.port) as servo:
-            assert any("return delay is 500 us and cannot be set to 0" in note for note in servo.warnings())
+            assert any(
+                "return_delay_time (register 5) is 500 us and cannot be set to 0" in note for note in servo.warnings()
+            )
             servo.sweep_to(0.1, 1.0)
             with pytest.raises(DeviceError, match=r"refused|memory is locked"):
                 servo.spin(1.0)
@@ -379,7 +383,7 @@ def test_the_latency_timer_is_looked_at(tmp_path, monkeypatch):
         adapter = tmp_path / Path(twin.port).resolve().name
         adapter.mkdir()
         (adapter / "latency_timer").write_text("16\n")
-        monkeypatch.setattr(bus, "_ADAPTERS", tmp_path)
+        monkeypatch.setattr(serial_port, "_ADAPTERS", tmp_path)
         with open_servo(twin.port) as servo:
             assert any("gathers bytes for 16 ms" in note and "udev" in note for note in servo.warnings())
 
