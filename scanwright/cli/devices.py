@@ -14,6 +14,8 @@ from scanwright.cli.console import BuildFolder, complain, group, notes_of, on_du
 
 app = group()
 
+_UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
+
 
 class StampAt(Enum):
     """Which moment of a turn the stamps of a sensor mean."""
@@ -105,8 +107,7 @@ def scan(
             with on_duty(), closing(watch):
                 recorded = acquire(plan, say_in_place, watch)
         except KeyboardInterrupt as stop:
-            unsafe = notes_of(stop)
-            for line in unsafe or ["stopped; the servo has answered that its torque is off"]:
+            for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
                 complain(line)
             if plan.recording.exists():
                 complain(f"what was recorded is in {plan.recording}")

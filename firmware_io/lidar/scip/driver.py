@@ -76,9 +76,10 @@ class ScipLidar:
     ) -> None:
         try:
             self.stop()
-        except DeviceError:
-            if kind is None:
+        except DeviceError as unsafe:
+            if error is None:
                 raise
+            error.add_note(f"its laser may still be on: {unsafe}")
         finally:
             self._stream.close()
 

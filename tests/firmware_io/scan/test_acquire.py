@@ -343,7 +343,7 @@ def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recordi
     assert summary.whole == (number == signal.SIGINT)
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert "stopped; the servo has answered that its torque is off" in complaints
+        assert "servo 1 (MX-64R) has answered that its torque is off" in complaints
 
 
 def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, twins):
