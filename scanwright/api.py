@@ -255,6 +255,8 @@ def scan(
     servo_id: int | None = None,
     recording: str | Path | None = None,
     intensity: bool = False,
+    cluster: int = 1,
+    every: int = 1,
     stamp_at: Literal["step_0", "rear"] = "step_0",
     say: Say = _quiet,
 ) -> Scanned:
@@ -268,6 +270,8 @@ def scan(
         servo_id: number of the servo, where several share its bus.
         recording: file to write, `.mcap`; None for one in the folder, named by date and time.
         intensity: ask the sensor for intensities too.
+        cluster: steps that share one range, the least of theirs.
+        every: one scan of so many is taken.
         stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
         say: is told what is being done.
 
@@ -287,6 +291,8 @@ def scan(
         servo_id=servo_id,
         recording=named,
         intensity=intensity,
+        cluster=cluster,
+        every=every,
         stamp_at=stamp_at,
     )
     recorded = acquire(plan, say)

@@ -45,6 +45,17 @@ class SerialStream:
         self._port.baudrate = baud
         self._port.reset_input_buffer()
 
+    def can(self, baud: int) -> bool:
+        """Whether the port takes that speed; it is as before afterwards."""
+        usual = self._port.baudrate
+        try:
+            self._port.baudrate = baud
+        except (OSError, ValueError):
+            return False
+        finally:
+            self._port.baudrate = usual
+        return True
+
     def read(self, timeout_s: float) -> bytes:
         """What has come."""
         self._port.timeout = max(timeout_s, 0.0)

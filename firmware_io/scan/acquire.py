@@ -113,7 +113,7 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
         for warning in servo.warnings():
             tell(f"warning: {servo.model}: {warning}")
         scans = _Scans(lidar, plan.stamp_at, tell)
-        lidar.start(intensity=plan.intensity)
+        lidar.start(intensity=plan.intensity, cluster=plan.cluster, skip=plan.every - 1)
         _settle_clock(scans, tell)
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
         tell("starting the servo")

@@ -73,6 +73,8 @@ def scan(
         Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
     ] = None,
     intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+    cluster: Annotated[int, typer.Option(min=1, max=99, help="Steps that share one range, the least of theirs.")] = 1,
+    every: Annotated[int, typer.Option(min=1, max=10, help="Take one scan of so many.")] = 1,
     stamp_at: Annotated[
         StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
     ] = StampAt.step_0,
@@ -97,6 +99,8 @@ def scan(
         servo_id=servo_id,
         recording=recording,
         intensity=intensity,
+        cluster=cluster,
+        every=every,
         stamp_at=stamp_at.value,
     )
     show(plan.lines())

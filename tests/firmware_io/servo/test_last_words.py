@@ -95,7 +95,7 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
         def read(self):
             raise DeviceTimeoutError("lidar: nothing came")
 
-        def reconnect(self, timeout_s):
+        def reconnect(self, _):
             raise DeviceError("lidar did not come back")
 
     servo = Holding(hears)

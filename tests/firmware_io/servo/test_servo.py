@@ -20,6 +20,7 @@ from firmware_io.servo.dynamixel import serial_line
 from firmware_io.servo.dynamixel.bus import ServoBus
 from firmware_io.servo.dynamixel.driver import nearest_turn, open_servo
 from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register, motor_of
+from firmware_io.servo.dynamixel.setup import find_servo
 from firmware_io.twins.servo_packets import packet_2, status
 
 REGISTERS = [
@@ -199,6 +200,15 @@ def test_a_late_answer_is_not_taken_for_the_next(bus):
     wire.read = read
     assert line.read(1, Register(36, 2)).data == b"\7\7"
     assert None in deadlines and len(wire.sent) == 2
+
+
+def test_of_several_servos_on_a_bus_one_is_named(bus):
+    line, wire = bus(1.0, lambda _: status(1.0, 1, 0, b"") + status(1.0, 2, 0, b""))
+    with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: say which one with --servo-id"):
+        find_servo(line, None, None)
+    wire.reply = lambda request: status(1.0, 2, 0, b"\x36\x01" if request[4] == 2 else b"")
+    found = find_servo(line, None, 2)
+    assert (found.table.model, found.id) == ("MX-64R", 2)
 
 
 def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):

@@ -22,7 +22,7 @@ from firmware_io.servo.dynamixel.driver import open_servo
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo import ServoTwin
 from firmware_io.twins.servo_machine import ServoMachine
-from firmware_io.twins.servo_packets import packet_2, status, take
+from firmware_io.twins.servo_packets import crc16, packet_2, status, take
 
 MODELS = [("MX-64R", 1.0), ("MX-28", 1.0), ("MX-64R", 2.0), ("XM430-W350", 2.0)]
 RATE = math.radians(180)
@@ -112,8 +112,7 @@ def machine(protocol=2.0):
 
 def ask(servo, wire, time_ns=0):
     """What the machine answers to bytes, as bytes."""
-    answered = servo.answer(take(bytearray(wire), servo.table.protocol), time_ns)
-    return None if answered is None else status(servo.table.protocol, servo.id, *answered)
+    return servo.respond(take(bytearray(wire), servo.table.protocol), time_ns)
 
 
 @pytest.mark.parametrize(
@@ -133,6 +132,21 @@ def ask(servo, wire, time_ns=0):
 )
 def test_answers_byte_by_byte(protocol, request_hex, answer_hex):
     assert ask(machine(protocol=protocol), bytes.fromhex(request_hex)) == (answer_hex and bytes.fromhex(answer_hex))
+
+
+@pytest.mark.parametrize("data", [b"\xa6\0\0\0", b"\xff\xff\xfd\0"])
+def test_fast_reads_are_answered_in_one_status_that_is_not_stuffed(data):
+    """LEN is 1 + 4 + 4: instruction; error, id and CRC; the data (e-manual, protocol2, fast sync read)."""
+    servo = machine()
+    servo.axis.change(0, mode="off")
+    servo._measure = lambda _: servo.memory.data.__setitem__(slice(132, 136), data)
+    body = bytes.fromhex("ff ff fd 00 fe 09 00 55 00 01") + data
+    expected = body + crc16(body).to_bytes(2, "little")
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 01"))) == expected
+    assert ask(servo, packet_2(254, 0x9A, bytes.fromhex("01 84 00 04 00"))) == expected
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 02"))) is None
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 02 01"))) is None  # it waits for servo 2 for ever
+    assert ask(servo, packet_2(1, 0x8A, bytes.fromhex("84 00 04 00 01")))[8] == 2  # no broadcast: unknown
 
 
 @pytest.mark.parametrize(
@@ -214,6 +228,8 @@ def test_rustypot_drives_the_mx_64_and_the_xm430():
     with ServoTwin("XM430-W350") as twin:
         second = rustypot.Xl430PyController(twin.port, 57600, 0.2)
         assert second.ping(1)
+        assert second.sync_read_present_position([1]) == [2048]
+        second.set_fast_sync_read(True)
         assert second.sync_read_present_position([1]) == [2048]
         second.write_torque_enable(1, True)
         second.sync_write_goal_position([1], [2400])
