@@ -59,7 +59,7 @@ class ProtocolError(DeviceError):
 
 
 class DeviceFaultError(DeviceError):
-    """A device reports a fault of its own: overload, heat, voltage, stall. What moved has been stopped."""
+    """A device reports a fault of its own: overload, heat, voltage, stall. It was told to stop."""
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

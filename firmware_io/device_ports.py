@@ -11,11 +11,11 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar, Servo
 from design.errors import DeviceError
 
 _FILE = "emulated.json"
-_HOKUYO = (0x15D1,)  # USB vendors
-_SERVO_ADAPTERS = (0x0403, 0x16D0, 0x1A86, 0x10C4)  # FTDI (U2D2, USB2Dynamixel), Xevelabs, QinHeng, Silicon Labs
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +59,13 @@ def emulated(out: Path) -> Ports | None:
 
 
 def lidar_ports() -> list[str]:
-    """Serial ports of the Hokuyo sensors that are plugged in."""
-    return _plugged(_HOKUYO)
+    """Serial ports that are plugged in and, by their USB ids, those of a lidar of the catalogue."""
+    return _plugged(Lidar)
 
 
 def servo_ports() -> list[str]:
-    """Serial ports of the adapters that a servo may hang on."""
-    return _plugged(_SERVO_ADAPTERS)
+    """Serial ports that are plugged in and, by their USB ids, adapters of a servo of the catalogue."""
+    return _plugged(Servo)
 
 
 def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
@@ -83,8 +83,10 @@ def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
     )
 
 
-def _plugged(vendors: tuple[int, ...]) -> list[str]:
-    return sorted(port.device for port in list_ports.comports() if port.vid in vendors)
+def _plugged(kind: type[Lidar] | type[Servo]) -> list[str]:
+    known = {usb_id for product in load_catalogue() if isinstance(product, kind) for usb_id in product.usb_ids or ()}
+    plugged = [port for port in list_ports.comports() if port.vid is not None and port.pid is not None]
+    return sorted(port.device for port in plugged if f"{port.vid:04x}:{port.pid:04x}" in known)
 
 
 def _only(option: str, what: str, found: list[str]) -> str:

@@ -252,8 +252,11 @@ def scan(
     turns: int = 1,
     lidar: str | None = None,
     servo: str | None = None,
+    servo_id: int | None = None,
     recording: str | Path | None = None,
     intensity: bool = False,
+    cluster: int = 1,
+    every: int = 1,
     stamp_at: Literal["step_0", "rear"] = "step_0",
     say: Say = _quiet,
 ) -> Scanned:
@@ -264,8 +267,11 @@ def scan(
         turns: full scans.
         lidar: serial port or HOST:PORT; None for the emulated or the plugged-in one, as for `servo`.
         servo: serial port.
+        servo_id: number of the servo, where several share its bus.
         recording: file to write, `.mcap`; None for one in the folder, named by date and time.
         intensity: ask the sensor for intensities too.
+        cluster: steps that share one range, the least of theirs.
+        every: one scan of so many is taken.
         stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
         say: is told what is being done.
 
@@ -278,7 +284,16 @@ def scan(
 
     named = None if recording is None else Path(recording)
     plan = plan_scan(
-        Path(folder), turns=turns, lidar=lidar, servo=servo, recording=named, intensity=intensity, stamp_at=stamp_at
+        Path(folder),
+        turns=turns,
+        lidar=lidar,
+        servo=servo,
+        servo_id=servo_id,
+        recording=named,
+        intensity=intensity,
+        cluster=cluster,
+        every=every,
+        stamp_at=stamp_at,
     )
     recorded = acquire(plan, say)
     return Scanned(recorded, assemble(plan.recording, Path(folder) / "angles.json", plan.recording.with_suffix(".ply")))

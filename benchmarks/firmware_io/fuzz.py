@@ -134,7 +134,7 @@ def servo(answers: int, seed: int) -> None:
     """Damage answers to one read of a block, and print what became of them."""
     rng, wire = random.Random(seed), Wire()
     with (
-        patch("firmware_io.servo.dynamixel.serial_line.serial.Serial", lambda *_, **__: wire),
+        patch.object(serial_line, "open_serial_port", lambda *_: wire),
         patch.object(serial_line.SerialLine, "wait_s", 0.0002),
         patch.object(bus, "_TRIES", 1),
     ):

@@ -6,7 +6,7 @@ Lengths are millimetres, masses grams.
 from __future__ import annotations
 
 import json
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +17,7 @@ from design.record import Record
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
 
 
 class Provenance(Record):
@@ -79,6 +80,9 @@ class Lidar(Product):
     cable_z_mm: float
     cable_diameter_mm: float = Field(gt=0)
     cable_straight_mm: float = Field(ge=0)
+    usb_ids: tuple[UsbId, ...] | None = Field(
+        default=None, exclude=True, description="vendor:product of its port; shapes no part"
+    )
 
     @model_validator(mode="after")
     def _steps_are_ordered(self) -> Lidar:
@@ -124,6 +128,11 @@ class Servo(Product):
     case_holes_z_mm: float
     case_rear_holes_mm: tuple[Pair, ...] = Field(min_length=4)
     case_rear_holes_z_mm: float
+    usb_ids: tuple[UsbId, ...] | None = Field(
+        default=None,
+        exclude=True,
+        description="vendor:product of the adapters between it and a computer; shapes no part",
+    )
 
 
 class Flange(Record):

@@ -6,9 +6,8 @@ import select
 import socket
 from typing import Protocol
 
-import serial
-
 from design.errors import DeviceError
+from firmware_io.serial_port import open_serial_port
 
 FIRST_BAUD = 115_200
 
@@ -33,7 +32,7 @@ class SerialStream:
     """A serial port, USB or not."""
 
     def __init__(self, port: str) -> None:
-        self._port = serial.Serial(port, FIRST_BAUD, exclusive=True, write_timeout=1.0)
+        self._port = open_serial_port(port, FIRST_BAUD)
         self._port.reset_input_buffer()
 
     @property
@@ -45,6 +44,17 @@ class SerialStream:
     def baud(self, baud: int) -> None:
         self._port.baudrate = baud
         self._port.reset_input_buffer()
+
+    def can(self, baud: int) -> bool:
+        """Whether the port takes that speed; it is as before afterwards."""
+        usual = self._port.baudrate
+        try:
+            self._port.baudrate = baud
+        except (OSError, ValueError):
+            return False
+        finally:
+            self._port.baudrate = usual
+        return True
 
     def read(self, timeout_s: float) -> bytes:
         """What has come."""
@@ -108,7 +118,10 @@ def open_stream(address: str) -> Stream:
         DeviceError: no such port or host, or it is in use.
     """
     host, colon, port = address.rpartition(":")
+    if not (colon and port.isdigit()):
+        return SerialStream(address)
     try:
-        return SocketStream(host, int(port)) if colon and port.isdigit() else SerialStream(address)
-    except (OSError, ValueError) as error:
-        raise DeviceError(f"{address}: cannot open: {error}; look at its plug and at who else uses it") from error
+        return SocketStream(host, int(port))
+    except (OSError, ValueError, OverflowError) as error:
+        why = "no answer in 2 s" if isinstance(error, TimeoutError) else getattr(error, "strerror", None) or error
+        raise DeviceError(f"{address}: cannot connect: {why}: look at address, cable and power") from error

@@ -13,10 +13,11 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 
@@ -42,6 +43,7 @@ _CLOCK_LEAST_S = 3.0
 _CLOCK_PATIENCE_S = 10.0
 _STEADY_PATIENCE_S = 15.0
 _AWAY_S = 10.0
+_UNHEARD = "the servo has not answered that it stands: look, and cut its power if it turns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,9 @@ class ScanSummary:
 
 
 def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
-    """Do it. Both devices are stopped and the recording is closed on every way out.
+    """Do it. Both devices are told to stop and the recording is closed on every way out.
+
+    What ends it early carries as notes what the devices answered to that.
 
     Raises:
         DeviceError: a device is absent, another one than the angle set names, or fails.
@@ -100,20 +104,33 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     ros_messages.definition(
         ros_messages.LASER_SCAN
     )  # loads the message types: half a second that must not fall into the recording
-    with ExitStack() as stack:
+    with _unturned_until_opened() as opened, ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar))
-        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo))
+        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id))
+        opened.set()
         check_model(plan.angles, lidar)
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
             tell(f"warning: {servo.model}: {warning}")
         scans = _Scans(lidar, plan.stamp_at, tell)
-        lidar.start(intensity=plan.intensity)
+        lidar.start(intensity=plan.intensity, cluster=plan.cluster, skip=plan.every - 1)
         _settle_clock(scans, tell)
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
         tell("starting the servo")
         _wait_until_steady(scans, axis, plan.motion, tell)
         return _record(plan, scans, axis, tell, watch)
+
+
+@contextmanager
+def _unturned_until_opened() -> Iterator[Event]:
+    """Note at a Ctrl-C that comes before the servo is opened (the event is set) that it was not turned."""
+    opened = Event()
+    try:
+        yield opened
+    except KeyboardInterrupt as stop:
+        if not opened.is_set():
+            stop.add_note("the servo had not been told to turn")
+        raise
 
 
 def check_model(angles: AngleSet, lidar: ScipLidar) -> None:
@@ -148,9 +165,11 @@ class _Scans:
         try:
             raw = self.lidar.read()
         except DeviceError as error:
+            stands = ""
             if self.axis is not None:
-                self.axis.stop()
-            self._say(f"{error}; the servo stands, waiting {_AWAY_S:g} s for the lidar to come back")
+                held = self.axis.stop()
+                stands = "the servo has answered that it holds, " if held else f"{_UNHEARD}, "
+            self._say(f"{error}; {stands}waiting {_AWAY_S:g} s for the lidar to come back")
             self.away += 1
             raw = self._found_again()
             if self.axis is not None:

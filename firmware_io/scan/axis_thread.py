@@ -13,7 +13,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
 import numpy as np
@@ -26,6 +26,7 @@ from firmware_io.servo.dynamixel.driver import DynamixelServo, ServoState
 
 SERVO_HZ = 100.0
 
+_HELD_S = 5.0  # three tries of two orders take 1.5 s
 _DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
 _WINDOW = 50  # samples: half a second
 _STILL_RAD = math.radians(0.2)  # two steps of the encoder
@@ -40,6 +41,7 @@ class AxisThread:
         begins_ns: when the motion proper begins; before it the axis is on its way to the start.
         orders: courses for the thread, None where the axis shall stand.
         told: states and errors from the thread.
+        held: from the thread, whether the servo answered the order to stand; False from one that has failed.
         window: the good angles of the last half second.
         left_out: angles that are not recorded, reason -> count.
     """
@@ -53,11 +55,16 @@ class AxisThread:
         self._kept: list[ServoState] = []  # heard by `go`, for the next who hears
         self._motion = motion
         self._doubt_rad = _DOUBT_STEPS * step_rad
+        self.held: SimpleQueue[bool] = SimpleQueue()
         self._order(stands_rad)
 
-    def stop(self) -> None:
-        """Stand, with torque on, until `go`."""
+    def stop(self) -> bool:
+        """Stand, with torque on, until `go`; whether the servo has answered that it was told so."""
         self.orders.put(None)
+        try:
+            return self.held.get(timeout=_HELD_S)
+        except Empty:
+            return False
 
     def go(self) -> None:
         """Make the motion anew from where the axis stands; `begins_ns` tells when it begins.
@@ -130,21 +137,28 @@ def turning_servo(servo: DynamixelServo, motion: Motion) -> Iterator[AxisThread]
             f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
         )
     axis, done = AxisThread(motion, stands_rad, servo.step_rad), Event()
-    thread = Thread(target=_follow, args=(servo, axis.orders, axis.told, done), name="servo", daemon=True)
+    thread = Thread(target=_follow, args=(servo, axis, done), name="servo", daemon=True)
     thread.start()
     try:
         yield axis
     finally:
         done.set()
-        thread.join()
+        _join(thread)
 
 
-def _follow(
-    servo: DynamixelServo,
-    orders: SimpleQueue[Iterator[Move] | None],
-    told: SimpleQueue[ServoState | Exception],
-    done: Event,
-) -> None:
+def _join(thread: Thread) -> None:
+    """Wait for the end of the thread, also where Ctrl-C comes again: it might turn a servo that was just stopped."""
+    again: KeyboardInterrupt | None = None
+    while thread.is_alive():
+        try:
+            thread.join()
+        except KeyboardInterrupt as interrupt:
+            again = interrupt
+    if again is not None:
+        raise again
+
+
+def _follow(servo: DynamixelServo, axis: AxisThread, done: Event) -> None:
     """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
     began_s = due_s = heard_s = time.monotonic()
     moves: Iterator[Move] = iter(())
@@ -153,12 +167,13 @@ def _follow(
         while not done.wait(max(due_s - time.monotonic(), 0)):
             now_s = time.monotonic()
             due_s = max(due_s + random.uniform(0.5, 1.5) / SERVO_HZ, now_s)
-            if not orders.empty():
-                ordered = orders.get()
+            if not axis.orders.empty():
+                ordered = axis.orders.get()
                 began_s, moves = now_s, iter(()) if ordered is None else ordered
                 move = next(moves, None)
                 if ordered is None:
                     servo.hold()
+                    axis.held.put(True)
             if move is not None and now_s - began_s >= move.at_s:
                 if math.isinf(move.goal_rad):
                     servo.spin(move.rate_rad_s)
@@ -166,10 +181,11 @@ def _follow(
                     servo.sweep_to(move.goal_rad, move.rate_rad_s)
                 move = next(moves, None)
             try:
-                told.put(servo.read())
+                axis.told.put(servo.read())
                 heard_s = now_s
             except (DeviceTimeoutError, ProtocolError):
                 if now_s - heard_s > _DEAF_S:
                     raise
     except Exception as error:  # whatever it is, the thread that waits for it raises it
-        told.put(error)
+        axis.told.put(error)
+        axis.held.put(False)

@@ -1,6 +1,8 @@
 """`scanwright doctor`: what is plugged in, how well it answers, what is wrong and what to do about it.
 
-Nothing turns; the laser is on for a few seconds.
+It reads. Only ports that were named, or whose USB ids are in the catalogue, are opened. A servo is listened to first,
+then asked, and told nothing: whoever drives it goes on, and what it holds stays held. A lidar measures for a few
+seconds, its laser on, and keeps no setting of that. What is to be set is set by `fix` alone, and `restore` undoes it.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -21,9 +24,13 @@ from firmware_io.device_ports import emulated, lidar_ports, servo_ports
 from firmware_io.lidar.scip.driver import new_clock, open_lidar
 from firmware_io.scan.acquire import CLOCK_GOOD_NS, check_model
 from firmware_io.scan.axis_thread import SERVO_HZ
-from firmware_io.servo.dynamixel.driver import open_servo
+from firmware_io.serial_port import latency_timer
+from firmware_io.servo.dynamixel import servo_settings
+from firmware_io.servo.dynamixel.bus import ServoBus
+from firmware_io.servo.dynamixel.setup import find_servo, slow_adapter, unfit_settings, value
 
 _LOOK_S = 4.0
+_LISTEN_S = 0.3
 _SERVO_READS = 100
 _BOUND_MS = 2.0
 
@@ -36,8 +43,15 @@ class DeviceFinding:
     says: str
 
 
-def examine(out: Path | None, lidar: str | None, servo: str | None) -> Iterator[DeviceFinding]:
-    """Examine the named ports, else the emulated scanner of the build folder, else whatever is plugged in."""
+def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
+    """Examine the named ports, else the emulated scanner of the build folder, else what the catalogue knows by USB ids.
+
+    Args:
+        out: build folder; its angle set says which devices it should be.
+        lidar: address.
+        servo: port.
+        servo_id: number of the servo on its bus; None if it is alone.
+    """
     yield DeviceFinding("ok", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
     angles = None if out is None else load_angles(out / "angles.json")
     twins = None if out is None else emulated(out)
@@ -48,7 +62,7 @@ def examine(out: Path | None, lidar: str | None, servo: str | None) -> Iterator[
     for port in lidars:
         yield from _guarded(_examine_lidar(port, angles))
     for port in servos:
-        yield from _guarded(_examine_servo(port, angles.servo if angles else None))
+        yield from _guarded(_examine_servo(port, angles.servo if angles else None, servo_id))
     if not lidars:
         yield DeviceFinding(
             "wrong",
@@ -56,8 +70,35 @@ def examine(out: Path | None, lidar: str | None, servo: str | None) -> Iterator[
         )
     if not servos:
         yield DeviceFinding(
-            "wrong", "no serial adapter on USB: plug in the servo's U2D2 or USB2Dynamixel, or give --servo PORT"
+            "wrong",
+            "no adapter of a servo on USB: plug in its U2D2 or USB2Dynamixel, or name another with --servo PORT",
         )
+
+
+def fix(out: Path | None, servo: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
+    """Set what keeps a servo from working well; only on a port that was named, or of an emulated scanner.
+
+    Args:
+        out: build folder, which gets the file of the old settings; None for the working folder.
+        servo: port.
+        servo_id: number of the servo on its bus; None if it is alone.
+    """
+    twins = None if out is None else emulated(out)
+    port = servo or (twins.servo if twins else None)
+    if port is None:
+        yield DeviceFinding("wrong", "--fix writes, so it does not guess: name the servo's port with --servo PORT")
+        return
+    model = None if out is None else load_angles(out / "angles.json").servo
+    yield from _told(servo_settings.fix(port, model, servo_id, Path() if out is None else out))
+
+
+def restore(file: Path, servo: str | None) -> Iterator[DeviceFinding]:
+    """Set a servo back to what `fix` found; `servo` is its port where that has another name now."""
+    yield from _told(servo_settings.restore(file, servo))
+
+
+def _told(lines: Iterator[str]) -> Iterator[DeviceFinding]:
+    yield from _guarded(DeviceFinding("ok", line) for line in lines)
 
 
 def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
@@ -65,7 +106,8 @@ def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
     try:
         yield from examination
     except DeviceError as error:
-        yield DeviceFinding("wrong", str(error))
+        for line in (str(error), *getattr(error, "__notes__", ())):
+            yield DeviceFinding("wrong", line)
 
 
 def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding]:
@@ -107,27 +149,41 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
     yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
 
 
-def _examine_servo(port: str, model: str | None) -> Iterator[DeviceFinding]:
-    with open_servo(port, model) as servo:
-        yield DeviceFinding("ok", f"{servo}, protocol {servo.protocol:.1f} at {servo.baud} baud")
-        for warning in servo.warnings():
-            yield DeviceFinding("warning", f"{port}: {warning}")
+def _examine_servo(port: str, model: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
+    with closing(ServoBus(port)) as bus:
+        if heard := bus.listen(_LISTEN_S):
+            raise DeviceError(
+                f"{port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
+                "this bus, or something else hangs on this port; nothing was sent to it"
+            )
+        found = find_servo(bus, model, servo_id)
+        table, who = found.table, f"{port}: servo {found.id}"
+        yield DeviceFinding("ok", f"{who} ({table.model}), protocol {table.protocol:.1f} at {bus.baud} baud")
+        first = bus.read(found.id, table.block)
+        if first.conditions:
+            code = first.conditions if table.hardware_error is None else value(bus, found.id, table.hardware_error)
+            says = f"{who} reports {table.names(code)}: find out why before it turns again; `scan` resets it"
+            yield DeviceFinding("warning", says)
+        if value(bus, found.id, table.torque):
+            yield DeviceFinding("warning", f"{who} has its torque on: something has driven it, and it may move")
+        for unfit in unfit_settings(bus, found):
+            yield DeviceFinding("warning", f"{who}: {unfit}: `scanwright doctor --fix --servo {port}` sets it")
+        if timer := slow_adapter(port):
+            yield DeviceFinding("warning", f"{port}: {timer}")
+        bus.return_delay_ns = value(bus, found.id, table.return_delay_ns) * table.return_delay_ns.unit
         began_s = time.monotonic()
-        states = [servo.read() for _ in range(_SERVO_READS)]
+        answers = [bus.read(found.id, table.block) for _ in range(_SERVO_READS)]
         rate_hz = _SERVO_READS / (time.monotonic() - began_s)
-    last = states[-1]
-    yield DeviceFinding("ok", f"{port}: {last.voltage_V:.1f} V, {last.temperature_degC:.0f} deg C")
+    volts, degC = (table.pick(register, answers[-1].data) for register in (table.voltage, table.temperature))
+    yield DeviceFinding("ok", f"{port}: {volts:.1f} V, {degC:.0f} deg C")
+    remedy = "set the latency timer of the adapter to 1 ms" if latency_timer(port) else "end other programs"
     yield _judged(
         rate_hz > 1.2 * SERVO_HZ,
         f"{port}: {rate_hz:.0f} reads/s, {SERVO_HZ:.0f} are needed",
-        "set the latency timer of the adapter to 1 ms, and the servo to 1 Mbaud",
+        f"{remedy}, and mind the servo's settings above",
     )
-    bound_ms = median(state.time_bound_ns for state in states) / 1e6
-    yield _judged(
-        bound_ms < _BOUND_MS,
-        f"{port}: the time of an angle is known to {bound_ms:.2f} ms",
-        "set the latency timer of the adapter to 1 ms",
-    )
+    bound_ms = median(answer.bound_ns for answer in answers) / 1e6
+    yield _judged(bound_ms < _BOUND_MS, f"{port}: the time of an angle is known to {bound_ms:.2f} ms", remedy)
 
 
 def _judged(good: bool, says: str, remedy: str) -> DeviceFinding:

@@ -24,8 +24,11 @@ class ScanPlan:
         motion: of its servo.
         turns: full scans.
         intensity: whether the sensor is asked for intensities.
+        cluster: steps that share one range, the least of theirs.
+        every: one scan of so many is taken.
         stamp_at: which moment of a turn the sensor's stamps mean.
         ports: where the devices are.
+        servo_id: number of the servo on its bus; None if it is alone there.
         recording: file to write.
         attached: files kept inside it, name -> text.
     """
@@ -34,8 +37,11 @@ class ScanPlan:
     motion: Motion
     turns: int
     intensity: bool
+    cluster: int
+    every: int
     stamp_at: StampAt
     ports: Ports
+    servo_id: int | None
     recording: Path
     attached: dict[str, str]
 
@@ -61,8 +67,11 @@ def plan_scan(
     turns: int = 1,
     lidar: str | None = None,
     servo: str | None = None,
+    servo_id: int | None = None,
     recording: Path | None = None,
     intensity: bool = False,
+    cluster: int = 1,
+    every: int = 1,
     stamp_at: StampAt = "step_0",
 ) -> ScanPlan:
     """What a scan with the scanner of a build folder will do; touches no device and writes nothing.
@@ -72,8 +81,11 @@ def plan_scan(
         turns: full scans.
         lidar: address; None for the emulated or the plugged-in one, as for `servo`.
         servo: port.
+        servo_id: its number on the bus; None if it is alone there.
         recording: None for one in `out`, named by date and time.
         intensity: ask for intensities.
+        cluster: steps that share one range.
+        every: one scan of so many is taken.
         stamp_at: which moment of a turn the sensor's stamps mean.
 
     Raises:
@@ -98,8 +110,11 @@ def plan_scan(
         motion=angles.motion,
         turns=turns,
         intensity=intensity,
+        cluster=cluster,
+        every=every,
         stamp_at=stamp_at,
         ports=find_ports(out, lidar, servo),
+        servo_id=servo_id,
         recording=recording or out / "recordings" / f"{datetime.now():%Y%m%d-%H%M%S}.mcap",
         attached={path.name: path.read_text(encoding="utf-8") for path in kept},
     )

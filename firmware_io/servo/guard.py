@@ -78,7 +78,7 @@ class Guard:
         self._said_s = time.monotonic()
         try:
             self._words.write(word)
-        except BrokenPipeError:
+        except (BrokenPipeError, ValueError):  # it has ended, or was dismissed
             return False
         return True
 

@@ -49,7 +49,7 @@ def emulated_scanner(
     scene: Scene,
     *,
     load: Load | None = None,
-    protocol: float = 1.0,
+    protocol: float | None = None,
     sigma_mm: float | None = None,
     seed: int = 0,
 ) -> Iterator[EmulatedScanner]:
@@ -59,7 +59,7 @@ def emulated_scanner(
         angles: angle set of the scanner.
         scene: what it stands in, in its world frame.
         load: what hangs on the servo; None for a light, balanced head.
-        protocol: of the servo.
+        protocol: of the servo; None for the one that the model has from the factory.
         sigma_mm: replaces the data sheet's range noise.
         seed: of the noise.
 

@@ -27,7 +27,7 @@ from typing import Self
 
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo_machine import ServoMachine
-from firmware_io.twins.servo_packets import status, take
+from firmware_io.twins.servo_packets import take
 
 _TICK_S = 0.02  # between two looks of the servo at itself
 _FORGET_NS = 100_000_000  # a request that stays incomplete is dropped
@@ -194,8 +194,7 @@ class ServoTwin:
         while request := take(buffer, self._protocol):
             arrived_ns = begin_ns + round(len(request.wire) * byte_ns)
             delay_ns, begin_ns = self._servo.return_delay_ns, arrived_ns
-            if answered := self._servo.answer(request, arrived_ns):
-                answer = status(self._protocol, self._servo.id, *answered)
+            if answer := self._servo.respond(request, arrived_ns):
                 begin_ns += delay_ns + round(len(answer) * byte_ns)
                 time.sleep(max(0.0, (begin_ns - time.monotonic_ns()) / 1e9))
                 self._send(self._damaged(answer))

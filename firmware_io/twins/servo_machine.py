@@ -12,7 +12,14 @@ from design.errors import DeviceError
 from firmware_io.servo.dynamixel.registers import TABLES, ControlTable
 from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
 from firmware_io.twins.servo_memory import ACCESS, ITEMS, RANGE, Memory
-from firmware_io.twins.servo_packets import BROADCAST, Request
+from firmware_io.twins.servo_packets import (
+    BROADCAST,
+    FAST_BULK_READ,
+    FAST_SYNC_READ,
+    Request,
+    fast_status,
+    status,
+)
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
@@ -73,6 +80,14 @@ class ServoMachine:
         error, data = self._carry_out(request, now_ns)
         return None if error is None else (error | self._conditions(), data)
 
+    def respond(self, request: Request, now_ns: int) -> bytes | None:
+        """Carry out a request; the bytes of the answer, None where there is none."""
+        if (answered := self.answer(request, now_ns)) is None:
+            return None
+        if request.instruction in (FAST_SYNC_READ, FAST_BULK_READ):
+            return fast_status(self.id, *answered)
+        return status(self.table.protocol, self.id, *answered)
+
     def overheat(self) -> None:
         """The motor is 5 degrees above its limit."""
         self._hot_degC = self.memory[31 if self._two else 11] + 5
@@ -122,6 +137,10 @@ class ServoMachine:
         if request.instruction == 2 and not to_all:
             error, data = self._read(*self._span(parameters), now_ns)
             return (None if level < 1 else error), data
+        if request.instruction in (FAST_SYNC_READ, FAST_BULK_READ) and to_all and self._two:
+            # Servos add their parts to one status, in the order asked for: this one is alone on its bus.
+            ids = parameters[4:] if request.instruction == FAST_SYNC_READ else parameters[::5]
+            return self._read_among_others(request, now_ns) if ids == bytes([self.id]) else (None, b"")
         if request.instruction in (0x82, 0x92) and to_all:
             return self._read_among_others(request, now_ns)
         error = self._change(request, now_ns)
@@ -175,9 +194,9 @@ class ServoMachine:
     def _read_among_others(self, request: Request, now_ns: int) -> tuple[int | None, bytes]:
         """Sync read and bulk read; in protocol 1.0 the MX know the second, and the AX neither."""
         parameters = request.parameters
-        if request.instruction == 0x82 and self._two and self.id in parameters[4:]:
+        if request.instruction in (0x82, FAST_SYNC_READ) and self._two and self.id in parameters[4:]:
             return self._read(*self._span(parameters), now_ns)
-        if request.instruction == 0x92 and self._two:
+        if request.instruction in (0x92, FAST_BULK_READ) and self._two:
             blocks = (parameters[start : start + 5] for start in range(0, len(parameters), 5))
             mine = next((block[1:] for block in blocks if block[0] == self.id), None)
         elif request.instruction == 0x92 and self.table.measures_turn:

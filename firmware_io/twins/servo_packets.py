@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 BROADCAST = 254
+FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,13 @@ def status(protocol: float, servo_id: int, error: int, data: bytes) -> bytes:
         return packet_2(servo_id, 0x55, bytes([error]) + data)
     body = bytes([servo_id, len(data) + 2, error]) + data
     return b"\xff\xff" + body + bytes([packet_checksum(body)])
+
+
+def fast_status(servo_id: int, error: int, data: bytes) -> bytes:
+    """The bytes of the status that one servo gives to a fast read: from all of them, its own id within, not stuffed."""
+    body = bytes([0x55, error, servo_id]) + data
+    packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, "little") + body
+    return packet + crc16(packet).to_bytes(2, "little")
 
 
 def packet_2(servo_id: int, instruction: int, parameters: bytes) -> bytes:

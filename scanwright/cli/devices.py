@@ -14,12 +14,19 @@ from scanwright.cli.console import BuildFolder, complain, group, notes_of, on_du
 
 app = group()
 
+_UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
+
 
 class StampAt(Enum):
     """Which moment of a turn the stamps of a sensor mean."""
 
     step_0 = "step_0"
     rear = "rear"
+
+
+ServoId = Annotated[
+    int | None, typer.Option(min=0, max=252, metavar="ID", help="Number of the servo, where several share its bus.")
+]
 
 
 @app.command()
@@ -61,10 +68,13 @@ def scan(
     turns: Annotated[int, typer.Option(help="Full scans.")] = 1,
     lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    servo_id: ServoId = None,
     recording: Annotated[
         Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
     ] = None,
     intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+    cluster: Annotated[int, typer.Option(min=1, max=99, help="Steps that share one range, the least of theirs.")] = 1,
+    every: Annotated[int, typer.Option(min=1, max=10, help="Take one scan of so many.")] = 1,
     stamp_at: Annotated[
         StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
     ] = StampAt.step_0,
@@ -86,8 +96,11 @@ def scan(
         turns=turns,
         lidar=lidar,
         servo=servo,
+        servo_id=servo_id,
         recording=recording,
         intensity=intensity,
+        cluster=cluster,
+        every=every,
         stamp_at=stamp_at.value,
     )
     show(plan.lines())
@@ -98,8 +111,7 @@ def scan(
             with on_duty(), closing(watch):
                 recorded = acquire(plan, say_in_place, watch)
         except KeyboardInterrupt as stop:
-            unsafe = notes_of(stop)
-            for line in unsafe or ["stopped; the servo has answered that its torque is off"]:
+            for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
                 complain(line)
             if plan.recording.exists():
                 complain(f"what was recorded is in {plan.recording}")
@@ -114,12 +126,27 @@ def doctor(
     out: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Build folder of the scanner.")] = None,
     lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    servo_id: ServoId = None,
+    fix: Annotated[
+        bool,
+        typer.Option("--fix", help="Set what keeps the servo from working well; keeps the old settings in a file."),
+    ] = False,
+    restore: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Set the servo back to what --fix found, and stop.")
+    ] = None,
 ) -> None:
-    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. Nothing turns."""
-    from firmware_io.scan.doctor import examine
+    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
+    from itertools import chain
 
+    from firmware_io.scan import doctor as examination
+
+    if restore is not None:
+        findings = examination.restore(restore, servo)
+    else:
+        fixed = examination.fix(out, servo, servo_id) if fix else iter(())
+        findings = chain(fixed, examination.examine(out, lidar, servo, servo_id))
     wrong = False
-    for finding in examine(out, lidar, servo):
+    for finding in findings:
         print(f"{finding.verdict:8} {finding.says}", flush=True)
         wrong |= finding.verdict == "wrong"
     raise typer.Exit(1 if wrong else 0)

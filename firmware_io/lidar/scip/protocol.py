@@ -27,7 +27,7 @@ Integers = NDArray[np.int32]
 SCIP_2 = b"SCIP2.0"
 STAMP_WRAP_MS = 1 << 24  # p. 12
 LINE_CHARACTERS = 64
-_LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 2161 steps
+LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 2161 steps
 _REQUEST = rb"(?:VV|PP|II|BM|QT|R[STB]|TM\d|SS\d{6}|CR\d\d|HS\d|DB\d\d|SCIP2\.0|%S[LT]|[GH][DSE]\d{10}|[MN][DSE]\d{13})"
 _ECHO = re.compile(_REQUEST + rb"(?:;[\w .+@]{0,16})?")
 _ECHO_LINE = re.compile(rb"^(?:" + _ECHO.pattern + rb")$", re.MULTILINE)
@@ -108,6 +108,17 @@ class Window:
     def size(self) -> int:
         """Number of ranges."""
         return (self.last_step - self.first_step) // self.cluster + 1
+
+    @property
+    def whole_clusters(self) -> int:
+        """Number of ranges of a sensor that sends none for steps that fill no cluster: which do is not known."""
+        return (self.last_step - self.first_step + 1) // self.cluster
+
+    @property
+    def bytes_per_scan(self) -> int:
+        """Of a reply: echo, status, stamp, and lines of 64 characters with their sum and end."""
+        characters = self.size * self.characters * (2 if self.intensity else 1)
+        return 16 + 4 + 6 + 1 + characters + 2 * -(-characters // LINE_CHARACTERS)
 
     @property
     def letter(self) -> str:
@@ -226,7 +237,7 @@ class Splitter:
     def feed(self, received: bytes) -> list[Reply]:
         """The replies that end in `received`, in order."""
         *blocks, self._pending = (self._pending + received).split(b"\n\n")
-        if len(self._pending) > _LONGEST_REPLY:
+        if len(self._pending) > LONGEST_REPLY:
             self.bad += 1
             self._pending = b""
         return [told for block in blocks for told in self._parsed(block.strip(b"\n"))]
@@ -284,7 +295,8 @@ def measurement(told: Reply) -> Measurement:
     if len(stamp) != 4 or any(len(line) != LINE_CHARACTERS for line in data[:-1]):
         raise ProtocolError(f"{told.echo.decode()}: a line was cut")
     numbers = decode(b"".join(data), window.characters)
-    if numbers.size != window.size * (2 if window.intensity else 1):
+    each = 2 if window.intensity else 1
+    if numbers.size not in (window.size * each, window.whole_clusters * each):
         raise ProtocolError(f"{told.echo.decode()}: {numbers.size} numbers for {window.size} steps")
     value, intensity = (numbers[::2], numbers[1::2]) if window.intensity else (numbers, numbers[:0])
     return Measurement(window, int(remaining or 0), int(decode(stamp, 4)[0]), value, intensity)

@@ -21,7 +21,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
@@ -34,7 +33,6 @@ BROADCAST = 254
 
 _TRIES = 3
 _LATE = 4  # times the wait for an answer, until it is given up for good
-_ADAPTERS = Path("/sys/bus/usb-serial/devices")
 
 _CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
 _CHECKSUM_1 = 0b0001_0000
@@ -84,12 +82,16 @@ class ServoBus:
         self.protocol = protocol
         self.return_delay_ns = 0.0
         self._line = SerialLine(port, baud)
-        try:
-            with self._port_errors():
-                self._line.find_echo()
-        except BaseException:
-            self.close()
-            raise
+
+    def listen(self, seconds: float) -> bytes:
+        """What comes in that time though nobody asked; a servo never speaks first."""
+        with self._port_errors():
+            return self._line.listen(seconds)
+
+    def find_echo(self) -> None:
+        """Find out whether the adapter returns what it sends; before the first request."""
+        with self._port_errors():
+            self._line.find_echo()
 
     @property
     def baud(self) -> int:
@@ -118,14 +120,10 @@ class ServoBus:
         """Close the port; may be called again."""
         self._line.port.close()
 
-    def lower_latency(self) -> int | None:
-        """Ask the USB adapter to hand over bytes at once; the ms it still gathers them, None where unknown."""
+    def lower_latency(self) -> None:
+        """Ask the USB adapter to hand over bytes at once, until the port is closed."""
         with suppress(OSError, ValueError, AttributeError, NotImplementedError):  # not every driver can, or needs to
             self._line.port.set_low_latency_mode(True)
-        try:
-            return int((_ADAPTERS / Path(self.port).resolve().name / "latency_timer").read_text())
-        except (OSError, ValueError):
-            return None
 
     def read(self, servo_id: int, register: Register) -> ServoAnswer:
         """The bytes of a register or a block.

@@ -1,4 +1,7 @@
-"""Drive one servo: spin, sweep, hold, read; whatever happens, it stands and its port is closed in the end.
+"""Drive one servo: spin, sweep, hold, read; whatever happens, it is told to stop and its port is closed in the end.
+
+An error that leaves the `with` statement carries as a note what the servo answered to that: that its torque is off, or
+that it could not be stopped.
 
 `open_servo` finds speed, protocol and model, and makes the servo ready: torque off, no return delay. While it turns,
 `read` it at least every two seconds: turns are counted from what is read, and a servo that nobody listens to is
@@ -28,6 +31,7 @@ _STALL_SHARE = 0.1  # of the way due
 _ARRIVED_RAD = math.radians(5.0)  # a loop without integral stops short of its goal, by friction and weight
 _GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
 
+_IS_OFF = "has answered that its torque is off"
 _ADVICE = {
     "overload": "free what brakes the axis, balance or lighten the head, then open the servo again",
     "overheating": "let it cool down; then a lower rate or a lighter head",
@@ -107,6 +111,9 @@ class DynamixelServo:
             if error is None:
                 raise
             error.add_note(str(unsafe))  # the first error tells more
+        else:
+            if error is not None:
+                error.add_note(f"{self} {_IS_OFF}")
 
     def close(self) -> None:
         """Take the torque, close the port. May be called again.
@@ -114,18 +121,20 @@ class DynamixelServo:
         Raises:
             DeviceError: the servo does not answer, and may still turn.
         """
-        stands, trouble = not self._bus.is_open, None
+        if not self._bus.is_open:
+            return
+        trouble: BaseException | None = None
         try:
-            if not stands:
-                self._stop()
-                stands = True
-        except DeviceError as error:
+            self._stop()
+        except BaseException as error:  # Ctrl-C again, too: the guard insists
             trouble = error
-        finally:
-            self._bus.close()
-            stands = self._guard.dismiss(stands)  # which tries longer
-        if trouble and not stands:
+        self._bus.close()
+        heard = self._guard.dismiss(stands=trouble is None)  # which tries longer
+        if trouble and not heard:
             raise DeviceError(f"{self}: could not be stopped: take its power ({trouble})") from trouble
+        if trouble and not isinstance(trouble, DeviceError):
+            trouble.add_note(f"{self} {_IS_OFF}")
+            raise trouble
 
     def warnings(self) -> tuple[str, ...]:
         """What was not as it should be when the servo was opened, and what to do about it."""
@@ -182,7 +191,8 @@ class DynamixelServo:
         """Position, velocity, load, voltage and temperature of one moment, in one transaction.
 
         Raises:
-            DeviceFaultError: overload, overheating, voltage, or no motion where there should be; it is stopped.
+            DeviceFaultError: overload, overheating, voltage, or no motion where there should be; it was told to stop,
+                and a note says so where it has not answered that it did.
             DeviceTimeoutError: it does not answer.
             ProtocolError: it answers nonsense.
             DeviceError: the guard stopped it, as it was not read for two seconds.
@@ -268,13 +278,15 @@ class DynamixelServo:
         try:
             self._stop()
         except DeviceError as unsafe:
-            error.add_note(str(unsafe))
+            error.add_note(f"{self} has not answered that its torque is off ({unsafe})")
         raise error
 
     def _neglected(self) -> NoReturn:
         self._order, self._mode = None, ()
-        stopped = f"not read for {SILENCE_S:g} s while it turned, so it was stopped"
-        raise DeviceError(f"{self}: {stopped}: read it more often, open it again")
+        heard = self._guard.dismiss(stands=False)
+        stopped = "so it was stopped" if heard else "and did not answer when it was to be stopped: take its power"
+        neglected = f"not read for {SILENCE_S:g} s while it turned, {stopped}"
+        raise DeviceError(f"{self}: {neglected}: read it more often, open it again")
 
     def _check_rate(self, rate_rad_s: float) -> None:
         if not abs(rate_rad_s) <= self._fastest_rad_s:
@@ -346,8 +358,8 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     """
     bus = ServoBus(port)
     try:
-        table, found_id = find_servo(bus, model, servo_id)
-        return DynamixelServo(bus, table, found_id, prepare(bus, table, found_id))
+        found = find_servo(bus, model, servo_id, unmute=True)
+        return DynamixelServo(bus, found.table, found.id, prepare(bus, found.table, found.id))
     except BaseException:
         bus.close()
         raise

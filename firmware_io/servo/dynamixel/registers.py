@@ -28,12 +28,17 @@ class Register:
         size: in bytes.
         unit: what one count is worth.
         sign: how negative values are written.
+        name: of a setting that outlasts a scan, as the e-manual has it.
     """
 
     address: int
     size: int
     unit: float = 1.0
     sign: Sign = "none"
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name} (register {self.address})" if self.name else f"register {self.address}"
 
     @property
     def bounds(self) -> tuple[int, int]:
@@ -51,7 +56,7 @@ class Register:
         """
         low, high = self.bounds
         if not low * self.unit - self.unit / 2 < value < high * self.unit + self.unit / 2:
-            raise DeviceError(f"register {self.address}: {value:g}: not in {low * self.unit:g} .. {high * self.unit:g}")
+            raise DeviceError(f"{self}: {value:g}: not in {low * self.unit:g} .. {high * self.unit:g}")
         count = round(value / self.unit)
         if self.sign == "bit10":
             return (abs(count) | (_BIT10 if count < 0 else 0)).to_bytes(self.size, "little")
@@ -84,6 +89,7 @@ class ControlTable:
         wheel: settings of continuous rotation.
         joint: settings of going to an angle.
         neutral: settings that would turn or shift the angles' zero, with the value that does not.
+        fast: the setting for 1 Mbaud.
         faults: what the bits of the fault byte mean (protocol 1.0: of the status; 2.0: of register `hardware_error`).
         joint_speed: speed on the way to an angle; count 0 means unlimited.
         watchdog: None in protocol 1.0, which has none.
@@ -100,8 +106,8 @@ class ControlTable:
     wheel: tuple[Setting, ...]
     joint: tuple[Setting, ...]
     neutral: tuple[Setting, ...]
+    fast: Setting
     faults: dict[int, str]
-    baud: Register
     return_delay_ns: Register
     status_return: Register
     torque: Register
@@ -143,7 +149,8 @@ _FAULTS_2 = {0: "voltage", 2: "overheating", 3: "motor encoder", 4: "electrical 
 
 def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rpm: float) -> ControlTable:
     ax = model == "AX-12A"
-    clockwise, counterclockwise = Register(6, 2), Register(8, 2)
+    clockwise = Register(6, 2, name="cw_angle_limit")
+    counterclockwise = Register(8, 2, name="ccw_angle_limit")
     step_rad = math.radians(step_deg)
     # In wheel mode the AX-12A takes a share of the voltage: that share of its 59 rpm without load, at 12 V.
     wheel_unit = 59 * RPM / 1023 if ax else speed_rpm * RPM
@@ -158,11 +165,16 @@ def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rp
         speed_loop=not ax,
         wheel=((clockwise, 0), (counterclockwise, 0)),
         joint=((clockwise, 0), (counterclockwise, last)),
-        neutral=() if ax else ((Register(20, 2), 0), (Register(22, 1), 1)),
+        neutral=()
+        if ax
+        else (
+            (Register(20, 2, sign="twos", name="multi_turn_offset"), 0),
+            (Register(22, 1, name="resolution_divider"), 1),
+        ),
+        fast=(Register(4, 1, name="baud_rate"), 1),
         faults=_FAULTS_1,
-        baud=Register(4, 1),
-        return_delay_ns=Register(5, 1, _DELAY_NS),
-        status_return=Register(16, 1),
+        return_delay_ns=Register(5, 1, _DELAY_NS, name="return_delay_time"),
+        status_return=Register(16, 1, name="status_return_level"),
         torque=Register(24, 1),
         wheel_speed=Register(32, 2, wheel_unit, "bit10"),
         joint_speed=Register(32, 2, speed_rpm * RPM),
@@ -178,7 +190,7 @@ def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rp
 
 
 def _protocol_2(model: str, number: int, *, current_mA: float, stall_A: float) -> ControlTable:
-    mode, speed, step_rad = Register(11, 1), 0.229 * RPM, 2 * math.pi / 4096
+    mode, speed, step_rad = Register(11, 1, name="operating_mode"), 0.229 * RPM, 2 * math.pi / 4096
     return ControlTable(
         model=model,
         number=number,
@@ -190,11 +202,11 @@ def _protocol_2(model: str, number: int, *, current_mA: float, stall_A: float) -
         speed_loop=True,
         wheel=((mode, 1),),
         joint=((mode, 3),),
-        neutral=((Register(10, 1), 0), (Register(20, 4, sign="twos"), 0)),
+        neutral=((Register(10, 1, name="drive_mode"), 0), (Register(20, 4, sign="twos", name="homing_offset"), 0)),
+        fast=(Register(8, 1, name="baud_rate"), 3),
         faults=_FAULTS_2,
-        baud=Register(8, 1),
-        return_delay_ns=Register(9, 1, _DELAY_NS),
-        status_return=Register(68, 1),
+        return_delay_ns=Register(9, 1, _DELAY_NS, name="return_delay_time"),
+        status_return=Register(68, 1, name="status_return_level"),
         torque=Register(64, 1),
         wheel_speed=Register(104, 4, speed, "twos"),
         joint_speed=Register(112, 4, speed),

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import time
 
-import serial
-from serial.tools.list_ports import comports
+from design.errors import ProtocolError
+from firmware_io.serial_port import open_serial_port
 
-from design.errors import DeviceError, ProtocolError
-
+_MANY = 4096
 _SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenever its time-out is changed
 
 
@@ -30,10 +28,7 @@ class SerialLine:
     wait_s = 0.050
 
     def __init__(self, port: str, baud: int) -> None:
-        try:
-            self.port = serial.Serial(port, baud, exclusive=True, timeout=_SLICE_S, write_timeout=1.0)
-        except (OSError, ValueError) as error:  # pyserial's own are OSErrors
-            raise DeviceError(_why_not_opened(port, error)) from error
+        self.port = open_serial_port(port, baud, _SLICE_S)
         self.is_using = False  # only `Tape` is ever sent to, which sets it; reading clears it
         self.echoes = False
         self.deadline_s = 0.0
@@ -65,6 +60,11 @@ class SerialLine:
         self.sent, self._echo_due = packet, self.echoes
         self.began_ns = self.ended_ns = time.monotonic_ns()
         self.port.write(packet)
+
+    def listen(self, seconds: float) -> bytes:
+        """What comes in that time without having been asked for."""
+        self.deadline_s = time.monotonic() + seconds
+        return self._read(_MANY)
 
     def find_echo(self) -> None:
         """Whether the adapter returns what it sends, tried with a byte that no servo answers."""
@@ -101,15 +101,3 @@ class Tape:
         """Keep the request."""
         self.packet = bytes(packet)
         return len(packet)
-
-
-def _why_not_opened(port: str, error: Exception) -> str:
-    number = getattr(error, "errno", None)
-    if number == errno.ENOENT:
-        there = ", ".join(sorted(found.device for found in comports())) or "none"
-        return f"{port}: no such port; serial ports here: {there}"
-    if number in (errno.EACCES, errno.EPERM):
-        return f"{port}: you may not open it; become a member of its group (often 'dialout'), then log in again"
-    if number in (errno.EAGAIN, errno.EBUSY):
-        return f"{port}: another program has it open; end that one first"
-    return f"{port}: cannot be opened: {error}"

@@ -15,6 +15,7 @@ from firmware_io.lidar.scip import driver as driver
 from firmware_io.lidar.scip import protocol
 from firmware_io.lidar.scip.driver import ScipLidar, new_clock, open_lidar
 from firmware_io.lidar.scip.raw_scan import to_laser_scan
+from firmware_io.twins import lidar_machine
 from firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
@@ -198,11 +199,17 @@ def test_what_a_sensor_cannot_do_is_told():
 
 
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
-    with pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
         open_lidar(str(tmp_path / "ttyACM7"))
-    with pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: look at address"):
         open_lidar("127.0.0.1:1")
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port), pytest.raises(DeviceError, match="cannot open"):
+    with pytest.raises(DeviceError, match="this is no serial port"):
+        open_lidar("/dev/null")
+    with (
+        LidarTwin("UTM-30LX", look) as twin,
+        open_lidar(twin.port),
+        pytest.raises(DeviceError, match="another program has it open"),
+    ):
         open_lidar(twin.port)
 
 
@@ -218,9 +225,13 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
 
 
 class SlowPort(byte_stream.SerialStream):
-    """A port whose sensor listens at the speed that it has after power-up, until it is told another one."""
+    """A real line, whose sensor listens at the speed that it has after power-up, until it is told another one."""
 
     listens = 19_200
+    fastest = 750_000  # of the adapter
+
+    def can(self, baud):
+        return baud <= self.fastest
 
     def write(self, data):
         if self.baud == self.listens:
@@ -229,13 +240,77 @@ class SlowPort(byte_stream.SerialStream):
                 self.listens = int(data[2:])
 
 
-def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch):
+@pytest.mark.parametrize("fastest", [750_000, 115_200])
+def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
+    """A URG-04LX needs 216 kbit/s for ten scans; 115,200 is all that some adapters give."""
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
+    monkeypatch.setattr(driver, "SerialStream", SlowPort)
+    monkeypatch.setattr(SlowPort, "fastest", fastest)
+    monkeypatch.setattr(driver, "_ANSWER_S", 0.4)
     with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
         assert lidar._stream.listens == lidar._stream.baud == 115_200
         lidar.start()
+        assert lidar._stream.listens == lidar._stream.baud == (250_000 if fastest == 750_000 else 115_200)
         check(lidar.read(), 682)
+
+
+class BadLine(byte_stream.SerialStream):
+    """A line that loses what is faster than 115,200, whatever both ends are set to."""
+
+    def write(self, data):
+        if self.baud == 115_200:
+            super().write(data)
+
+
+def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
+    monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
+    monkeypatch.setattr(driver, "SerialStream", BadLine)
+    monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
+    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+        lidar.start()
+        assert lidar._stream.baud == 115_200
+        check(lidar.read(), 682)
+
+
+def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypatch):
+    told = replace(lidar_machine.IDENTITIES["UTM-30LX"], firmware="1.16.02(19/Jan./2010)")
+    monkeypatch.setitem(lidar_machine.IDENTITIES, "UTM-30LX", told)
+    asked, answer = [], lidar_machine.LidarMachine.answer
+
+    def listening(self, request, now_ns):
+        asked.append(request)
+        return answer(self, request, now_ns)
+
+    monkeypatch.setattr(lidar_machine.LidarMachine, "answer", listening)
+    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+        assert lidar.sync is None
+        lidar.start()
+        check(lidar.read(), 1081)
+    assert b"PP" in asked and b"TM0" not in asked
+
+
+class AsleepStream:
+    """What came while the program was kept from running, in pieces as small as a pseudo-terminal's."""
+
+    def __init__(self, waiting):
+        self.waiting = waiting
+
+    def read(self, timeout_s):
+        assert timeout_s < 0, "the deadline has passed"
+        taken, self.waiting = self.waiting[:100], self.waiting[100:]
+        return taken
+
+
+def test_a_reply_that_waits_for_a_late_host_counts():
+    lidar = object.__new__(driver.ScipLidar)
+    lidar.address, lidar._waiting, lidar._splitter = "wire", [], protocol.Splitter()
+    lidar._stream = AsleepStream(protocol.reply(b"PP", "00", protocol.text_lines([("MODL", "x" * 500)])))
+    assert lidar._next(time.monotonic() - 10.0)[0].echo == b"PP"
+    with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
+        lidar._next(time.monotonic() - 10.0)
+    lidar._stream = AsleepStream(b"x" * 100_000)
+    with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
+        lidar._next(time.monotonic() - 10.0)
 
 
 class Chatter:

@@ -319,3 +319,25 @@ def test_parameters_that_cannot_be_are_refused(wrong):
         parameters.parameters(told | wrong)
     with pytest.raises(ProtocolError, match="no AFRT"):
         parameters.parameters({key: text for key, text in told.items() if key != "AFRT"})
+
+
+def test_a_rest_that_fills_no_cluster_may_be_sent_or_not():
+    """Which sensors do is not known; one more or one less than that is a damaged scan."""
+    window = protocol.Window(first_step=0, last_step=11, cluster=5)
+    assert (window.size, window.whole_clusters) == (3, 2)
+    echo = protocol.continuous(window)
+    for count in range(5):
+        told = protocol.Reply(echo, "99", (protocol.encode([7], 4), protocol.encode(range(100, 100 + count), 3)))
+        if count in (2, 3):
+            np.testing.assert_array_equal(protocol.measurement(told).value, 100 + np.arange(count))
+        else:
+            with pytest.raises(ProtocolError, match=f"{count} numbers for 3 steps"):
+                protocol.measurement(told)
+
+
+@pytest.mark.parametrize("intensity", [False, True])
+def test_how_many_bytes_a_scan_has(intensity):
+    window = protocol.Window(first_step=44, last_step=725, intensity=intensity)
+    payload = protocol.encode(range(window.size * (2 if intensity else 1)), 3)
+    told = protocol.reply(protocol.continuous(window), "99", protocol.data_lines(0, payload))
+    assert window.bytes_per_scan == len(told)

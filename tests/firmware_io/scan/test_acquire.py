@@ -31,7 +31,7 @@ from firmware_io.scan import acquire
 from firmware_io.scan.axis_thread import turning_servo
 from firmware_io.scan.plan import plan_scan
 from firmware_io.scan.setpoints import course
-from firmware_io.servo.dynamixel.driver import ServoState
+from firmware_io.servo.dynamixel.driver import ServoState, open_servo
 from firmware_io.twins.scanner import emulated_scanner, room
 from firmware_io.twins.servo import ServoTwin
 
@@ -343,7 +343,7 @@ def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recordi
     assert summary.whole == (number == signal.SIGINT)
     if number == signal.SIGINT:
         assert process.returncode == 130
-        assert "stopped; the servo has answered that its torque is off" in complaints
+        assert "servo 1 (MX-64R) has answered that its torque is off" in complaints
 
 
 def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, twins):
@@ -412,3 +412,18 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, twins):
         plan = plan_scan(tmp_path, lidar=twins.ports.lidar, servo=servo.port)
         with pytest.raises(DeviceError, match="stands in its dead sector"):
             acquire.acquire(plan, lambda _: None)
+
+
+@pytest.mark.parametrize(("servo", "protocol"), [("MX-64R", 1.0), ("XM430-W350", 2.0)])
+def test_a_servo_is_emulated_as_it_comes_from_the_factory(servo, protocol):
+    with emulated_scanner(angle_set(servo=servo), room(None)) as twins, open_servo(twins.ports.servo) as opened:
+        assert (opened.model, opened.protocol) == (servo, protocol)
+
+
+def test_clusters_and_every_second_scan_reach_the_recording(out, twins):
+    summary = run(out, twins, cluster=5, every=2)
+    scans = list(open_recording(recorded(out)).scans())
+    assert summary.scans == len(scans)
+    assert {scan.range_m.size for scan in scans} == {217}
+    steps_s = np.diff([scan.stamp_ns for scan in scans]) / 1e9
+    assert np.median(steps_s) == pytest.approx(0.05, rel=0.02)

@@ -20,6 +20,7 @@ from firmware_io.servo.dynamixel import serial_line
 from firmware_io.servo.dynamixel.bus import ServoBus
 from firmware_io.servo.dynamixel.driver import nearest_turn, open_servo
 from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register
+from firmware_io.servo.dynamixel.setup import find_servo
 from firmware_io.twins.servo_packets import packet_2, status
 
 REGISTERS = [
@@ -56,7 +57,7 @@ def bus(monkeypatch):
 
     def make(protocol, reply, tries=1, wait_s=0.05):
         wire = Wire(reply)
-        monkeypatch.setattr(serial_line.serial, "Serial", lambda *_, **__: wire)
+        monkeypatch.setattr(serial_line, "open_serial_port", lambda *_: wire)
         monkeypatch.setattr(serial_line.SerialLine, "wait_s", wait_s)
         monkeypatch.setattr(servo_bus, "_TRIES", tries)
         return ServoBus("wire", protocol=protocol), wire
@@ -122,7 +123,7 @@ DIALOGUES = [
 def test_packets_of_the_manual(bus, protocol, verb, register, data, request_hex, answer_hex):
     line, wire = bus(protocol, lambda _: bytes.fromhex(answer_hex))
     answer = line.read(1, register) if verb == "read" else line.write(1, register, data)
-    assert wire.sent[1:] == [bytes.fromhex(request_hex)]  # the first is the byte that looks for an echo
+    assert wire.sent == [bytes.fromhex(request_hex)]
     assert answer.data == bytes.fromhex(answer_hex)[5 if protocol == 1.0 else 9 : -1 if protocol == 1.0 else -2]
 
 
@@ -180,7 +181,7 @@ def test_a_damaged_answer_is_asked_again(bus):
     replies = iter([b"", status(1.0, 1, 0, b"\1\2")[:-1] + b"\0", status(1.0, 1, 0, b"\1\2")])
     line, wire = bus(1.0, lambda _: next(replies), tries=3)
     assert line.read(1, Register(36, 2)).data == b"\1\2"
-    assert len(wire.sent) == 1 + 3
+    assert len(wire.sent) == 3
 
 
 def test_a_late_answer_is_not_taken_for_the_next(bus):
@@ -198,7 +199,16 @@ def test_a_late_answer_is_not_taken_for_the_next(bus):
 
     wire.read = read
     assert line.read(1, Register(36, 2)).data == b"\7\7"
-    assert None in deadlines and len(wire.sent) == 3
+    assert None in deadlines and len(wire.sent) == 2
+
+
+def test_of_several_servos_on_a_bus_one_is_named(bus):
+    line, wire = bus(1.0, lambda _: status(1.0, 1, 0, b"") + status(1.0, 2, 0, b""))
+    with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: say which one with --servo-id"):
+        find_servo(line, None, None)
+    wire.reply = lambda request: status(1.0, 2, 0, b"\x36\x01" if request[4] == 2 else b"")
+    found = find_servo(line, None, 2)
+    assert (found.table.model, found.id) == ("MX-64R", 2)
 
 
 def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):

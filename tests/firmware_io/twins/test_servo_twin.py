@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 from pyax12.connection import Connection
 
 from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from firmware_io.servo.dynamixel import bus
+from firmware_io import serial_port
 from firmware_io.servo.dynamixel.driver import open_servo
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo import ServoTwin
 from firmware_io.twins.servo_machine import ServoMachine
-from firmware_io.twins.servo_packets import packet_2, status, take
+from firmware_io.twins.servo_packets import crc16, packet_2, status, take
 
 MODELS = [("MX-64R", 1.0), ("MX-28", 1.0), ("MX-64R", 2.0), ("XM430-W350", 2.0)]
 RATE = math.radians(180)
@@ -112,8 +112,7 @@ def machine(protocol=2.0):
 
 def ask(servo, wire, time_ns=0):
     """What the machine answers to bytes, as bytes."""
-    answered = servo.answer(take(bytearray(wire), servo.table.protocol), time_ns)
-    return None if answered is None else status(servo.table.protocol, servo.id, *answered)
+    return servo.respond(take(bytearray(wire), servo.table.protocol), time_ns)
 
 
 @pytest.mark.parametrize(
@@ -133,6 +132,21 @@ def ask(servo, wire, time_ns=0):
 )
 def test_answers_byte_by_byte(protocol, request_hex, answer_hex):
     assert ask(machine(protocol=protocol), bytes.fromhex(request_hex)) == (answer_hex and bytes.fromhex(answer_hex))
+
+
+@pytest.mark.parametrize("data", [b"\xa6\0\0\0", b"\xff\xff\xfd\0"])
+def test_fast_reads_are_answered_in_one_status_that_is_not_stuffed(data):
+    """LEN is 1 + 4 + 4: instruction; error, id and CRC; the data (e-manual, protocol2, fast sync read)."""
+    servo = machine()
+    servo.axis.change(0, mode="off")
+    servo._measure = lambda _: servo.memory.data.__setitem__(slice(132, 136), data)
+    body = bytes.fromhex("ff ff fd 00 fe 09 00 55 00 01") + data
+    expected = body + crc16(body).to_bytes(2, "little")
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 01"))) == expected
+    assert ask(servo, packet_2(254, 0x9A, bytes.fromhex("01 84 00 04 00"))) == expected
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 02"))) is None
+    assert ask(servo, packet_2(254, 0x8A, bytes.fromhex("84 00 04 00 02 01"))) is None  # it waits for servo 2 for ever
+    assert ask(servo, packet_2(1, 0x8A, bytes.fromhex("84 00 04 00 01")))[8] == 2  # no broadcast: unknown
 
 
 @pytest.mark.parametrize(
@@ -214,6 +228,8 @@ def test_rustypot_drives_the_mx_64_and_the_xm430():
     with ServoTwin("XM430-W350") as twin:
         second = rustypot.Xl430PyController(twin.port, 57600, 0.2)
         assert second.ping(1)
+        assert second.sync_read_present_position([1]) == [2048]
+        second.set_fast_sync_read(True)
         assert second.sync_read_present_position([1]) == [2048]
         second.write_torque_enable(1, True)
         second.sync_write_goal_position([1], [2400])
@@ -354,12 +370,14 @@ def test_opening_sets_what_it_relies_on_and_says_so():
             assert (servo.id, servo.baud) == (42, 115200)
             notes = " ".join(servo.warnings())
             assert (
-                "register 20 was -500" in notes and "register 10 was 1" in notes and "return delay was 500 us" in notes
+                "homing_offset (register 20) was -500" in notes
+                and "drive_mode (register 10) was 1" in notes
+                and "return_delay_time (register 9) was 250 (500 us)" in notes
             )
             assert (memory[20], memory[68], memory[10], memory[9]) == (0, 2, 0, 0)
         with open_servo(twin.port, servo_id=42) as servo:
             assert servo.warnings() == ()
-        with pytest.raises(DeviceError, match="servo 42 is a XM430-W350, not a MX-64R"):
+        with pytest.raises(DeviceError, match="the model of servo 42 is XM430-W350, not MX-64R"):
             open_servo(twin.port, "MX-64R")
 
 
@@ -367,7 +385,9 @@ def test_a_locked_memory_is_said():
     with ServoTwin("MX-64R") as twin:
         twin.memory[47] = 1
         with open_servo(twin.port) as servo:
-            assert any("return delay is 500 us and cannot be set to 0" in note for note in servo.warnings())
+            assert any(
+                "return_delay_time (register 5) is 500 us and cannot be set to 0" in note for note in servo.warnings()
+            )
             servo.sweep_to(0.1, 1.0)
             with pytest.raises(DeviceError, match=r"refused|memory is locked"):
                 servo.spin(1.0)
@@ -378,7 +398,7 @@ def test_the_latency_timer_is_looked_at(tmp_path, monkeypatch):
         adapter = tmp_path / Path(twin.port).resolve().name
         adapter.mkdir()
         (adapter / "latency_timer").write_text("16\n")
-        monkeypatch.setattr(bus, "_ADAPTERS", tmp_path)
+        monkeypatch.setattr(serial_port, "_ADAPTERS", tmp_path)
         with open_servo(twin.port) as servo:
             assert any("gathers bytes for 16 ms" in note and "udev" in note for note in servo.warnings())
 

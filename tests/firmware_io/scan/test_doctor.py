@@ -1,0 +1,227 @@
+"""The doctor on the twins: it reads and nothing else; what `--fix` sets is named, kept, and set back."""
+
+import fcntl
+import json
+import os
+import re
+import termios
+import threading
+import tty
+from types import SimpleNamespace
+
+import pytest
+
+from firmware_io import device_ports, serial_port
+from firmware_io.servo.dynamixel.registers import TABLES
+from firmware_io.twins import servo as servo_twin
+from firmware_io.twins.servo import ServoTwin
+from firmware_io.twins.servo_packets import take
+
+PING, READ, WRITE = 1, 2, 3
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_plugged_in(monkeypatch, tmp_path):
+    monkeypatch.setattr(device_ports.list_ports, "comports", lambda: [])
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def heard(monkeypatch):
+    """All bytes that the twin of a servo gets, in the order in which they come."""
+    said, read = bytearray(), servo_twin.os.read
+
+    def listening(fd, size):
+        data = read(fd, size)
+        if size == 4096:
+            said.extend(data)
+        return data
+
+    monkeypatch.setattr(servo_twin, "os", SimpleNamespace(**{**vars(servo_twin.os), "read": listening}))
+    return said
+
+
+def instructions(said, protocol):
+    """The instructions in a stream, and the bytes that belong to no packet of either protocol."""
+    buffer, found = bytearray(said), []
+    while request := take(buffer, protocol):
+        found.append(request.instruction)
+    return found
+
+
+def spoil(twin):
+    """Everything that the driver would set is otherwise; in counts, by address."""
+    two = twin.memory[0] in (311, 1020)
+    for address, count in ({10: 1, 20: -500, 9: 200} if two else {20: 500, 22: 2, 5: 200}).items():
+        twin.memory[address] = count
+
+
+def kept(twin):
+    """The settings of a twin that outlast its power."""
+    return bytes(twin.memory.data[: 64 if twin.memory[0] in (311, 1020) else 24])
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("MX-64R", 1.0), ("XM430-W350", 2.0), ("AX-12A", 1.0)])
+def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, heard, command):
+    with ServoTwin(model, protocol) as twin:
+        if model != "AX-12A":
+            spoil(twin)
+        twin.memory[24 if protocol == 1.0 else 64] = 1  # somebody's arm hangs on it
+        before = bytes(twin.memory.data)
+        code, said, _ = command("doctor", "--servo", twin.port)
+        assert bytes(twin.memory.data[: len(kept(twin)) + 2]) == before[: len(kept(twin)) + 2]
+        assert twin.memory[24 if protocol == 1.0 else 64] == 1
+    assert set(instructions(heard, 1.0)) | set(instructions(heard, 2.0)) <= {PING, READ}
+    assert READ in instructions(heard, protocol)
+    assert "has its torque on" in said
+    assert code == 1  # there is no lidar
+    if model != "AX-12A":
+        assert f"return_delay_time (register {5 if protocol == 1.0 else 9}) is 200, so that its answers come" in said
+        assert "`scanwright doctor --fix --servo" in said
+
+
+def test_a_servo_that_answers_only_pings_is_not_told_to(heard, command):
+    with ServoTwin("MX-64R") as twin:
+        twin.memory[16] = 0
+        _, said, _ = command("doctor", "--servo", twin.port)
+        assert twin.memory[16] == 0
+    assert set(instructions(heard, 1.0)) | set(instructions(heard, 2.0)) <= {PING, READ}
+    assert "servo 1 answers pings only: its status_return_level (register 16) is 0; `scanwright doctor --fix" in said
+
+
+def test_where_something_speaks_first_nothing_is_said(command):
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    done = threading.Event()
+
+    def speak():
+        while not done.wait(0.01):
+            os.write(master, b"$GPGGA,")
+
+    speaker = threading.Thread(target=speak)
+    speaker.start()
+    try:
+        _, said, _ = command("doctor", "--servo", os.ttyname(slave))
+    finally:
+        done.set()
+        speaker.join()
+    with pytest.raises(BlockingIOError):  # nothing has come
+        os.read(master, 1)
+    os.close(master)
+    os.close(slave)
+    assert "bytes came unasked" in said and "nothing was sent" in said
+
+
+@pytest.mark.parametrize(("model", "protocol"), [("MX-64R", 1.0), ("XM430-W350", 2.0)])
+def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path):
+    with ServoTwin(model, protocol) as twin:
+        spoil(twin)
+        before = kept(twin)
+        code, said, _ = command("doctor", "--fix", "--servo", twin.port)
+        (file,) = tmp_path.glob("servo-*.json")
+        assert kept(twin) != before
+        assert f"`scanwright doctor --restore {file.name}`" in said
+        for setting in json.loads(file.read_text())["settings"]:
+            name = rf"{setting['register']} \(register \d+\)"
+            assert re.search(rf"servo 1: {name}: {setting['before']} -> {setting['after']}$", said, re.MULTILINE)
+        assert "--fix` sets it" not in said  # the examination after it finds nothing
+        if protocol == 2.0:
+            assert "protocol 2.0 at 1000000 baud" in said
+        code, said, _ = command("doctor", "--restore", file)
+        assert code == 0
+        assert kept(twin) == before
+    assert "return_delay_time" in said and "0 -> 200" in said
+
+
+def test_what_is_already_right_is_not_written(command, tmp_path, heard):
+    with ServoTwin("MX-64R") as twin:
+        twin.memory[5] = 0
+        _, said, _ = command("doctor", "--fix", "--servo", twin.port)
+    assert "every setting is as it should be" in said
+    assert not list(tmp_path.glob("servo-*"))
+    assert WRITE not in instructions(heard, 1.0)
+
+
+@pytest.mark.parametrize("protocol", [1.0, 2.0])
+def test_a_mute_servo_is_unmuted_by_a_fix_and_mute_again_after_the_restore(protocol, command, tmp_path):
+    level = 16 if protocol == 1.0 else 68
+    with ServoTwin("MX-64R", protocol) as twin:
+        twin.memory[level] = 0
+        _, said, _ = command("doctor", "--fix", "--servo", twin.port)
+        assert twin.memory[level] == 2
+        assert f"status_return_level (register {level}): 0 -> 2" in said
+        (file,) = tmp_path.glob("servo-*.json")
+        code, said, _ = command("doctor", "--restore", file)
+        assert (code, twin.memory[level]) == (0, 0)
+        assert "2 -> 0; it was not read back" in said
+
+
+def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monkeypatch):
+    with ServoTwin("MX-64R") as twin:
+        twin.memory[24] = 1
+        before = bytes(twin.memory.data[:36])
+        code, said, _ = command("doctor", "--fix", "--servo", twin.port)
+        assert bytes(twin.memory.data[:36]) == before
+        assert code == 1 and "has its torque on, and holds or turns something" in said
+        plugged = [SimpleNamespace(device=twin.port, vid=0x0403, pid=0x6014)]
+        monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
+        twin.memory[24] = 0
+        code, said, _ = command("doctor", "--fix")
+        assert bytes(twin.memory.data[:24]) == before[:24]
+        assert code == 1 and "--fix writes, so it does not guess: name the servo's port" in said
+    assert not list(tmp_path.glob("servo-*"))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"settings": [{"register": "id", "before": 3, "after": 1}]}, "has no setting id = 3"),
+        ({"settings": [{"register": "baud_rate", "before": 300, "after": 1}]}, "has no setting baud_rate = 300"),
+        ({"model": "MX-65"}, "has no setting"),
+        ({"settings": []}, "settings"),
+        ({"schema": "else"}, "schema"),
+    ],
+)
+def test_a_file_of_settings_that_is_none_changes_nothing(change, says, command, tmp_path):
+    right = {"schema": "scanwright/servo-settings/1", "port": "/dev/null", "model": "MX-64R", "protocol": 1.0, "id": 1}
+    right["settings"] = [{"register": "baud_rate", "before": 34, "after": 1}]
+    file = tmp_path / "servo.json"
+    file.write_text(json.dumps(right | change))
+    code, said, _ = command("doctor", "--restore", file)
+    assert code == 1
+    assert str(file) in said and says in said
+    assert len(said.splitlines()) == 1
+
+
+def test_only_ports_whose_usb_ids_are_in_the_catalogue_are_looked_at(monkeypatch):
+    """A lone board on a common USB chip is no servo; the adapters of the makers are, and so are Hokuyo's sensors."""
+    ids = {"u2d2": (0x0403, 0x6014), "usb2ax": (0x16D0, 0x06A7), "ch340": (0x1A86, 0x7523), "cp210x": (0x10C4, 0xEA60)}
+    ids |= {"hokuyo": (0x15D1, 0x0000), "other": (0x0403, 0x6010), "board": (None, None)}
+    plugged = [SimpleNamespace(device=name, vid=vid, pid=pid) for name, (vid, pid) in ids.items()]
+    monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
+    assert device_ports.servo_ports() == ["u2d2", "usb2ax"]
+    assert device_ports.lidar_ports() == ["hokuyo"]
+
+
+def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
+    """A pseudo-terminal has no such lines, so what is asked of the system is looked at."""
+    asked, ioctl = [], fcntl.ioctl
+
+    def listening(fd, request, *rest):
+        asked.append(request)
+        return ioctl(fd, request, *rest)
+
+    monkeypatch.setattr("serial.serialposix.fcntl.ioctl", listening)
+    with ServoTwin("MX-64R") as twin:
+        serial_port.open_serial_port(twin.port, 57600).close()
+    assert not set(asked) & {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET}
+
+
+def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
+    from firmware_io.servo.dynamixel.setup import settable
+
+    for table in TABLES:
+        names = settable(table)
+        assert "" not in names
+        assert {register for register, _ in (*table.neutral, table.fast)} < set(names.values())
