@@ -23,7 +23,7 @@ from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.deck_holes import DeckHoles
 from design.errors import TaskError
 from design.motion import Motion, Shortest, Spin, Sweep
-from design.record import Record
+from design.record import Record, read_npy
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
 from design.task.named_record import named_record, names_in, valid_record
@@ -45,6 +45,8 @@ SHIPPED = Path(__file__).parent / "shipped"
 
 Angle = Number | Span
 """One value fixes the angle; two are the range to search, in degrees."""
+
+_MOST_PIXELS = 1 << 25  # of a map's picture: 0.04 deg a pixel
 
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
 
@@ -297,7 +299,9 @@ def _table(region: MapRegion | MeshRegion, folder: Path) -> Array:
 def _read_map(path: Path) -> Array:
     try:
         table = _map_table(path)
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
+    except TaskError:
+        raise
+    except Exception as error:  # pictures that are damaged fail in a dozen ways
         raise TaskError(f"{path}: cannot read the map: {error}") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
         raise TaskError(f"{path}: a map is one table of real numbers")
@@ -310,14 +314,17 @@ def _read_map(path: Path) -> Array:
 
 def _map_table(path: Path) -> Any:
     if path.suffix == ".npy":
-        with path.open("rb") as file:  # an archive of tables would keep it open
-            return np.load(file, allow_pickle=False)
+        return read_npy(path, TaskError)
     if path.suffix == ".csv":
         text = path.read_text(encoding="utf-8")
         return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
     if path.suffix == ".png":
         from matplotlib.image import imread
+        from PIL import Image
 
+        with Image.open(path) as picture_file:
+            if (pixels := picture_file.width * picture_file.height) > _MOST_PIXELS:
+                raise TaskError(f"{path}: a map of {pixels:,} pixels: at most {_MOST_PIXELS:,}")
         picture = imread(path)  # 0..1 already, (rows, columns[, channels])
         return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
     raise TaskError(f"{path}: a map is a .png, .csv or .npy file")

@@ -12,6 +12,10 @@ from scanwright.cli.console import AsJson, group, say, show, show_json
 
 app = group()
 
+Organised = Annotated[
+    bool, typer.Option("--organised", help="Keep a row for every beam of every scan, NaN where there is no point.")
+]
+
 
 class AngleUnit(Enum):
     """Unit of an angle in somebody's recording."""
@@ -63,9 +67,7 @@ def assemble(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
     angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.ply", help="Cloud to write.")],
-    flat: Annotated[
-        bool, typer.Option("--flat", help="Only points that exist; default keeps beam i in column i.")
-    ] = False,
+    organised: Organised = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
     per: Annotated[
         Per, typer.Option(help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ...")
@@ -97,7 +99,7 @@ def assemble(
         recording,
         angles,
         out,
-        flat=flat,
+        organised=organised,
         lag_s=lag_s,
         per=per.value,
         poses=poses,
@@ -160,6 +162,7 @@ def register(
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read, or a recording (.mcap).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
+    organised: Organised = False,
 ) -> None:
     """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
 
@@ -167,4 +170,4 @@ def convert(
     """
     from firmware_io.recording.convert import convert
 
-    show(convert(source, target))
+    show(convert(source, target, organised=organised))
