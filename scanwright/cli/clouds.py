@@ -50,15 +50,18 @@ def import_(
 
 @app.command()
 def repair(
-    recording: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that was cut off.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Recording that was cut off or damaged; it stays as it is.")
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE.mcap", help="Write there and leave FILE as it is.")
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write; FILE.repaired.mcap if not given."),
     ] = None,
 ) -> None:
-    """Close a recording that was cut off by a crash, a full disk or a pulled plug: all that is whole is kept."""
-    from firmware_io.recording.repair import repair
+    """Save every whole message of a recording that was cut off or damaged, into another file."""
+    from firmware_io.recording.repair.repair import repair, repaired_place
 
-    target = out or recording
+    target = out or repaired_place(recording)
     show(repair(recording, target).lines(recording, target))
 
 
