@@ -34,6 +34,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
+    except RecursionError as error:
+        raise TaskError(f"{path}: not a TOML file: nested too deeply") from error
     except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
         raise TaskError(f"{path}: not a TOML file: {error}") from error
 

@@ -35,6 +35,7 @@ Per = Literal["recording", "turn", "half"]
 COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
 """What a cloud can tell of each point beside x y z."""
 _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
+_LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
@@ -168,8 +169,8 @@ def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dt
 def _check(out: Path, lag_s: float, columns: list[str]) -> None:
     if out.suffix != ".ply":
         raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")
-    if not np.isfinite(lag_s):
-        raise RecordingError(f"lag {lag_s} s: not a finite number")
+    if not abs(lag_s) <= _LONGEST_LAG_S:
+        raise RecordingError(f"lag {lag_s} s: a number from {-_LONGEST_LAG_S:g} to {_LONGEST_LAG_S:g}")
     for name in columns:
         if name not in COLUMNS:
             raise RecordingError(f"column '{name}': not one of a cloud{suggest(name, COLUMNS)}")

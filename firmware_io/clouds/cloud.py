@@ -25,6 +25,7 @@ COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring":
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
 _EVER_NS = 2**63
+_FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +53,10 @@ class Cloud:
         n = len(self.points_m) if self.points_m.ndim else 0
         if self.points_m.shape != (n, 3) or self.points_m.dtype.kind != "f":
             raise RecordingError(f"points of shape {self.points_m.shape}, {self.points_m.dtype}: (n, 3), float")
+        far = np.isfinite(self.points_m) & (np.abs(self.points_m) > _FARTHEST_M)
+        if far.any():
+            row = int(np.argmax(far.any(axis=1)))
+            raise RecordingError(f"row {row + 1}: a point at {self.points_m[row]} m: at most {_FARTHEST_M:g} from 0")
         for name, column in self.columns.items():
             if column.shape != (n,) or column.dtype.kind not in "iufb":
                 raise RecordingError(f"column {name}: shape {column.shape}, {column.dtype}: {n} numbers")

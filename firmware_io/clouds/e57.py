@@ -57,11 +57,23 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with whole_file(path, RecordingError) as part, pye57.E57(str(part), mode="w") as e57:
+    with whole_file(path, RecordingError) as part:
+        foreign(f"{path}: cannot write", _write_scans, part, clouds, path.stem)
+    return []
+
+
+def _write_scans(part: Path, clouds: Sequence[Cloud], name: str) -> None:
+    e57 = pye57.E57(str(part), mode="w")
+    try:
         e57.image_file.extensionsAdd(_PREFIX, _URI)
         for number, cloud in enumerate(clouds, 1):
-            _write_scan(e57, cloud, f"{path.stem} {number}")
-    return []
+            _write_scan(e57, cloud, f"{name} {number}")
+        e57.close()
+    except BaseException:
+        e57.image_file.cancel()
+        raise
+    finally:
+        del e57.image_file  # its destructor would close it once more, and complain where the disk is full
 
 
 def _read_scan(e57: pye57.E57, number: int) -> Cloud:

@@ -92,7 +92,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     for name, column in columns.items():
         las[_OWN_FIELD.get(name, name)] = column
     with whole_file(path, RecordingError) as part, part.open("wb") as stream:
-        las.write(stream, do_compress=path.suffix.lower() == ".laz")
+        foreign(f"{path}: cannot write", las.write, stream, do_compress=path.suffix.lower() == ".laz")
     return said
 
 

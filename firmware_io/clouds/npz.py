@@ -20,7 +20,13 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     if missing := {"points_m", "shape", "T_world_cloud"} - set(held):
         raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of ours")
     columns = {name.removeprefix(_COLUMN): array for name, array in held.items() if name.startswith(_COLUMN)}
-    points_m, shape = held["points_m"], held["shape"]
+    points_m, shape, T = held["points_m"], held["shape"], held["T_world_cloud"]
+    for name, array, wanted in (
+        ("points_m", points_m, (len(points_m), 3) if points_m.ndim else ()),
+        ("T_world_cloud", T, (4, 4)),
+    ):
+        if array.shape != wanted or not wanted or array.dtype not in (np.float32, np.float64):
+            raise RecordingError(f"{path}: {name}: shape {array.shape}, {array.dtype}: {wanted or '(n, 3)'}, float")
     if shape.shape != (2,) or shape.dtype.kind not in "iu" or int(shape[0]) * int(shape[1]) != len(points_m):
         raise RecordingError(
             f"{path}: shape = {str(shape.tolist())[:80]}: two whole numbers, {len(points_m)} rows in all"
@@ -30,7 +36,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(f"{path}: start_ns = {str(start.tolist())[:80]}: one whole number")
     height, width = (int(count) for count in shape)
     start_ns = None if start is None else int(start)
-    return [Cloud(points_m, columns, (height, width), held["T_world_cloud"], start_ns)], []
+    return [Cloud(points_m, columns, (height, width), T, start_ns)], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

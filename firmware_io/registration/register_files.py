@@ -104,6 +104,12 @@ def register_files(
         said += lines
     if len(clouds) < 2:
         raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
+    for k, cloud in enumerate(clouds):
+        for i in range(k):
+            if np.array_equal(cloud.points_m, clouds[i].points_m, equal_nan=True):
+                raise RecordingError(
+                    f"{names[k]}: the very points of {names[i]}; a cloud tells nothing of its own place"
+                )
     if len(set(names)) < len(names):
         names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
     if start is not None:
