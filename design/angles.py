@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -38,15 +38,19 @@ def standard_settings() -> dict[str, Setting]:
     return {name: np.radians(angles) for name, angles in STANDARD_DEG.items()}
 
 
+Degrees = Annotated[float, Field(ge=-360, le=360)]
+Millimetres = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
 class Angles(Record):
     """The six angles of the paper in degrees; the two gammas are 0 by design."""
 
-    alpha_rot: float
-    beta_rot: float
-    gamma_rot: float = 0.0
-    alpha_laser: float
-    beta_laser: float
-    gamma_laser: float = 0.0
+    alpha_rot: Degrees
+    beta_rot: Degrees
+    gamma_rot: Degrees = 0.0
+    alpha_laser: Degrees
+    beta_laser: Degrees
+    gamma_laser: Degrees = 0.0
 
 
 class AngleSet(Record):
@@ -57,9 +61,9 @@ class AngleSet(Record):
     task_sha256: str | None = None
     source: Literal["design", "calibration"] = "design"
     angles_deg: Angles
-    delta_rotvec_rot_deg: tuple[float, float] = (0.0, 0.0)
-    t_rot_laser_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    t_world_rot_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    delta_rotvec_rot_deg: tuple[Degrees, Degrees] = (0.0, 0.0)
+    t_rot_laser_mm: tuple[Millimetres, Millimetres, Millimetres] = (0.0, 0.0, 0.0)
+    t_world_rot_mm: tuple[Millimetres, Millimetres, Millimetres] = (0.0, 0.0, 0.0)
     sensor: str
     servo: str
     slip_ring: str | None = None
@@ -100,7 +104,7 @@ class AngleSet(Record):
 
 
 def load_angles(path: Path) -> AngleSet:
-    """Read `angles.json`.
+    """Read `angles.json`, as strictly as a task: text and true are no numbers, and the schema is named.
 
     Raises:
         TaskError: the file is missing, is not JSON, or is not an angle set.
@@ -110,9 +114,12 @@ def load_angles(path: Path) -> AngleSet:
     except (OSError, UnicodeDecodeError) as error:
         raise TaskError(f"{path}: cannot read the angle set: {_reason(error)}") from error
     try:
-        return AngleSet.model_validate_json(text)
+        found = AngleSet.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise TaskError(explain(error, path, AngleSet)) from error
+    if "schema_id" not in found.model_fields_set:
+        raise TaskError(f'{path}: schema: this key is required: "scanwright/angles/1"')
+    return found
 
 
 def _reason(error: OSError | UnicodeDecodeError) -> str:

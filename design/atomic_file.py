@@ -16,10 +16,13 @@ def check_place(path: Path, refusal: type[ScanwrightError]) -> None:
     Raises:
         ScanwrightError: a `refusal`: this is a folder, or there is no such folder.
     """
-    if path.is_dir():
-        raise refusal(f"{path}: this is a folder; name a file in it")
-    if not path.parent.is_dir():
-        raise refusal(f"{path}: the folder {path.parent} does not exist")
+    try:
+        if path.is_dir():
+            raise refusal(f"{path}: this is a folder; name a file in it")
+        if not path.parent.is_dir():
+            raise refusal(f"{path}: the folder {path.parent} does not exist")
+    except OSError as error:  # a name longer than names can be
+        raise refusal(f"{path}: cannot write: {error.strerror}") from error
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from design.arrays import Array
 from design.record import Record
@@ -46,7 +46,7 @@ class Sweep(Record):
     """From one limit to the other and back: accelerate, cruise, brake; both ways alike."""
 
     mode: Literal["sweep"] = "sweep"
-    limits_deg: tuple[float, float]
+    limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]]
     period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time out and back")
     profile: Literal["trapezoid"] = "trapezoid"
     accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="while it speeds up and brakes")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from design.errors import BuildError
+from design.record import read_npz
 
 AXIS_STEPS = 720  # equal steps of the axis angle, from 0, in [0, 2 pi)
 
@@ -49,17 +49,17 @@ def load_own_body(path: Path) -> tuple[Shadow, Float[ndarray, " beams"]]:
     Raises:
         BuildError: the file is missing, damaged, or its arrays do not fit each other.
     """
-    try:
-        if not zipfile.is_zipfile(path):  # NumPy would take it for a pickle
-            raise ValueError("damaged, or another file")
-        with np.load(path, allow_pickle=False) as arrays:
-            bearings_rad, beams = np.asarray(arrays["bearing_rad"], float), np.asarray(arrays["beams"], bool)
-            stator = np.asarray(arrays["stator"], bool) if "stator" in arrays else None
-        if bearings_rad.ndim != 1 or bearings_rad.size < 2 or not np.all(np.diff(bearings_rad) > 0):
-            raise ValueError(f"bearing_rad of shape {bearings_rad.shape}: two or more increasing bearings")
-        if beams.shape != bearings_rad.shape or (stator is not None and stator.shape[:-1] != beams.shape):
-            shapes = f"beams {beams.shape}, stator {None if stator is None else stator.shape}"
-            raise ValueError(f"{shapes}: one row for each of {bearings_rad.size} bearings")
-    except Exception as error:  # the reader of archives fails with a dozen types
-        raise BuildError(f"{path}: not as `scanwright build` writes it ({error}): build the folder again") from error
+    held = read_npz(path, BuildError)
+    bearings_rad, beams, stator = held.get("bearing_rad"), held.get("beams"), held.get("stator")
+    if bearings_rad is None or bearings_rad.dtype != float or bearings_rad.ndim != 1 or bearings_rad.size < 2:
+        raise BuildError(f"{path}: bearing_rad: two or more numbers: build the folder again")
+    if not (np.isfinite(bearings_rad).all() and np.all(np.diff(bearings_rad) > 0)):
+        raise BuildError(f"{path}: bearing_rad: finite and increasing: build the folder again")
+    count = bearings_rad.size
+    if beams is None or beams.dtype != bool or beams.shape != (count,):
+        found = "missing" if beams is None else f"shape {beams.shape}, {beams.dtype}"
+        raise BuildError(f"{path}: beams: {found}: ({count},) and bool: build the folder again")
+    if stator is not None and (stator.dtype != bool or stator.ndim != 2 or len(stator) != count):
+        found = f"shape {stator.shape}, {stator.dtype}"
+        raise BuildError(f"{path}: stator: {found}: ({count}, axis angles) and bool: build the folder again")
     return Shadow(beams, stator), bearings_rad

@@ -52,8 +52,10 @@ def emulated(out: Path) -> Ports | None:
     """Ports of the emulated scanner of this folder; None where nobody emulates it now."""
     try:
         found = Ports(**json.loads((out / _FILE).read_text(encoding="utf-8")))
+        if not (isinstance(found.lidar, str) and isinstance(found.servo, str)):
+            return None
         os.kill(found.pid, 0)
-    except (OSError, ValueError, TypeError):  # no file, one of another program, or its process is gone
+    except (OSError, ValueError, TypeError, OverflowError, RecursionError):  # none, another program's, or its is gone
         return None
     return found
 

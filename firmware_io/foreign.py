@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from design.errors import RecordingError
@@ -25,6 +27,21 @@ def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) 
         raise RecordingError(f"{what}: {error.strerror or _first_line(error)}") from error
     except Exception as error:
         raise RecordingError(f"{what}: {_first_line(error)}") from error
+
+
+@contextmanager
+def of_file(path: Path) -> Iterator[None]:
+    """Put the file's name before what a record says of its values, which knows of no file.
+
+    Raises:
+        RecordingError: as the body does.
+    """
+    try:
+        yield
+    except RecordingError as error:
+        if str(error).startswith(str(path)):
+            raise
+        raise RecordingError(f"{path}: {error}") from error
 
 
 def foreign_items(what: str, items: Iterable[T]) -> Iterator[T]:

@@ -6,6 +6,7 @@ sensor to the cloud: nothing here removes one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -14,6 +15,16 @@ from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
 from design.errors import RecordingError
+
+_TURNS_RAD = 1000.0
+_SCAN_BOUNDS = (
+    ("angle_min_rad", -_TURNS_RAD, _TURNS_RAD),
+    ("angle_increment_rad", -_TURNS_RAD, _TURNS_RAD),
+    ("time_increment_s", 0.0, 1.0),
+    ("range_min_m", -math.inf, math.inf),
+    ("range_max_m", -math.inf, math.inf),
+)
+_MOST_RAD = 1e9  # of a joint that counts turns: years of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,6 +41,9 @@ class Scan:
         range_max_m: longest range the sensor can mean.
         range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.
         intensity: shape (n,), or (0,) from a sensor that measures none.
+
+    Raises:
+        RecordingError: bearings, times between beams or limits of the range are no numbers of a lidar.
     """
 
     stamp_ns: int
@@ -41,6 +55,11 @@ class Scan:
     range_max_m: float
     range_m: Float32[ndarray, " n"]
     intensity: Float32[ndarray, " m"]
+
+    def __post_init__(self) -> None:
+        for name, low, high in _SCAN_BOUNDS:
+            if not low <= (value := getattr(self, name)) <= high:
+                raise RecordingError(f"scan: {name} = {value}: {low:g} to {high:g}")
 
     @property
     def bearing_rad(self) -> Float64[ndarray, " beams"]:
@@ -119,8 +138,8 @@ class JointLog:
     def __post_init__(self) -> None:
         if self.time_ns.shape != self.position_rad.shape or self.time_ns.ndim != 1 or not self.time_ns.size:
             raise RecordingError(f"joint log: {self.time_ns.size} times and {self.position_rad.size} positions")
-        if not np.isfinite(self.position_rad).all():
-            raise RecordingError("joint log: a position is not a finite number")
+        if not (np.abs(self.position_rad) <= _MOST_RAD).all():
+            raise RecordingError(f"joint log: a position is not a finite number, or beyond {_MOST_RAD:g} rad")
         if np.any(np.diff(self.time_ns) <= 0):
             where = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
             raise RecordingError(f"joint log: sample {where} is not later than the one before it")

@@ -372,7 +372,7 @@ def assemble(
     angles: AnglesLike,
     out: str | Path,
     *,
-    flat: bool = False,
+    organised: bool = False,
     lag_s: float = 0.0,
     per: Literal["recording", "turn", "half"] = "recording",
     poses: str | None = None,
@@ -388,7 +388,7 @@ def assemble(
         recording: `.mcap`.
         angles: angle set of the scanner that made it.
         out: cloud to write, `.ply`; `out_000.ply` and so on where there are several.
-        flat: only points that exist; else NaN rows keep beam i in column i.
+        organised: keep beam i of every scan in its row i, NaN where it became no point; else only points.
         lag_s: time by which the angle log is late.
         per: one cloud for the recording, or for each (half) turn.
         poses: where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).
@@ -408,12 +408,12 @@ def assemble(
     if camera is not None:
         from firmware_io.colour.paint import painter
 
-        paint = painter(_task(camera), recording, angle_set, trajectory, lag_s)
+        paint = painter(_task(camera), recording, angle_set, trajectory, lag_s, organised=organised)
     summary = assemble_recording(
         recording,
         angle_set,
         Path(out),
-        flat=flat,
+        organised=organised or paint is not None,  # neighbours tell how surfaces lie to the camera
         lag_s=lag_s,
         per=per,
         poses=trajectory,
@@ -421,8 +421,11 @@ def assemble(
         smooth=smooth,
         columns=columns,
     )
-    painted = () if paint is None else tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
-    return replace(summary, said=(*summary.said, *painted))
+    if paint is None:
+        return summary
+    painted = tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
+    summary = replace(summary, said=(*summary.said, *painted))
+    return summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
 
 
 def calibrate(
@@ -501,19 +504,23 @@ def read_cloud(path: str | Path) -> Cloud:
     return clouds[0]
 
 
-def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any]) -> list[str]:
+def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organised: bool = False) -> list[str]:
     """Write a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
+
+    Rows without a point are left out, unless the cloud is organised and the format says what its rows and columns are
+    (PCD, E57, NPZ).
 
     Args:
         path: the file.
         cloud: a cloud, or the points [m] of one, shape (n, 3).
+        organised: keep the rows and columns of an organised cloud in PLY and XYZ too, in comments.
 
     Returns:
         What the format cannot hold, one sentence each.
 
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
-        RecordingError: the format is not known, or the file cannot be written.
+        RecordingError: the format is not known or cannot hold this, or the file cannot be written.
     """
-    record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud))
-    return write_clouds(Path(path), [record])[1]
+    record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
+    return list(write_clouds(Path(path), [record], organised=organised).said)

@@ -28,7 +28,7 @@ from threading import Event, Timer
 from design.angles import AngleSet
 from design.errors import ScanwrightError
 from firmware_io.recording.recording import open_recording
-from firmware_io.recording.repair import repair
+from firmware_io.recording.repair.repair import repair
 from firmware_io.scan import acquire
 from firmware_io.scan.plan import plan_scan
 from firmware_io.twins.scanner import EmulatedScanner, emulated_scanner, room
@@ -128,7 +128,7 @@ def inside(out: Path, twins: EmulatedScanner, fault: Fault) -> Outcome:
             raise TooBusyError from error
         ended = type(error).__name__
     timer.join()
-    lost_s = max(hit[0][1] - repair(plan.recording, plan.recording).times_ns[1], 0) / 1e9
+    lost_s = max(hit[0][1] - repair(plan.recording).times_ns[1], 0) / 1e9
     if ended != "goes on":
         return Outcome(ended, stood[0], lost_s, float("nan"))
     stamps_ns = open_recording(plan.recording).stamp_ns
@@ -159,7 +159,7 @@ def outside(out: Path, twins: EmulatedScanner, number: int | None) -> Outcome:
         stands_s = stands_after_s(twins, time.monotonic() - (time.time_ns() - hit_ns) / 1e9)
         process.communicate()
     (recording,) = (out / "recordings").glob("*.mcap")
-    lost_s = max(hit_ns - repair(recording, recording).times_ns[1], 0) / 1e9
+    lost_s = max(hit_ns - repair(recording).times_ns[1], 0) / 1e9
     typed = "one line, exit 2" if process.returncode == 2 else f"exit {process.returncode}"
     return Outcome(typed, stands_s, lost_s, float("nan"))
 

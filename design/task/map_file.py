@@ -9,6 +9,9 @@ import numpy as np
 
 from design.arrays import Array
 from design.errors import TaskError
+from design.record import read_npy
+
+_MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg a pixel
 
 
 def read_map(path: Path) -> Array:
@@ -19,7 +22,9 @@ def read_map(path: Path) -> Array:
     """
     try:
         table = _map_table(path)
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
+    except TaskError:
+        raise
+    except Exception as error:  # pictures that are damaged fail in a dozen ways
         raise TaskError(f"{path}: cannot read the map: {error}") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
         raise TaskError(f"{path}: a map is one table of real numbers")
@@ -32,14 +37,17 @@ def read_map(path: Path) -> Array:
 
 def _map_table(path: Path) -> Any:
     if path.suffix == ".npy":
-        with path.open("rb") as file:  # an archive of tables would keep it open
-            return np.load(file, allow_pickle=False)
+        return read_npy(path, TaskError)
     if path.suffix == ".csv":
         text = path.read_text(encoding="utf-8")
         return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
     if path.suffix == ".png":
         from matplotlib.image import imread
+        from PIL import Image
 
+        with Image.open(path) as picture_file:
+            if (pixels := picture_file.width * picture_file.height) > _MOST_PIXELS:
+                raise TaskError(f"{path}: a map of {pixels:,} pixels: at most {_MOST_PIXELS:,}")
         picture = imread(path)  # 0..1 already, (rows, columns[, channels])
         return picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
     raise TaskError(f"{path}: a map is a .png, .csv or .npy file")

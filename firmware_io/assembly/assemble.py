@@ -26,6 +26,7 @@ from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.assembly.turns import turn_starts
+from firmware_io.clouds.cloud import COLUMN_TYPES
 from firmware_io.clouds.ply import PlyWriter
 from firmware_io.recording.recording import Recording, open_recording
 from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
@@ -34,6 +35,8 @@ Per = Literal["recording", "turn", "half"]
 COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
 """What a cloud can tell of each point beside x y z."""
 _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
+_LONGEST_LAG_S = 3600.0
+_RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
 
@@ -45,6 +48,7 @@ class AssembleSummary:
         out: the cloud, or the name that the clouds are numbered after.
         clouds: the files written.
         points: beams with a place in the world.
+        rows: of all files; `points` in flat clouds.
         beams: beams in the recording.
         width: rows of a cloud per scan; 0 in a flat cloud.
         height: scans.
@@ -56,6 +60,7 @@ class AssembleSummary:
     out: Path
     clouds: tuple[Path, ...]
     points: int
+    rows: int
     beams: int
     width: int
     height: int
@@ -65,12 +70,14 @@ class AssembleSummary:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        form = f"organised, {self.height:,} scans x {self.width:,} beams" if self.width else "flat"
+        rows = f"wrote {self.points:,} points of {self.beams:,} beams"
+        if self.width:
+            rows = f"wrote {self.rows:,} rows ({self.points:,} points, {self.width:,} rows a scan)"
         where = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
         return [
             *self.said,
             *(f"left out {count:,} beams: {reason.replace('_', ' ')}" for reason, count in self.left_out.items()),
-            f"wrote {self.points:,} points of {self.beams:,} beams ({form}) to {where}",
+            f"{rows} to {where}",
         ]
 
 
@@ -79,7 +86,7 @@ def assemble_recording(
     angles: AngleSet,
     out: Path,
     *,
-    flat: bool = False,
+    organised: bool = False,
     lag_s: float = 0.0,
     per: Per = "recording",
     poses: Trajectory | None = None,
@@ -93,7 +100,7 @@ def assemble_recording(
         recording: MCAP recording.
         angles: angle set of the scanner that made it.
         out: the cloud, `.ply`: x y z [m] and `columns`; `out_000.ply` and so on where there are several.
-        flat: leave out rows without a point; the organised form keeps them as NaN, `width` rows to a scan.
+        organised: keep beam i of every scan in its row i, `width` rows to a scan, NaN where it became no point.
         lag_s: how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
         per: a new cloud after each whole (half) turn since the first scan, and where the axis turns back; a scan
             belongs where its first beam does.
@@ -114,8 +121,11 @@ def assemble_recording(
         curve, said = straight(source.joint_log), "axis angle: straight between samples, as asked"
     cloud_from_rows = _cloud_of(source, per, round(lag_s * 1e9))
     fields = cloud_fields(source.has_intensity, columns)
-    width = 0 if flat else int(source.beams.max())
+    if source.beams.max() > _RINGS:
+        raise RecordingError(f"{recording}: a scan of {source.beams.max()} beams: a cloud numbers at most {_RINGS}")
+    width = int(source.beams.max()) if organised else 0
     counts: Counter[int] = Counter()
+    written = 0
     clouds: list[Path] = []
     for which, tagged in groupby(zip(cloud_from_rows.tolist(), source.scans(), strict=True), key=itemgetter(0)):
         path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
@@ -125,7 +135,7 @@ def assemble_recording(
             for block, placed in _placed(map(itemgetter(1), tagged), curve, angles, lag_s, poses, own_body, columns):
                 counts.update({verdict: int(np.sum(placed.verdict == verdict)) for verdict in Verdict})
                 rows = _rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
-                cloud.write(rows[placed.verdict == Verdict.POINT] if flat else rows)
+                cloud.write(rows if organised else rows[placed.verdict == Verdict.POINT])
             if not counts[Verdict.POINT] and which == cloud_from_rows[-1]:
                 reasons = ", ".join(f"{count} {reason}" for reason, count in _left_out(counts).items())
                 raise RecordingError(f"{recording}: none of the {source.beams.sum()} beams becomes a point: {reasons}")
@@ -133,11 +143,13 @@ def assemble_recording(
             path.unlink()
         else:
             clouds.append(path)
+            written += cloud.rows
     beams = int(source.beams.sum())
     return AssembleSummary(
         out=out,
         clouds=tuple(clouds),
         points=counts[Verdict.POINT],
+        rows=written,
         beams=beams,
         width=width,
         height=source.beams.size,
@@ -150,16 +162,15 @@ def assemble_recording(
 def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dtype[np.void]:
     """Columns of our clouds. A recording without intensities has no such column."""
     # joint_rad counts turns: after ten minutes float32 would be a hundredth of a degree coarse
-    kinds = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u4"}
     wanted = [name for name in COLUMNS if name in columns and (has_intensity or name != "intensity")]
-    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, kinds[name]) for name in wanted)])
+    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, COLUMN_TYPES[name]) for name in wanted)])
 
 
 def _check(out: Path, lag_s: float, columns: list[str]) -> None:
     if out.suffix != ".ply":
         raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")
-    if not np.isfinite(lag_s):
-        raise RecordingError(f"lag {lag_s} s: not a finite number")
+    if not abs(lag_s) <= _LONGEST_LAG_S:
+        raise RecordingError(f"lag {lag_s} s: a number from {-_LONGEST_LAG_S:g} to {_LONGEST_LAG_S:g}")
     for name in columns:
         if name not in COLUMNS:
             raise RecordingError(f"column '{name}': not one of a cloud{suggest(name, COLUMNS)}")

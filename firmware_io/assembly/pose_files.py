@@ -28,6 +28,8 @@ _COLUMNS = {
     "qz": {"qz", "q_z", "q_rs_z", "orientation_z"},
     "qw": {"qw", "q_w", "q_rs_w", "orientation_w"},
 }
+_EVER_NS = 2**63
+_TIME_DIGITS = 20  # a decimal may have a million more, and an int of it as many
 _SECONDS = {"t", "time", "time_s", "timestamp", "timestamp_s", "stamp"}
 _NANOSECONDS = {"time_ns", "timestamp_ns", "stamp_ns"}
 
@@ -113,7 +115,12 @@ def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
 def _row(path: Path, number: int, time: str, places: int, values: list[str]) -> _Row:
     try:
         # a float64 rounds the seconds of today to 256 ns
-        return int(Decimal(time).scaleb(places).to_integral_value()), [float(value) for value in values]
+        when = Decimal(time)
+        if not when.is_finite():
+            raise ValueError
+        if when.adjusted() > _TIME_DIGITS or abs(when.scaleb(places)) >= _EVER_NS:
+            raise RecordingError(f"{path}:{number}: time {time[:40]}: a number of nanoseconds below 2^63")
+        return int(when.scaleb(places).to_integral_value()), [float(value) for value in values]
     except (InvalidOperation, ValueError, OverflowError) as error:
         raise RecordingError(f"{path}:{number}: not a line of numbers: {time}, {', '.join(values)}") from error
 

@@ -20,6 +20,7 @@ from design.arrays import Floats, Pose, Times
 from design.errors import RecordingError
 
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
+_FARTHEST_M = 1e8  # from 0: maps of the Earth's coordinates are 6.4e6 m from its centre
 _EVER_NS = 2**62
 
 
@@ -68,6 +69,8 @@ class Trajectory:
         values = np.hstack([self.position_m, self.quaternion])
         if not np.isfinite(values).all():
             raise RecordingError(f"pose {int(np.argmin(np.isfinite(values).all(axis=1))) + 1}: not a finite number")
+        if (farthest_m := float(np.abs(self.position_m).max())) > _FARTHEST_M:
+            raise RecordingError(f"a position of {farthest_m:.3g} m: at most {_FARTHEST_M:g}")
         norm = np.linalg.norm(self.quaternion, axis=1)
         if np.any(np.abs(norm - 1) > _NORM_ERROR):
             worst = int(np.argmax(np.abs(norm - 1)))

@@ -8,19 +8,24 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float64
+from jaxtyping import Bool, Float, Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
 from design import frames
 from design.arrays import Pose
+from design.errors import RecordingError
 
 Column = NDArray[Any]
 
-COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u4"} | dict.fromkeys(
+COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u2"} | dict.fromkeys(
     ("red", "green", "blue", "alpha"), "|u1"
 )
 """What the columns of our own clouds hold. Others keep the type of their file."""
+_NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
+_ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
+_EVER_NS = 2**63
+_FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +38,9 @@ class Cloud:
         shape: rows and columns of an organised cloud, row by row; (1, n) of a flat one.
         T_world_cloud: where the cloud stands, shape (4, 4).
         start_ns: moment of `time_s` = 0 since 1970, where it is known.
+
+    Raises:
+        RecordingError: arrays do not fit each other, a column is no numbers, the pose is none, or the start is no time.
     """
 
     points_m: Float[ndarray, "n 3"]
@@ -42,11 +50,21 @@ class Cloud:
     start_ns: int | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.points_m)
-        if self.points_m.shape != (n, 3) or any(column.shape != (n,) for column in self.columns.values()):
-            raise ValueError("points are (n, 3) and columns (n,)")
-        if self.shape[0] * self.shape[1] != n:
+        n = len(self.points_m) if self.points_m.ndim else 0
+        if self.points_m.shape != (n, 3) or self.points_m.dtype.kind != "f":
+            raise RecordingError(f"points of shape {self.points_m.shape}, {self.points_m.dtype}: (n, 3), float")
+        far = np.isfinite(self.points_m) & (np.abs(self.points_m) > _FARTHEST_M)
+        if far.any():
+            row = int(np.argmax(far.any(axis=1)))
+            raise RecordingError(f"row {row + 1}: a point at {self.points_m[row]} m: at most {_FARTHEST_M:g} from 0")
+        for name, column in self.columns.items():
+            if column.shape != (n,) or column.dtype.kind not in "iufb":
+                raise RecordingError(f"column {name}: shape {column.shape}, {column.dtype}: {n} numbers")
+        if min(self.shape) < 0 or self.shape[0] * self.shape[1] != n:
             object.__setattr__(self, "shape", (1, n))
+        check_pose(self.T_world_cloud)
+        if self.start_ns is not None and not -_EVER_NS <= self.start_ns < _EVER_NS:
+            raise RecordingError(f"time_s 0 is {self.start_ns} ns: below {_EVER_NS}")
 
     @property
     def organised(self) -> bool:
@@ -54,9 +72,59 @@ class Cloud:
         return self.shape[0] > 1
 
     @property
+    def valid(self) -> Bool[ndarray, " n"]:
+        """Rows that are a point, shape (n,)."""
+        return np.isfinite(self.points_m).all(axis=1)
+
+    def flat(self) -> Cloud:
+        """The points alone: no row without one, no shape."""
+        valid = self.valid
+        if valid.all():
+            return Cloud(self.points_m, self.columns, (1, len(valid)), self.T_world_cloud, self.start_ns)
+        columns = {name: column[valid] for name, column in self.columns.items()}
+        points_m = self.points_m[valid]
+        return Cloud(points_m, columns, (1, len(points_m)), self.T_world_cloud, self.start_ns)
+
+    @property
     def placed(self) -> bool:
         """Whether the cloud has a pose of its own."""
         return not np.array_equal(self.T_world_cloud, np.eye(4))
+
+
+def check_pose(T: Pose) -> None:
+    """Refuse what is no pose.
+
+    Raises:
+        RecordingError: not (4, 4), not finite, not orthonormal, a mirror, or with another last row than 0 0 0 1.
+    """
+    if T.shape != (4, 4) or T.dtype.kind != "f" or not np.isfinite(T).all():
+        raise RecordingError(f"pose: shape {T.shape}, {T.dtype}: 4 x 4 finite numbers")
+    R = T[:3, :3]
+    off = float(np.abs(R @ R.T - np.eye(3)).max())
+    if off > _ORTHONORMAL_ERROR or np.linalg.det(R) < 0 or not np.array_equal(T[3], [0, 0, 0, 1]):
+        raise RecordingError(
+            f"pose: its rotation is off orthonormal by {off:.3g} at determinant {np.linalg.det(R):.3g}, its last row "
+            f"is {T[3]}: at most {_ORTHONORMAL_ERROR:g}, 1 and [0 0 0 1]"
+        )
+
+
+def held(values: Column, kind: np.dtype[Any] | str) -> Column:
+    """The values in another type.
+
+    Raises:
+        RecordingError: it cannot hold them; fractions of floats are rounded where the type is a float, nowhere else.
+    """
+    kind = np.dtype(kind)
+    with np.errstate(all="ignore"):
+        found = values.astype(kind)
+        if kind.kind == "f":
+            fits = np.isfinite(found) | ~np.isfinite(values) if values.dtype.kind == "f" else np.isfinite(found)
+        else:
+            # no type of whole numbers holds all of the others: compare on the wider one's ground
+            fits = (found == values) & ((found < 0) == (values < 0))
+    if not fits.all():
+        raise RecordingError(f"{values[np.argmin(fits)]} does not fit {kind.name}")
+    return found
 
 
 def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
@@ -73,8 +141,14 @@ def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
 
 
 def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
-    """The cloud of a structured array with x y z, and of what the lines of its header tell."""
+    """The cloud of a structured array with x y z, and of what the lines of its header tell.
+
+    Raises:
+        RecordingError: there is no x, y or z, or a line tells nonsense.
+    """
     names = rows.dtype.names or ()
+    if not {*"xyz"} <= set(names):
+        raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
     real = np.float32 if all(rows.dtype[axis].itemsize == 4 for axis in "xyz") else np.float64
     points_m: NDArray[np.floating] = np.stack([rows[axis] for axis in "xyz"], axis=1).astype(real)
     return told(Cloud(points_m, {name: np.array(rows[name]) for name in names if name not in "xyz"}), lines)
@@ -92,7 +166,11 @@ def headlines(cloud: Cloud) -> list[str]:
 
 
 def told(cloud: Cloud, lines: Iterable[str]) -> Cloud:
-    """The cloud with what `headlines` wrote."""
+    """The cloud with what `headlines` wrote.
+
+    Raises:
+        RecordingError: the pose is none, or the start is no time.
+    """
     shape, T, start_ns = list(cloud.shape), cloud.T_world_cloud, cloud.start_ns
     for line in lines:
         match line.split():
@@ -101,10 +179,17 @@ def told(cloud: Cloud, lines: Iterable[str]) -> Cloud:
             case ["height", count] if count.isdigit():
                 shape[0] = int(count)
             case ["pose", *numbers] if len(numbers) == 7:
-                T = pose_matrix([float(number) for number in numbers])
+                T = pose_matrix(_numbers(line, numbers))
             case ["time_s", "0", "is", count, "ns"] if re.fullmatch(r"-?\d+", count):
                 start_ns = int(count)
     return Cloud(cloud.points_m, cloud.columns, (shape[0], shape[1]), T, start_ns)
+
+
+def _numbers(line: str, words: Iterable[str]) -> list[float]:
+    try:
+        return [float(word) for word in words]
+    except ValueError as error:
+        raise RecordingError(f"'{line}': not numbers") from error
 
 
 def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
@@ -115,10 +200,19 @@ def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
 
 
 def pose_matrix(numbers: Iterable[float]) -> Pose:
-    """Inverse of `pose_numbers`; the quaternion may have any length but zero."""
+    """Inverse of `pose_numbers`.
+
+    Raises:
+        RecordingError: a number is not finite, or the quaternion is none.
+    """
     from scipy.spatial.transform import Rotation
 
     x, y, z, *quaternion = numbers
+    length = float(np.linalg.norm(quaternion))
+    if not np.isfinite([x, y, z, length]).all() or abs(length - 1) > _NORM_ERROR:
+        raise RecordingError(
+            f"pose at ({x:g}, {y:g}, {z:g}) with a quaternion of length {length:.4g}: finite, and of length 1"
+        )
     return frames.rigid(Rotation.from_quat(quaternion).as_matrix(), [x, y, z])
 
 

@@ -27,9 +27,12 @@ from firmware_io.clouds.cloud import (
     pose_numbers,
     told,
 )
-from firmware_io.foreign import foreign
+from firmware_io.clouds.cloud import held as fitting
+from firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
+_MOST_PACKED = 8  # points to a byte: three axes of a bit each, with nothing else
+_MOST_EMPTY = 100  # cells to a point: rows and columns that are emptier mean something else
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
 _COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
 _OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp", **_COLOURS}
@@ -43,20 +46,41 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     if not path.is_file():
         raise RecordingError(f"{path}: cannot read: No such file or directory")
     with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
-        return [foreign(f"{path}: scan {k}", _read_scan, e57, k) for k in range(e57.scan_count)], []
+        if not e57.scan_count:
+            raise RecordingError(f"{path}: no scan in it")
+        clouds = []
+        for k in range(e57.scan_count):
+            with of_file(path):
+                clouds.append(foreign(f"scan {k}", _read_scan, e57, k))
+        return clouds, []
 
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with whole_file(path, RecordingError) as part, pye57.E57(str(part), mode="w") as e57:
+    with whole_file(path, RecordingError) as part:
+        foreign(f"{path}: cannot write", _write_scans, part, clouds, path.stem)
+    return []
+
+
+def _write_scans(part: Path, clouds: Sequence[Cloud], name: str) -> None:
+    e57 = pye57.E57(str(part), mode="w")
+    try:
         e57.image_file.extensionsAdd(_PREFIX, _URI)
         for number, cloud in enumerate(clouds, 1):
-            _write_scan(e57, cloud, f"{path.stem} {number}")
-    return []
+            _write_scan(e57, cloud, f"{name} {number}")
+        e57.close()
+    except BaseException:
+        e57.image_file.cancel()
+        raise
+    finally:
+        del e57.image_file  # its destructor would close it once more, and complain where the disk is full
 
 
 def _read_scan(e57: pye57.E57, number: int) -> Cloud:
     header = e57.get_header(number)
+    size = Path(e57.path).stat().st_size
+    if not 0 < header.point_count <= _MOST_PACKED * size:
+        raise RecordingError(f"{header.point_count:,} points announced, {size:,} bytes there")
     held = _read_points(e57, header)
     if all(name in held for name in _AXES):
         points = np.stack([held.pop(name) for name in _AXES], axis=1)
@@ -75,7 +99,11 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
         if name not in _STRUCTURE
     }
     columns |= {name: colour_bytes(columns[name]) for name in _COLOURS if name in columns}
-    columns = {name: values.astype(COLUMN_TYPES.get(name, values.dtype)) for name, values in columns.items()}
+    for name, values in columns.items():
+        try:
+            columns[name] = fitting(values, COLUMN_TYPES.get(name, values.dtype))
+        except RecordingError as error:
+            raise RecordingError(f"column {name}: {error}") from error
     T = np.eye(4)
     if header.has_pose():
         w, x, y, z = header.rotation
@@ -91,7 +119,7 @@ def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
     row, column = row - row.min(), column - column.min()
     height, width = int(row.max()) + 1, int(column.max()) + 1
     cell = row * width + column
-    if len(np.unique(cell)) != len(cell):  # several returns to a cell
+    if len(np.unique(cell)) != len(cell) or height * width > _MOST_EMPTY * len(cell):  # several returns to a cell
         return cloud
     points = np.full((height * width, 3), np.nan, cloud.points_m.dtype)
     points[cell] = cloud.points_m

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from design.atomic_file import check_place
 from design.errors import RecordingError, require, suggest
 from firmware_io.clouds.cloud import Cloud
+from firmware_io.foreign import of_file
 
 _FORMATS = {  # suffix: module of this folder, and the packages of the extra `clouds` that it needs
     ".ply": ("ply",),
@@ -21,6 +23,8 @@ _FORMATS = {  # suffix: module of this folder, and the packages of the extra `cl
     ".npz": ("npz",),
     ".xyz": ("xyz",),
 }
+_SHAPED = {".pcd", ".e57", ".npz"}  # their own fields say what rows and columns are, or which rows are no points
+_POINTS_ONLY = {".las", ".laz"}
 
 
 def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
@@ -34,7 +38,9 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(f"{path}: this is a folder; name a cloud in it, a file")
     if path.suffix in (".mcap", ".bag", ".db3"):
         raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes the one of the other")
-    clouds: tuple[list[Cloud], list[str]] = _format(path).read(path)
+    module = _format(path)
+    with of_file(path):
+        clouds: tuple[list[Cloud], list[str]] = module.read(path)
     return clouds
 
 
@@ -49,19 +55,64 @@ def check_target(path: Path) -> None:
     check_place(path, RecordingError)
 
 
-def write_clouds(path: Path, clouds: Sequence[Cloud]) -> tuple[list[Path], list[str]]:
-    """Write clouds, each to a file of its own where the format holds one; the files, and what they do not hold.
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What became of clouds that were written.
+
+    Attributes:
+        paths: the files.
+        rows: in all of them.
+        said: what they do not hold, one sentence each.
+    """
+
+    paths: tuple[Path, ...]
+    rows: int
+    said: tuple[str, ...]
+
+
+def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False) -> Written:
+    """Write clouds, each to a file of its own where the format holds one.
+
+    Rows without a point are left out, unless the cloud is organised and the format says what its rows and columns are
+    (PCD, E57, NPZ): many readers of the others take NaN for a point at 0.
+
+    Args:
+        path: the file, or what several are numbered after.
+        clouds: with a point in each.
+        organised: keep the rows and columns of organised clouds in PLY and XYZ too, in comments.
 
     Raises:
         InstallError: the format needs a package that is not installed.
-        RecordingError: the format is not known, or the file cannot be written.
+        RecordingError: the format is not known or cannot hold this, or the file cannot be written.
     """
     module = _format(path)
-    if path.suffix.lower() == ".e57":
-        return [path], module.write(path, clouds)
+    suffix = path.suffix.lower()
+    if organised:
+        _check_organised(path, suffix, clouds)
+    said: list[str] = []
+    for number, cloud in enumerate(clouds):
+        if not cloud.valid.any():
+            raise RecordingError(f"{path}: none of the {len(cloud.points_m)} rows of cloud {number + 1} is a point")
+    formed = [cloud if cloud.organised and (organised or suffix in _SHAPED) else cloud.flat() for cloud in clouds]
+    rows = sum(len(cloud.points_m) for cloud in formed)
+    if lost := sum(len(cloud.points_m) for cloud in clouds) - rows:
+        said.append(f"left out {lost:,} rows without a point")
+    if suffix not in _SHAPED and not organised and any(cloud.organised for cloud in clouds):
+        shapes = ", ".join(f"{cloud.shape[0]} x {cloud.shape[1]}" for cloud in clouds if cloud.organised)
+        said.append(f"the shape {shapes} is lost (pcd, e57 and npz keep it)")
+    if suffix == ".e57":
+        return Written((path,), rows, (*said, *module.write(path, formed)))
     paths = [path] if len(clouds) == 1 else [path.with_stem(f"{path.stem}_{k}") for k in range(1, len(clouds) + 1)]
-    said = [module.write(one, cloud) for one, cloud in zip(paths, clouds, strict=True)]
-    return paths, list(dict.fromkeys(line for lines in said for line in lines))
+    for one, cloud in zip(paths, formed, strict=True):
+        said += module.write(one, cloud)
+    return Written(tuple(paths), rows, tuple(dict.fromkeys(said)))
+
+
+def _check_organised(path: Path, suffix: str, clouds: Sequence[Cloud]) -> None:
+    if suffix in _POINTS_ONLY:
+        raise RecordingError(f"{path}: LAS holds points, no rows and columns: organised clouds are ply pcd e57 npz xyz")
+    if not all(cloud.organised for cloud in clouds):
+        raise RecordingError(f"{path}: organised: the cloud is flat, nobody knows its rows and columns")
 
 
 def _format(path: Path) -> Any:

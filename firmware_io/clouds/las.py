@@ -1,4 +1,4 @@
-"""LAS and LAZ 1.4: points of a map in its world, whole numbers of a tenth of a millimetre.
+"""LAS and LAZ 1.4: points of a map in its world, whole numbers of a tenth of a millimetre (more beyond 200 km).
 
 The pose, the start of the times and the rows of an organised cloud stand in a record of our own (a VLR), which other
 software ignores: it sees the points where they belong, in the world.
@@ -10,6 +10,8 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
 
 from design import frames
 from design.atomic_file import whole_file
@@ -17,7 +19,9 @@ from design.errors import RecordingError
 from firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
 from firmware_io.foreign import foreign
 
-_STEP_M = 1e-4
+_STEPS_M = (1e-4, 1e-3, 1e-2)
+_MOST_STEPS = 2**31 - 1
+_PACKED = 1000  # times smaller than its points LAZ never gets
 _OURS = "scanwright"
 _EXACT = "intensity_exact"
 _OWN_FIELD = {"intensity": "intensity", "time_s": "gps_time"}
@@ -27,9 +31,8 @@ _HELD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file, in the frame of its scanner where the file tells it, else in the world."""
+    _check_header(path)
     las = foreign(f"{path}: not a LAS file", laspy.read, path)
-    if not len(las.points):
-        raise RecordingError(f"{path}: no point")
     lines = [
         line
         for vlr in las.header.vlrs
@@ -58,20 +61,17 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
-    """Write a cloud; lines about what the file does not hold."""
-    valid = np.isfinite(cloud.points_m).all(axis=1)
-    if not valid.any():
-        raise RecordingError(f"{path}: no row of the cloud is a point, and LAS holds nothing else")
-    world = frames.apply(cloud.T_world_cloud, cloud.points_m[valid].astype(float))
+    """Write a flat cloud; lines about what the file does not hold."""
+    world = frames.apply(cloud.T_world_cloud, cloud.points_m.astype(float))
     header = laspy.LasHeader(version="1.4", point_format=7 if "red" in cloud.columns else 6)
-    header.scales = np.full(3, _STEP_M)
+    step_m = _step_m(path, world)
+    header.scales = np.full(3, step_m)
     header.offsets = np.floor(world.min(axis=0))
-    lines = [line for line in headlines(cloud) if not line.startswith(("width", "height"))]
-    if lines:
+    if lines := headlines(cloud):
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
-    columns = {name: column[valid] for name, column in cloud.columns.items()}
+    columns = dict(cloud.columns)
     columns |= {name: columns[name].astype(np.uint16) * 257 for name in _COLOURS if name in columns}
-    said = ["LAS rounds coordinates to 0.1 mm"]
+    said = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
     if cloud.placed:
         said.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
     if "intensity" in columns and not _whole(columns["intensity"]):
@@ -80,10 +80,6 @@ def write(path: Path, cloud: Cloud) -> list[str]:
         said.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
     if "time_s" in columns:
         said.append("gps_time is seconds since the first beam, not the time of GPS")
-    if cloud.organised or not valid.all():
-        height, width = cloud.shape
-        shape = f"the shape {height} x {width} is lost, " if cloud.organised else ""
-        said.append(f"LAS holds points only: {shape}{np.count_nonzero(~valid):,} rows without a point are left out")
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams(name, column.dtype)
@@ -96,8 +92,32 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     for name, column in columns.items():
         las[_OWN_FIELD.get(name, name)] = column
     with whole_file(path, RecordingError) as part, part.open("wb") as stream:
-        las.write(stream, do_compress=path.suffix.lower() == ".laz")
+        foreign(f"{path}: cannot write", las.write, stream, do_compress=path.suffix.lower() == ".laz")
     return said
+
+
+def _check_header(path: Path) -> None:
+    """Refuse a header that promises what the file has no room for, or no coordinates."""
+    with foreign(f"{path}: not a LAS file", laspy.open, path) as reader:
+        header = reader.header
+        room = path.stat().st_size * (_PACKED if header.are_points_compressed else 1)
+        if not 0 < header.point_count * header.point_format.size <= room:
+            raise RecordingError(
+                f"{path}: {header.point_count:,} points announced, {path.stat().st_size:,} bytes there"
+            )
+        numbers = np.array([header.scales, header.offsets])
+        if not np.isfinite(numbers).all() or (header.scales <= 0).any():
+            raise RecordingError(f"{path}: scales {header.scales}, offsets {header.offsets}: finite, scales above 0")
+
+
+def _step_m(path: Path, world: Float64[ndarray, "n 3"]) -> float:
+    """The finest step at which 32 bits reach over all points."""
+    across_m = float(np.ptp(world, axis=0).max()) + 1
+    for step_m in _STEPS_M:
+        if across_m < step_m * _MOST_STEPS:
+            return step_m
+    most_km = _STEPS_M[-1] * _MOST_STEPS / 1000
+    raise RecordingError(f"{path}: the points are {across_m / 1000:.3g} km apart: LAS holds {most_km:,.0f} km")
 
 
 def _whole(intensity: Column) -> bool:

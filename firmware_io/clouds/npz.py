@@ -3,32 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
-from zipfile import is_zipfile
 
 import numpy as np
 
 from design.atomic_file import whole_file
 from design.errors import RecordingError
+from design.record import read_npz
 from firmware_io.clouds.cloud import Cloud
-from firmware_io.foreign import foreign
 
 _COLUMN = "column."
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file such as `write` makes."""
-    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
-        if not is_zipfile(stream):
-            raise RecordingError(f"{path}: not an archive of NumPy, or cut off")
-    with foreign(f"{path}: cannot read", np.load, path, allow_pickle=False) as archive:
-        missing = {"points_m", "shape", "T_world_cloud"} - set(archive)
-        if missing:
-            raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of ours")
-        held = {name: foreign(f"{path}: cannot read {name}", archive.__getitem__, name) for name in archive}
+    held = read_npz(path, RecordingError)
+    if missing := {"points_m", "shape", "T_world_cloud"} - set(held):
+        raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of ours")
     columns = {name.removeprefix(_COLUMN): array for name, array in held.items() if name.startswith(_COLUMN)}
-    height, width = (int(count) for count in held["shape"])
-    start_ns = int(held["start_ns"]) if "start_ns" in held else None
-    return [Cloud(held["points_m"], columns, (height, width), held["T_world_cloud"], start_ns)], []
+    points_m, shape, T = held["points_m"], held["shape"], held["T_world_cloud"]
+    for name, array, wanted in (
+        ("points_m", points_m, (len(points_m), 3) if points_m.ndim else ()),
+        ("T_world_cloud", T, (4, 4)),
+    ):
+        if array.shape != wanted or not wanted or array.dtype not in (np.float32, np.float64):
+            raise RecordingError(f"{path}: {name}: shape {array.shape}, {array.dtype}: {wanted or '(n, 3)'}, float")
+    if shape.shape != (2,) or shape.dtype.kind not in "iu" or int(shape[0]) * int(shape[1]) != len(points_m):
+        raise RecordingError(
+            f"{path}: shape = {str(shape.tolist())[:80]}: two whole numbers, {len(points_m)} rows in all"
+        )
+    start = held.get("start_ns")
+    if start is not None and (start.shape or start.dtype.kind not in "iu"):
+        raise RecordingError(f"{path}: start_ns = {str(start.tolist())[:80]}: one whole number")
+    height, width = (int(count) for count in shape)
+    start_ns = None if start is None else int(start)
+    return [Cloud(points_m, columns, (height, width), T, start_ns)], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,25 +12,84 @@ from numpy.lib import recfunctions
 from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, PointCloud
 
+from design.arrays import Pose
 from design.atomic_file import whole_file
 from design.errors import RecordingError
 from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
 from firmware_io.foreign import foreign
 
+_LONGEST_HEADER = 1 << 16
+_DIGITS = 16
+_MOST_PACKED = 100  # times smaller LZF never gets: 264 bytes in 3
+_AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
+
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file, whether ascii, binary or binary_compressed."""
-    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
-        data = stream.read()
+    data = foreign(f"{path}: cannot read", path.read_bytes)
+    header = _header(path, data)
     pcd = foreign(f"{path}: not a PCD file", PointCloud.from_fileobj, io.BufferedReader(io.BytesIO(data)))
     rows = pcd.pc_data
-    if not {"x", "y", "z"} <= set(rows.dtype.names or ()):
-        raise RecordingError(f"{path}: the fields are {' '.join(rows.dtype.names or ())}; a cloud has x y z")
-    x, y, z, w, i, j, k = pcd.metadata.viewpoint
-    comments = [line[1:].decode("ascii", "replace").strip() for line in data[:4096].splitlines() if line[:1] == b"#"]
-    cloud = cloud_from_rows(_unpacked(rows), comments)
-    shape = (pcd.metadata.height, pcd.metadata.width)
-    return [Cloud(cloud.points_m, cloud.columns, shape, pose_matrix([x, y, z, i, j, k, w]), cloud.start_ns)], []
+    if rows.shape != (header.shape[0] * header.shape[1],):
+        raise RecordingError(
+            f"{path}: {rows.size} rows, HEIGHT x WIDTH {header.shape[0]} x {header.shape[1]} announced"
+        )
+    cloud = cloud_from_rows(_unpacked(rows), header.comments)
+    return [Cloud(cloud.points_m, cloud.columns, header.shape, header.T_world_cloud, cloud.start_ns)], []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PcdHeader:
+    """What the header of a cloud says, checked against the file.
+
+    Attributes:
+        shape: HEIGHT and WIDTH.
+        T_world_cloud: VIEWPOINT.
+        comments: lines that begin with #.
+    """
+
+    shape: tuple[int, int]
+    T_world_cloud: Pose
+    comments: tuple[str, ...]
+
+
+def _header(path: Path, data: bytes) -> PcdHeader:
+    """Refuse a header that is none, or that promises more rows than the file has bytes for."""
+    end = re.search(rb"^DATA (ascii|binary|binary_compressed)\r?\n", data[:_LONGEST_HEADER], re.MULTILINE)
+    if end is None:
+        raise RecordingError(f"{path}: not a PCD file: no line DATA ascii, binary or binary_compressed")
+    lines = data[: end.start()].decode("ascii", "replace").splitlines()
+    told = {words[0]: words[1:] for line in lines if (words := line.split()) and not line.startswith("#")}
+    fields = told.get("FIELDS", [])
+    if len(set(fields)) != len(fields) or not {*"xyz"} <= set(fields):
+        raise RecordingError(f"{path}: the fields are {' '.join(fields)[:200]}; a cloud has x y z, each field once")
+    counts = told.setdefault("COUNT", ["1"] * len(fields))
+    for key in ("SIZE", "TYPE", "COUNT"):
+        if len(told.get(key, [])) != len(fields):
+            raise RecordingError(
+                f"{path}: {key} {' '.join(told.get(key, []))[:80]}: one for each of {len(fields)} fields"
+            )
+    size = sum(_whole(path, told, "SIZE", k) * _whole(path, told, "COUNT", k) for k in range(len(fields)))
+    rows, height, width = (_whole(path, told, key, 0) for key in ("POINTS", "HEIGHT", "WIDTH"))
+    room = (len(data) - end.end()) * (_MOST_PACKED if end[1] == b"binary_compressed" else 1)
+    if not 0 < rows == height * width or rows * (2 * sum(map(int, counts)) if end[1] == b"ascii" else size) > room + 1:
+        raise RecordingError(
+            f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {size} bytes each announced, "
+            f"{len(data) - end.end()} bytes there"
+        )
+    viewpoint = foreign(f"{path}: VIEWPOINT", lambda: [float(word) for word in told.get("VIEWPOINT", _AT_ORIGIN)])
+    if len(viewpoint) != 7:
+        raise RecordingError(f"{path}: VIEWPOINT of {len(viewpoint)} numbers: x y z qw qx qy qz")
+    x, y, z, w, i, j, k = viewpoint
+    comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
+    return PcdHeader((height, width), pose_matrix([x, y, z, i, j, k, w]), comments)
+
+
+def _whole(path: Path, told: dict[str, list[str]], key: str, place: int) -> int:
+    words = told.get(key, [])
+    if place >= len(words) or not words[place].isdecimal() or not 0 < len(words[place]) < _DIGITS:
+        raise RecordingError(f"{path}: {key} {' '.join(words)[:80]}: a whole number")
+    return int(words[place])
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

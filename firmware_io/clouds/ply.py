@@ -6,9 +6,10 @@ everything but integers of 64 bits.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from contextlib import ExitStack
-from itertools import takewhile
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -34,12 +35,16 @@ _WORDS = {
 }
 _TYPES = {word: code for code, word in _WORDS.items()}
 _DIGITS = 20
+_LONGEST_HEADER = 1 << 20
 
 
 class PlyWriter:
     """Writes rows as they come; use it in a `with` statement. The file appears only when that ends well.
 
     The header's number of rows is filled in at the end: nothing has to be known before, nothing is kept.
+
+    Attributes:
+        rows: written so far.
 
     Raises:
         RecordingError: the file cannot be written.
@@ -50,7 +55,7 @@ class PlyWriter:
         self._path = path
         self._fields = fields
         self._comments = [line for comment in comments for line in comment.splitlines()]
-        self._rows = 0
+        self.rows = 0
         self._stack = ExitStack()
 
     def __enter__(self) -> PlyWriter:
@@ -72,7 +77,7 @@ class PlyWriter:
         if rows.dtype != self._fields:
             raise ValueError(f"rows of {rows.dtype}, the file holds {self._fields}")
         self._stream.write(np.ascontiguousarray(rows).data)
-        self._rows += rows.size
+        self.rows += rows.size
 
     def _finish(
         self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
@@ -83,14 +88,14 @@ class PlyWriter:
 
     def _header(self) -> bytes:
         # A last comment gives back what the number takes, so that the header's length never changes.
-        filler = "-" * (_DIGITS - len(str(self._rows)))
+        filler = "-" * (_DIGITS - len(str(self.rows)))
         columns = [f"property {_WORDS[self._fields[name].str]} {name}" for name in self._fields.names or ()]
         lines = [
             "ply",
             "format binary_little_endian 1.0",
             *(f"comment {comment}" for comment in self._comments),
             f"comment {filler}",
-            f"element vertex {self._rows}",
+            f"element vertex {self.rows}",
             *columns,
             "end_header",
         ]
@@ -113,56 +118,87 @@ def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterab
         cloud.write(rows)
 
 
-def ply_comments(path: Path) -> list[str]:
-    """The comments in the header of a cloud that `read_ply` reads, without the filler."""
+@dataclass(frozen=True, slots=True)
+class PlyHeader:
+    """What the header of a cloud says, checked against the file.
+
+    Attributes:
+        fields: of a row; x y z among them, all floats.
+        rows: at least 1, and all there.
+        comments: without the filler.
+        start: where the rows begin.
+    """
+
+    fields: np.dtype[np.void]
+    rows: int
+    comments: tuple[str, ...]
+    start: int
+
+    @property
+    def width(self) -> int:
+        """Rows of a scan of an organised cloud, 0 of a flat one."""
+        told = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
+        width, height = int(told.get("width", 0)), int(told.get("height", 0))
+        return width if height > 1 and width * height == self.rows else 0
+
+
+def read_header(path: Path) -> PlyHeader:
+    """The header of a cloud such as `PlyWriter` writes.
+
+    Raises:
+        RecordingError: the file is missing, cut off, or another kind of PLY.
+    """
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
-        lines = iter(stream.readline, b"")
-        words = [line.decode("ascii", "replace").strip() for line in takewhile(_in_header, lines)]
-    comments = [line.removeprefix("comment ") for line in words if line.startswith("comment ")]
-    return [comment for comment in comments if comment.strip("-")]
-
-
-def _in_header(line: bytes) -> bool:
-    return line.strip() != b"end_header"
+        text = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
+    end = re.search(rb"^end_header\r?\n", text, re.MULTILINE)
+    lines = text[: end.start() if end else len(text)].decode("ascii", "replace").splitlines()
+    if not lines or lines[0].strip() != "ply":
+        raise RecordingError(f"{path}: not a PLY file")
+    fields: list[tuple[str, str]] = []
+    rows = -1
+    for line in lines[1:]:
+        match line.split():
+            case ["format", kind, *_] if kind != "binary_little_endian":
+                raise RecordingError(f"{path}: PLY format {kind}; only binary_little_endian is read")
+            case ["element", "vertex", number] if rows < 0 and number.isdecimal() and len(number) <= _DIGITS:
+                rows = int(number)
+            case ["property", word, name] if word in _TYPES and rows >= 0:
+                fields.append((name, _TYPES[word]))
+            case ["format" | "comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise RecordingError(f"{path}: not a cloud of scalar columns: '{line.strip()[:80]}' in the header")
+    if not end:
+        raise RecordingError(f"{path}: no 'end_header' in the first {len(text):,} bytes")
+    names = [name for name, _ in fields]
+    if twice := [name for k, name in enumerate(names) if name in names[:k]]:
+        raise RecordingError(f"{path}: property {twice[0]} stands twice in the header")
+    kinds = dict(fields)
+    if not all(kinds.get(axis, "") in ("<f4", "<f8") for axis in "xyz"):
+        raise RecordingError(f"{path}: the columns are {' '.join(names)[:200]}; a cloud has x y z, float or double")
+    layout = np.dtype(fields)
+    start, size = end.end(), path.stat().st_size
+    if rows < 1 or size < start + rows * layout.itemsize:
+        raise RecordingError(
+            f"{path}: {max(rows, 0)} rows of {layout.itemsize} bytes announced, {size - start} bytes there"
+        )
+    comments = [line.removeprefix("comment ") for line in lines if line.startswith("comment ")]
+    return PlyHeader(layout, rows, tuple(comment for comment in comments if comment.strip("-")), start)
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
     """Rows of a cloud such as `PlyWriter` writes, shape (n,), read only and mapped: columns are loaded when touched.
 
     Raises:
-        RecordingError: the file is missing, cut off, or another kind of PLY.
+        RecordingError: as for `read_header`.
     """
-    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
-        if stream.readline().strip() != b"ply":
-            raise RecordingError(f"{path}: not a PLY file")
-        fields: list[tuple[str, str]] = []
-        rows = -1
-        while (line := stream.readline()).strip() != b"end_header":
-            match line.decode("ascii", "replace").split():
-                case ["format", kind, *_] if kind != "binary_little_endian":
-                    raise RecordingError(f"{path}: PLY format {kind}; only binary_little_endian is read")
-                case ["element", "vertex", number] if rows < 0 and number.isdigit():
-                    rows = int(number)
-                case ["property", word, name] if word in _TYPES and rows >= 0:
-                    fields.append((name, _TYPES[word]))
-                case ["format" | "comment" | "obj_info", *_]:
-                    pass
-                case _:
-                    shown = line.decode("ascii", "replace").strip() or "end of file"
-                    raise RecordingError(f"{path}: not a cloud of scalar columns: '{shown}' in the header")
-        start = stream.tell()
-    layout = np.dtype(fields)
-    size = path.stat().st_size
-    if rows < 1 or size < start + rows * layout.itemsize:
-        raise RecordingError(
-            f"{path}: {max(rows, 0)} rows of {layout.itemsize} bytes announced, {size - start} bytes there"
-        )
-    return np.memmap(path, layout, "r", start, (rows,))
+    header = read_header(path)
+    return np.memmap(path, header.fields, "r", header.start, (header.rows,))
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file."""
-    return [cloud_from_rows(read_ply(path), ply_comments(path))], []
+    return [cloud_from_rows(read_ply(path), read_header(path).comments)], []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

@@ -8,10 +8,11 @@ import numpy as np
 
 from design.atomic_file import whole_file
 from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
+from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
 from firmware_io.foreign import foreign
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
+_TYPES = {"|i1", "|u1", *(f"<{kind}{size}" for kind in "iu" for size in (2, 4, 8)), *_DIGITS}
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
@@ -26,15 +27,23 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     count = values.shape[1]
     if count < 3:
         raise RecordingError(f"{path}: {count} numbers in a line; a cloud has x y z at least")
+    if not np.isfinite(values[:, :3]).any():
+        raise RecordingError(f"{path}: none of the {len(values)} lines is a point")
     named = [words for line in comments if len(words := line.lower().split()) == count and words[:3] == ["x", "y", "z"]]
     typed = [words[1:] for line in comments if len(words := line.split()) == count + 1 and words[0] == "types"]
     names = named[0] if named else ["x", "y", "z", *(f"column_{k}" for k in range(4, count + 1))]
-    kinds = foreign(
-        f"{path}: types {typed}", np.dtype, list(zip(names, typed[0] if typed else ["<f8"] * count, strict=True))
-    )
-    rows = np.empty(len(values), kinds)
+    if twice := [name for k, name in enumerate(names) if name in names[:k]]:
+        raise RecordingError(f"{path}: column {twice[0]} is named twice")
+    types = typed[0] if typed else ["<f8"] * count
+    for name, kind in zip(names, types, strict=True):
+        if kind not in _TYPES or (name in ("x", "y", "z") and kind not in _DIGITS):
+            raise RecordingError(f"{path}: types: {name} is {kind[:40]}: {', '.join(sorted(_TYPES))}; x y z are floats")
+    rows = np.empty(len(values), list(zip(names, types, strict=True)))
     for k, name in enumerate(names):
-        rows[name] = values[:, k]
+        try:
+            rows[name] = held(values[:, k], types[k])
+        except RecordingError as error:
+            raise RecordingError(f"{path}: column {name}: {error}") from error
     return [cloud_from_rows(rows, comments)], [] if named or count == 3 else [
         f"columns 4 to {count} have no name in {path}"
     ]

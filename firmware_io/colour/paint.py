@@ -28,7 +28,7 @@ from design.camera import Camera
 from design.errors import TaskError
 from design.task.task import LoadedTask
 from firmware_io.assembly.trajectory import Trajectory
-from firmware_io.clouds.ply import PlyWriter, ply_comments, read_ply
+from firmware_io.clouds.ply import PlyWriter, read_header, read_ply
 from firmware_io.colour.camera_views import CameraView, load_views, opened
 from firmware_io.recording.recording import Recording, open_recording
 
@@ -61,9 +61,11 @@ class ColourSummary:
 
 
 def painter(
-    loaded: LoadedTask, recording: Path, angles: AngleSet, poses: Trajectory | None, lag_s: float
+    loaded: LoadedTask, recording: Path, angles: AngleSet, poses: Trajectory | None, lag_s: float, *, organised: bool
 ) -> Callable[[Path], ColourSummary]:
-    """What colours a cloud of a recording, in place, with the images of a task's camera.
+    """What colours an organised cloud of a recording, in place, with the images of a task's camera.
+
+    Rows without a point go once it is coloured, unless it is to stay `organised`.
 
     Raises:
         TaskError: the task describes no camera.
@@ -74,25 +76,26 @@ def painter(
         raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
     views = load_views(camera, loaded.source.parent, angles, source, poses, lag_s)
     spacing, from_m = spacing_of(source), stands_m(source, angles, poses)
-    return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m)
+    return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m, organised=organised)
 
 
 def colour_cloud(
-    path: Path, camera: Camera, views: list[CameraView], spacing: Spacing, from_m: Floats
+    path: Path, camera: Camera, views: list[CameraView], spacing: Spacing, from_m: Floats, *, organised: bool = False
 ) -> ColourSummary:
     """Colour a PLY cloud in place, in constant memory but for seven bytes a point and one depth image.
 
     Args:
-        path: cloud such as `assemble` writes.
+        path: cloud such as `assemble` writes; how surfaces lie is seen in organised ones only.
         camera: that took all images.
         views: the images.
         spacing: of beams and scan lines.
         from_m: where the scanner stood in the cloud, shape (3,): the farther from it, the sparser the points.
+        organised: leave the cloud so; else rows without a point go once it is coloured.
 
     Raises:
         RecordingError: an image cannot be read or has another size, or the cloud cannot be written.
     """
-    rows, width = read_ply(path), _width(path)
+    rows, width = read_ply(path), read_header(path).width
     rgb = np.zeros((rows.size, 3), np.uint8)
     nearest_rad = np.full(rows.size, np.inf, np.float32)
     inside = np.zeros(rows.size, np.bool_)
@@ -110,7 +113,7 @@ def colour_cloud(
             nearest_rad[which] = seen.aside_rad[better]
             rgb[which] = picture[seen.row[better], seen.column[better]]
     coloured = np.isfinite(nearest_rad)
-    _write(path, rows, rgb, coloured)
+    _write(path, rows, rgb, coloured, organised=organised)
     points = int(np.isfinite(rows["x"]).sum())
     count = int(coloured.sum())
     return ColourSummary(points, count, int(np.sum(inside & ~coloured)), points - int(inside.sum()), len(views))
@@ -214,12 +217,6 @@ def _tangent(grid: Floats, far_m: Floats, step_rad: float, axis: int) -> tuple[F
     return ahead, apart_m / steps
 
 
-def _width(path: Path) -> int:
-    """Points to a scan of an organised cloud, 0 of a flat one."""
-    widths = [words[1] for comment in ply_comments(path) if (words := comment.split())[:1] == ["width"]]
-    return int(widths[0]) if widths and widths[0].isdigit() else 0
-
-
 @njit(cache=True)
 def _draw(
     column: NDArray[np.int64],
@@ -238,10 +235,13 @@ def _draw(
                     depth[v, u] = depth_m[i]
 
 
-def _write(path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], coloured: Bool[ndarray, " n"]) -> None:
+def _write(
+    path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], coloured: Bool[ndarray, " n"], *, organised: bool
+) -> None:
     kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
     fields = np.dtype([*kept, *((name, "|u1") for name in COLOURS)])
-    with PlyWriter(path, fields, ply_comments(path)) as cloud:
+    comments = [line for line in read_header(path).comments if organised or line.split()[0] not in ("width", "height")]
+    with PlyWriter(path, fields, comments) as cloud:
         for begin in range(0, rows.size, _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             out = np.empty(rows[part].size, fields)
@@ -250,7 +250,7 @@ def _write(path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], colou
             for channel, name in enumerate(COLOURS[:3]):
                 out[name] = rgb[part, channel]
             out["alpha"] = np.where(coloured[part], 255, 0)
-            cloud.write(out)
+            cloud.write(out if organised else out[np.isfinite(out["x"])])
 
 
 def stands_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Float64[ndarray, " 3"]:

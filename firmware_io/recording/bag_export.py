@@ -63,12 +63,12 @@ def export_bag(recording: Path, out: Path) -> Exported:
         )
     if out.suffix == ".bag":
         with whole_file(out, RecordingError) as part:
-            return _ros1(recording, part)
+            return foreign(f"{out}: cannot write", _ros1, recording, part)
     if out.exists():
         raise RecordingError(f"{out}: exists; a ROS 2 bag is a new folder")
     check_place(out, RecordingError)
     try:
-        return _ros2(recording, out)
+        return foreign(f"{out}: cannot write", _ros2, recording, out)
     except BaseException:
         shutil.rmtree(out, ignore_errors=True)
         raise

@@ -8,12 +8,13 @@ from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from firmware_io.recording.bag_export import export_bag
 
 
-def convert(source: Path, target: Path) -> list[str]:
+def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]:
     """Turn a cloud into another format, or a recording into a bag; what came of it, in words.
 
     Args:
         source: a cloud, or a recording (`.mcap`).
         target: a cloud; or a bag, `.bag` for ROS 1, else a new folder for ROS 2.
+        organised: keep the rows without a point of an organised cloud, in formats that do not define them too.
 
     Raises:
         InstallError: a format needs the extra `clouds`, which is not installed.
@@ -26,7 +27,6 @@ def convert(source: Path, target: Path) -> list[str]:
         return [*unknown, f"wrote {written} to {target}"]
     check_target(target)
     clouds, unread = read_clouds(source)
-    wrote, lost = write_clouds(target, clouds)
-    rows = sum(len(cloud.points_m) for cloud in clouds)
-    notes = [f"note: {line}" for line in (*unread, *lost)]
-    return [*notes, f"wrote {rows:,} rows to {', '.join(str(path) for path in wrote)}"]
+    wrote = write_clouds(target, clouds, organised=organised)
+    notes = [f"note: {line}" for line in (*unread, *wrote.said)]
+    return [*notes, f"wrote {wrote.rows:,} rows to {', '.join(str(path) for path in wrote.paths)}"]

@@ -25,6 +25,10 @@ from firmware_io.recording.recording import MessageWriter, RecordingWriter
 from firmware_io.samples import JointLog
 
 AngleUnit = Literal["deg", "rad"]
+_WRAP, _WRAP_LEAST, _WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
+_FASTEST_RPM = 120.0
+_SWEEP_RAD = 4 * math.pi
+_LEAST_RAD = math.radians(7.0)
 _LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
 
 
@@ -111,6 +115,7 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
         doubled = clock.angle_ns.size - log.time_ns.size
         left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
         warnings = [clock.said] if clock.said else []
+        warnings += [*_unit_warnings(clock.angle_ns, survey.angle, log, angle_unit)]
         warnings += [*_angle_warnings(survey, angle_unit), *_scan_warnings(survey, clock)]
         if not in_time.all():
             warnings.append(
@@ -210,6 +215,26 @@ def _angle_warnings(survey: _Survey, angle_unit: AngleUnit) -> Iterator[str]:
             "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
             "to 9 mm per metre of range, the way from command to motion comes on top"
         )
+
+
+def _unit_warnings(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
+    """What speaks for the other unit: where angles wrap, how fast the axis would turn, how far."""
+    step = np.abs(np.diff(angle[np.argsort(time_ns, kind="stable")]))
+    usual = float(np.median(step)) if step.size else 0.0
+    wraps = step[step > max(_WRAP * usual, _WRAP_LEAST)]
+    other, turn = ("deg", 360.0) if angle_unit == "rad" else ("rad", 2 * math.pi)
+    if wraps.size and abs((float(np.median(wraps)) + usual) / turn - 1) < _WRAP_ERROR:
+        yield f"angles jump by {np.median(wraps):.4g}, a whole turn in {other}: is the unit {other}?"
+        return
+    moved_rad, seconds = np.abs(np.diff(log.position_rad)), np.diff(log.time_ns) / 1e9
+    travel_rad, span_rad = float(moved_rad.sum()), float(np.ptp(log.position_rad))
+    fastest_rpm = float(np.median(moved_rad / seconds)) / (2 * math.pi) * 60 if seconds.size else 0.0
+    if angle_unit == "rad" and fastest_rpm > _FASTEST_RPM:
+        yield f"the axis turns at {fastest_rpm:.0f} rpm, faster than any servo: is the unit deg?"
+    elif angle_unit == "rad" and span_rad > _SWEEP_RAD and travel_rad > 1.5 * span_rad:
+        yield f"the axis goes to and fro over {span_rad / (2 * math.pi):.1f} turns: is the unit deg?"
+    elif angle_unit == "deg" and 0 < span_rad < _LEAST_RAD:
+        yield f"the axis moves over {math.degrees(span_rad):.2g} deg only: is the unit rad?"
 
 
 def _gap_warnings(log: JointLog) -> Iterator[str]:

@@ -88,6 +88,9 @@ def _summary(path: Path, stream: BinaryIO) -> Summary:
     summary = foreign(what, lambda: SeekingReader(stream).get_summary())
     if summary is None:
         raise RecordingError(what)
+    for channel in summary.channels.values():
+        if channel.schema_id not in summary.schemas:
+            raise RecordingError(f"{path}: {channel.topic} has no type in the index: `scanwright repair` mends it")
     return summary
 
 

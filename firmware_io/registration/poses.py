@@ -13,7 +13,7 @@ from design.arrays import Pose
 from design.atomic_file import whole_file
 from design.errors import RecordingError
 from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
-from firmware_io.foreign import foreign
+from firmware_io.foreign import foreign, of_file
 
 _AXES = ("rx", "ry", "rz", "x", "y", "z")
 
@@ -52,6 +52,7 @@ def read_poses(path: Path, count: int) -> list[Pose]:
     if len(lines) != count:
         raise RecordingError(f"{path}: {len(lines)} poses for {count} clouds; one line for each, in their order")
     rows = foreign(f"{path}: a line is time x y z qx qy qz qw", np.loadtxt, lines, ndmin=2)
-    if rows.shape != (count, 8) or not np.isfinite(rows).all() or not np.any(rows[:, 4:], axis=1).all():
-        raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers, the quaternion not zero")
-    return [pose_matrix(row[1:]) for row in rows]
+    if rows.shape != (count, 8) or not np.isfinite(rows).all():
+        raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers")
+    with of_file(path):
+        return [pose_matrix(row[1:]) for row in rows]

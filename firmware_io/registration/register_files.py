@@ -104,6 +104,12 @@ def register_files(
         said += lines
     if len(clouds) < 2:
         raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
+    for k, cloud in enumerate(clouds):
+        for i in range(k):
+            if np.array_equal(cloud.points_m, clouds[i].points_m, equal_nan=True):
+                raise RecordingError(
+                    f"{names[k]}: the very points of {names[i]}; a cloud tells nothing of its own place"
+                )
     if len(set(names)) < len(names):
         names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
     if start is not None:
@@ -119,9 +125,10 @@ def register_files(
         return RegisteredFiles(tuple(names), found, 0, (), tuple(said))
     say("merging")
     merged = merge(clouds, found.T_world, map_spacing_m)
-    wrote, lost = write_clouds(out, [merged])
+    wrote = write_clouds(out, [merged])
     covariances, png = poses.with_suffix(".cov.csv"), out.with_suffix(".png")
     write_poses(poses, names, clouds, found.T_world)
     write_covariances(covariances, names, found.covariance)
     overlap_picture(png, views, found)
-    return RegisteredFiles(tuple(names), found, len(merged.points_m), (*wrote, poses, covariances, png), (*said, *lost))
+    files = (*wrote.paths, poses, covariances, png)
+    return RegisteredFiles(tuple(names), found, wrote.rows, files, (*said, *wrote.said))

@@ -14,6 +14,8 @@ from design.motion import Motion, Spin
 from firmware_io.device_ports import Ports, find_ports
 from firmware_io.lidar.scip.parameters import StampAt
 
+_LONGEST_S = 7 * 24 * 3600.0
+
 
 @dataclass(frozen=True, slots=True)
 class ScanPlan:
@@ -96,6 +98,9 @@ def plan_scan(
         raise DeviceError(f"--turns = {turns}: at least 1")
     if angles.motion is None:
         raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set does not say how the servo moves")
+    if turns * angles.motion.duration_s > _LONGEST_S:
+        most = int(_LONGEST_S / angles.motion.duration_s)
+        raise DeviceError(f"--turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
     product = load_catalogue().products.get(angles.servo)
     if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
         raise DeviceError(

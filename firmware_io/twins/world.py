@@ -17,7 +17,10 @@ from numpy import ndarray
 from design.angles import AngleSet
 from design.arrays import Floats, Times
 from design.catalogue.products import Lidar
+from design.errors import TaskError
 from design.scene.ray_caster import Hits, Scene, cast
+
+_MOST_NOISE_MM = 1e5
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +59,12 @@ def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
     """The model of a catalogue sensor; `sigma_mm` replaces the noise of its data sheet.
 
     SCIP sends millimetres. No data sheet says at which incidence a surface is lost: 85 deg is assumed.
+
+    Raises:
+        TaskError: the noise is none.
     """
+    if sigma_mm is not None and not 0 <= sigma_mm <= _MOST_NOISE_MM:
+        raise TaskError(f"noise {sigma_mm} mm: 0 to {_MOST_NOISE_MM:g}")
     return RangeModel(
         sigma_m=(lidar.range_sigma_mm if sigma_mm is None else sigma_mm) / 1000,
         quantum_m=0.001,

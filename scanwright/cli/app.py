@@ -5,6 +5,7 @@ A command imports its room only when it is called, so that `--help` answers at o
 
 from __future__ import annotations
 
+import errno
 import sys
 
 import typer
@@ -12,6 +13,11 @@ import typer
 from design.errors import ScanwrightError
 from scanwright.cli import clouds, design, devices, pages, parts
 from scanwright.cli.console import complain, notes_of
+
+_OF_THE_SYSTEM = {
+    *(errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
+}
+"""What a disk refuses, wherever it does: never a bug of ours."""
 
 app = typer.Typer(
     help="One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar.",
@@ -31,4 +37,9 @@ def run() -> None:
     except ScanwrightError as error:
         for line in (str(error), *notes_of(error)):
             complain(line)
+        sys.exit(2)
+    except OSError as error:
+        if error.errno not in _OF_THE_SYSTEM:
+            raise
+        complain(f"{error.filename or 'a file'}: {error.strerror}")
         sys.exit(2)

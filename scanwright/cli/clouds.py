@@ -12,6 +12,10 @@ from scanwright.cli.console import AsJson, group, say, show, show_json
 
 app = group()
 
+Organised = Annotated[
+    bool, typer.Option("--organised", help="Keep a row for every beam of every scan, NaN where there is no point.")
+]
+
 
 class AngleUnit(Enum):
     """Unit of an angle in somebody's recording."""
@@ -46,15 +50,18 @@ def import_(
 
 @app.command()
 def repair(
-    recording: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that was cut off.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Recording that was cut off or damaged; it stays as it is.")
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE.mcap", help="Write there and leave FILE as it is.")
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write; FILE.repaired.mcap if not given."),
     ] = None,
 ) -> None:
-    """Close a recording that was cut off by a crash, a full disk or a pulled plug: all that is whole is kept."""
-    from firmware_io.recording.repair import repair
+    """Save every whole message of a recording that was cut off or damaged, into another file."""
+    from firmware_io.recording.repair.repair import repair, repaired_place
 
-    target = out or recording
+    target = out or repaired_place(recording)
     show(repair(recording, target).lines(recording, target))
 
 
@@ -63,9 +70,7 @@ def assemble(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
     angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.ply", help="Cloud to write.")],
-    flat: Annotated[
-        bool, typer.Option("--flat", help="Only points that exist; default keeps beam i in column i.")
-    ] = False,
+    organised: Organised = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
     per: Annotated[
         Per, typer.Option(help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ...")
@@ -97,7 +102,7 @@ def assemble(
         recording,
         angles,
         out,
-        flat=flat,
+        organised=organised,
         lag_s=lag_s,
         per=per.value,
         poses=poses,
@@ -160,6 +165,7 @@ def register(
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read, or a recording (.mcap).")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
+    organised: Organised = False,
 ) -> None:
     """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
 
@@ -167,4 +173,4 @@ def convert(
     """
     from firmware_io.recording.convert import convert
 
-    show(convert(source, target))
+    show(convert(source, target, organised=organised))

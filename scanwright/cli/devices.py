@@ -40,7 +40,7 @@ def emulate(
         tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where the scanner stands in the mesh, metres.")
     ] = (0.0, 0.0, 0.0),
     noise_mm: Annotated[float | None, typer.Option(min=0, help="Range noise; default is the data sheet's.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
     from design.angles import load_angles

@@ -73,6 +73,9 @@ def test_every_key_of_the_contract_survives_a_round_trip(tmp_path):
 
 def test_what_a_file_may_leave_out_is_zero_or_null(tmp_path):
     table = {"task": "mine", "sensor": "UTM-30LX", "servo": "AX-12A", "angles_deg": dict.fromkeys(NAMES, 1.0)}
+    with pytest.raises(TaskError, match=r'angles\.json: schema: this key is required: "scanwright/angles/1"'):
+        load_angles(written(tmp_path, table))
+    table["schema"] = "scanwright/angles/1"
     one = load_angles(written(tmp_path, table))
     full = json.loads(one.to_json())
     assert full["schema"] == "scanwright/angles/1"
@@ -81,6 +84,27 @@ def test_what_a_file_may_leave_out_is_zero_or_null(tmp_path):
     assert full["delta_rotvec_rot_deg"] == [0, 0]
     assert full["t_rot_laser_mm"] == full["t_world_rot_mm"] == [0, 0, 0]
     assert [full[key] for key in ("task_sha256", "slip_ring", "motion", "J", "J_error", "covariance")] == [None] * 6
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("angles_deg", {**dict.fromkeys(NAMES, 1.0), "beta_rot": True}),
+        ("angles_deg", {**dict.fromkeys(NAMES, 1.0), "beta_rot": "90"}),
+        ("angles_deg", {**dict.fromkeys(NAMES, 1.0), "beta_rot": 1e300}),
+        ("t_world_rot_mm", [0, 0, 1e300]),
+        ("t_rot_laser_mm", [0, False, 0]),
+        ("delta_rotvec_rot_deg", ["0", 0]),
+        ("motion", {"mode": "sweep", "limits_deg": [True, 90], "period_s": 9}),
+        ("motion", {"mode": "spin", "period_s": "18"}),
+        ("J", "-5"),
+        ("covariance", [[0, 0, 0, "1"]] * 4),
+    ],
+)
+def test_text_and_true_are_no_numbers_and_lengths_end_somewhere(tmp_path, key, value):
+    with pytest.raises(TaskError, match=rf"angles\.json: {key}[. ]") as told:
+        load_angles(written(tmp_path, full_table() | {key: value}))
+    assert len(str(told.value).splitlines()) == 1
 
 
 def test_a_record_cannot_be_changed():

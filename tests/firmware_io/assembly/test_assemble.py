@@ -151,8 +151,11 @@ def test_organised_and_flat_clouds_hold_the_same_points(tmp_path):
     short = a_scan(1, 40, START + 10**8, intensity=np.arange(40, dtype=np.float32))
     scans = [a_scan(0, range_m=np.array([1, np.nan, 3] * 20, np.float32)), short, a_scan(2, 50, START + 3 * 10**9)]
     recording = write(tmp_path / "r.mcap", scans, a_log(0, 1))
-    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply")
-    flat = assemble_recording(recording, angle_set(), tmp_path / "f.ply", flat=True)
+    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply", organised=True)
+    flat = assemble_recording(recording, angle_set(), tmp_path / "f.ply")
+    assert (organised.rows, flat.rows) == (180, 80)
+    assert organised.lines()[-1] == f"wrote 180 rows (80 points, 60 rows a scan) to {tmp_path / 'o.ply'}"
+    assert flat.lines()[-1] == f"wrote 80 points of 150 beams to {tmp_path / 'f.ply'}"
     assert (organised.width, organised.height, organised.padding, flat.width, flat.padding) == (60, 3, 30, 0, 0)
     assert organised.points == flat.points == 80
     assert organised.beams == flat.beams == 150
@@ -172,9 +175,10 @@ def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path)
     scans = [a_scan(k, 20, START + k * 50_000_000, time_increment_s=1e-4) for k in range(52)]
     log = a_log(1.0, 1.0 + 2.6 * 2 * np.pi, START, START + 2_600_000_000)
     recording = write(tmp_path / "r.mcap", scans, log)
-    whole = assemble_recording(recording, angle_set(0, 90, 0, -90), tmp_path / "w.ply")
+    mount = angle_set(0, 90, 0, -90)
+    whole = assemble_recording(recording, mount, tmp_path / "w.ply", organised=True)
     for per, heights in (("turn", [20, 20, 12]), ("half", [10, 10, 10, 10, 10, 2])):
-        summary = assemble_recording(recording, angle_set(0, 90, 0, -90), tmp_path / f"{per}.ply", per=per)
+        summary = assemble_recording(recording, mount, tmp_path / f"{per}.ply", per=per, organised=True)
         assert [path.name for path in summary.clouds] == [f"{per}_{k:03}.ply" for k in range(len(heights))]
         assert (summary.points, summary.height) == (whole.points, whole.height)
         rows = [read_ply(path) for path in summary.clouds]
@@ -240,7 +244,7 @@ def test_own_body_and_poses_are_reasons_of_their_own(tmp_path, command):
     ]
     (tmp_path / "poses.tum").write_text("\n".join(lines))
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
-    code, printed, complaints = command(*words, "--flat", "--poses", tmp_path / "poses.tum", "--columns", "ring,time_s")
+    code, printed, complaints = command(*words, "--poses", tmp_path / "poses.tum", "--columns", "ring,time_s")
     assert (code, complaints) == (0, [])
     assert f"left out {8 * 4} beams: own body" in printed
     assert f"left out {3 * 36 - 1} beams: outside poses" in printed
@@ -260,7 +264,7 @@ def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_no
     fine_rad = np.linspace(-1.95, 1.0, 400) + 2 * np.pi  # the same bearings, counted one turn further
     np.savez(tmp_path / "own_body.npz", beams=np.abs(fine_rad - 2 * np.pi) < 0.25, bearing_rad=fine_rad)
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
-    code, printed, _ = command(*words)
+    code, printed, _ = command(*words, "--organised")
     bearing_rad = a_scan(0, 40).bearing_rad
     assert code == 0
     assert f"warning: {np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))} of 40 beams have no bearing" in printed
@@ -270,13 +274,14 @@ def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_no
 @pytest.mark.parametrize(
     ("arrays", "says"),
     [
-        ({"beams": np.zeros(3, bool)}, "bearing_rad is not a file in the archive"),
-        ({"beams": np.zeros(3, bool), "bearing_rad": np.zeros(3)}, "two or more increasing bearings"),
+        ({"beams": np.zeros(3, bool)}, "bearing_rad: two or more numbers"),
+        ({"beams": np.zeros(3, bool), "bearing_rad": np.zeros(3)}, "finite and increasing"),
         (
             {"beams": np.zeros(2, bool), "bearing_rad": np.arange(3.0)},
-            r"beams \(2,\), stator None: one row for each of 3",
+            r"beams: shape \(2,\), bool: \(3,\) and bool",
         ),
-        (None, r"own_body.npz: not as `scanwright build` writes it \(damaged, "),
+        ({"beams": np.array(["a", "b"]), "bearing_rad": np.arange(2.0)}, "an array of <U1: numbers only"),
+        (None, r"own_body.npz: not an archive of NumPy, or damaged: "),
     ],
 )
 def test_a_wrong_mask_is_one_line(tmp_path, command, arrays, says):
@@ -382,7 +387,7 @@ def room(tmp_path_factory):
 
 def distance_m(room, angles, out, **more):
     recording, expected = room
-    assemble_recording(recording, angles, out, **more)
+    assemble_recording(recording, angles, out, organised=True, **more)
     rows = read_ply(out)
     points = np.stack([rows[name] for name in "xyz"], axis=1)
     np.testing.assert_array_equal(np.isnan(points), np.isnan(expected))

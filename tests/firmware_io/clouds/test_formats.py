@@ -33,18 +33,19 @@ def some_cloud(height=5, width=7, real=np.float32, nan=True, seed=0):
         "intensity": rng.uniform(0, 5000, n).astype(np.float32),
         "time_s": np.sort(rng.uniform(0, 600, n)),
         "joint_rad": rng.uniform(0, 4000, n),
-        "ring": np.tile(np.arange(width), height).astype(np.uint32),
+        "ring": np.tile(np.arange(width), height).astype(np.uint16),
     }
     return Cloud(points, columns, (height, width), POSE, 1_763_000_000_123_456_789)
 
 
-def through(tmp_path, cloud, suffix):
+def through(tmp_path, cloud, suffix, organised=False):
     path = tmp_path / f"cloud.{suffix}"
-    paths, said = write_clouds(path, [cloud])
-    assert paths == [path]
+    wrote = write_clouds(path, [cloud], organised=organised)
+    assert wrote.paths == (path,)
     (back,), unread = read_clouds(path)
     assert unread == []
-    return back, said
+    assert wrote.rows == len(back.points_m)
+    return back, list(wrote.said)
 
 
 def same(back, cloud):
@@ -63,9 +64,38 @@ def same(back, cloud):
 @pytest.mark.parametrize("suffix", EXACT)
 def test_everything_comes_back(tmp_path, suffix, real):
     cloud = some_cloud(real=real)
-    back, said = through(tmp_path, cloud, suffix)
+    back, said = through(tmp_path, cloud, suffix, organised=True)
     same(back, cloud)
     assert said == []
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_clouds_are_flat_unless_their_format_says_what_rows_and_columns_are(tmp_path, suffix):
+    cloud = some_cloud()
+    back, said = through(tmp_path, cloud, suffix)
+    if suffix in ("pcd", "e57", "npz"):
+        same(back, cloud)
+        assert said == []
+        return
+    assert (back.shape, back.valid.all(), len(back.points_m)) == ((1, 29), True, 29)
+    assert said[:2] == ["left out 6 rows without a point", "the shape 5 x 7 is lost (pcd, e57 and npz keep it)"]
+    if suffix in EXACT:
+        same(back, cloud.flat())
+    # rows without a point in a cloud without a shape say nothing in any format
+    loose = Cloud(cloud.points_m, cloud.columns)
+    back, said = through(tmp_path, loose, suffix)
+    assert (len(back.points_m), said[0]) == (29, "left out 6 rows without a point")
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_an_organised_cloud_is_refused_where_it_cannot_be(tmp_path, suffix):
+    path = tmp_path / f"c.{suffix}"
+    says = "LAS holds points" if suffix in ("las", "laz") else "the cloud is flat"
+    with pytest.raises(RecordingError, match=rf"c\.{suffix}: .*{says}"):
+        write_clouds(path, [Cloud(np.ones((3, 3)))], organised=True)
+    with pytest.raises(RecordingError, match=rf"c\.{suffix}: none of the 3 rows of cloud 1 is a point"):
+        write_clouds(path, [Cloud(np.full((3, 3), np.nan))])
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("suffix", EXACT)
@@ -88,8 +118,17 @@ def test_las_keeps_points_and_columns_and_says_what_it_loses(tmp_path, suffix):
         np.testing.assert_array_equal(back.columns[name], column[valid])
     np.testing.assert_allclose(back.T_world_cloud, POSE, atol=1e-12)
     assert back.start_ns == cloud.start_ns
-    assert "LAS holds points only: the shape 5 x 7 is lost, 6 rows without a point are left out" in said
-    assert len(said) == 5
+    assert len(said) == 6
+
+
+def test_las_takes_longer_steps_for_long_ways_and_says_so(tmp_path):
+    far = np.array([[0.0, 0, 0], [214_000, 0, 0], [1_500_000.5, 0, 0]])
+    assert through(tmp_path, Cloud(far[:2]), "las")[1] == ["LAS rounds coordinates to 0.1 mm"]
+    back, said = through(tmp_path, Cloud(far), "las")
+    assert said == ["LAS rounds coordinates to 1 mm"]
+    np.testing.assert_allclose(back.points_m, far, rtol=0, atol=1e-3)
+    with pytest.raises(RecordingError, match="km apart: LAS holds 21,475 km"):
+        write_clouds(tmp_path / "c.las", [Cloud(1e2 * far)])
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -132,9 +171,9 @@ values = arrays.arrays(np.float32, st.tuples(st.integers(1, 6), st.just(3)), ele
 @given(points=values, holes=st.sets(st.integers(0, 5)), odd=st.sampled_from([np.nan, np.inf, -1e30, 0.1]))
 def test_any_values_come_back(tmp_path, suffix, points, holes, odd):
     points = points.copy()
-    points[[hole for hole in holes if hole < len(points)]] = np.nan
-    cloud = Cloud(points, {"intensity": np.full(len(points), odd, np.float32)})
-    same(through(tmp_path, cloud, suffix)[0], cloud)
+    points[[hole for hole in holes if hole < len(points) - 1]] = np.nan
+    cloud = Cloud(points, {"intensity": np.full(len(points), odd, np.float32)}, (len(points), 1))
+    same(through(tmp_path, cloud, suffix, organised=cloud.organised)[0], cloud)
 
 
 @settings(deadline=None)
@@ -145,7 +184,7 @@ def test_pose_numbers_and_matrix_are_inverse(t, rotvec):
 
 
 def test_trimesh_reads_our_ply(tmp_path):
-    cloud = some_cloud()
+    cloud = some_cloud().flat()
     write_clouds(tmp_path / "c.ply", [cloud])
     loaded = trimesh.load(tmp_path / "c.ply")
     np.testing.assert_array_equal(loaded.vertices, cloud.points_m)
@@ -159,7 +198,7 @@ def parse_pcd(data):
         line, _, data = data.partition(b"\n")
         key, *words = line.decode().split()
         header[key] = words
-    kinds = {"F": {"4": "<f4", "8": "<f8"}, "U": {"4": "<u4", "1": "u1"}, "I": {"4": "<i4"}}
+    kinds = {"F": {"4": "<f4", "8": "<f8"}, "U": {"4": "<u4", "2": "<u2", "1": "u1"}, "I": {"4": "<i4"}}
     layout = np.dtype(
         [(f, kinds[t][s]) for f, t, s in zip(header["FIELDS"], header["TYPE"], header["SIZE"], strict=True)]
     )
@@ -275,7 +314,7 @@ def test_e57_cells_that_were_left_out_come_back_as_nan(tmp_path):
 
 
 def test_xyz_is_text_that_numpy_reads(tmp_path):
-    cloud = some_cloud()
+    cloud = some_cloud().flat()
     write_clouds(tmp_path / "c.xyz", [cloud])
     np.testing.assert_array_equal(np.loadtxt(tmp_path / "c.xyz", dtype=np.float32, usecols=(0, 1, 2)), cloud.points_m)
 

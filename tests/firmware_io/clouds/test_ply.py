@@ -69,9 +69,9 @@ BROKEN = {
     "'property list uchar int vertex_indices' in the header": lambda data: data.replace(
         b"end_header", b"property list uchar int vertex_indices\nend_header"
     ),
-    "'end of file' in the header": lambda data: data[:4],
-    "10 rows of 36 bytes announced": lambda data: data[:-1],
-    "0 rows of 36 bytes announced": lambda data: data.replace(b"vertex 10", b"vertex 0"),
+    "no 'end_header' in the first 4 bytes": lambda data: data[:4],
+    "10 rows of 34 bytes announced": lambda data: data[:-1],
+    "0 rows of 34 bytes announced": lambda data: data.replace(b"vertex 10", b"vertex 0"),
 }
 
 

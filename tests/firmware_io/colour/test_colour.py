@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, START_NS, Setup, Simulated, Truth, cast, simulate, write
 from design.camera import Camera
-from firmware_io.clouds.ply import read_ply
+from firmware_io.clouds.ply import read_header, read_ply
 
 SETUP = Setup(beams=216, sweeps=((50.0, 360.0),), noise_m=0.01)
 SIZE = (400, 300)
@@ -164,6 +164,11 @@ def test_points_get_the_paint_of_what_they_lie_on(scanned, command, tmp_path, mo
     code, said, _ = command("assemble", scanned / "room.mcap", *words)
     assert code == 0, said
     cloud = read_ply(out)
+    assert f"wrote {cloud.size:,} points of " in said
+    assert command("assemble", scanned / "room.mcap", *words[:-1], tmp_path / "o.ply", "--organised")[0] == 0
+    organised = read_ply(tmp_path / "o.ply")
+    assert read_header(tmp_path / "o.ply").width and not read_header(out).width
+    assert organised[np.isfinite(organised["x"])].tobytes() == cloud.tobytes()
     points_m = np.stack([cloud[axis] for axis in "xyz"], axis=1).astype(float)
     range_m = np.linalg.norm(points_m, axis=1)
     scanner = np.broadcast_to(np.array(SETUP.position_m), points_m.shape)

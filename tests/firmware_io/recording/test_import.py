@@ -297,6 +297,35 @@ def test_a_type_that_the_bag_does_not_define_is_told(tmp_path):
         )
 
 
+UNITS = {
+    "wraps at 360": ("rad", lambda k: (k * 7.0 + 0.5) % 360, "a whole turn in deg: is the unit deg?"),
+    "wraps at 2 pi": ("deg", lambda k: (k * 0.31) % (2 * np.pi), "a whole turn in rad: is the unit rad?"),
+    "too fast": ("rad", lambda k: k * 20.5, "rpm, faster than any servo: is the unit deg?"),
+    "to and fro over turns": (
+        "rad",
+        lambda k: 30 + 29.5 * np.sin(k / 40),
+        "to and fro over 9.4 turns: is the unit deg?",
+    ),
+    "hardly moves": ("deg", lambda k: np.sin(k / 30), "over 2 deg only: is the unit rad?"),
+    "rad": ("rad", lambda k: (k * 0.05) % (2 * np.pi), ""),
+    "deg": ("deg", lambda k: (k * 3.1 + 0.2) % 360, ""),
+    "sweeps": ("deg", lambda k: 80.5 * np.sin(k / 40), ""),
+}
+
+
+@pytest.mark.parametrize("case", UNITS)
+def test_what_speaks_for_the_other_unit_is_said(ros1, tmp_path, case):
+    unit, angle, says = UNITS[case]
+    for k in range(300):
+        at_ns = START + k * SECOND // 20
+        ros1.add("/joint", ros1.joint(at_ns, float(angle(k))), at_ns)
+        ros1.add("/scan", ros1.scan(at_ns, time_increment=0.001), at_ns)
+    summary, _ = imported(ros1, tmp_path, angle_unit=unit)
+    about = [warning for warning in summary.warnings if "is the unit" in warning]
+    assert len(about) == bool(says)
+    assert says in "".join(about)
+
+
 BAD_BAGS = {
     "none.bag": (None, "no such bag"),
     "empty.bag": (b"", "the file is empty"),

@@ -25,7 +25,7 @@ from design.scene.ray_caster import cast
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.clouds.ply import read_ply
 from firmware_io.recording.recording import open_recording
-from firmware_io.recording.repair import repair
+from firmware_io.recording.repair.repair import repair
 from firmware_io.samples import JointLog
 from firmware_io.scan import acquire
 from firmware_io.scan.axis_thread import turning_servo
@@ -284,7 +284,7 @@ def test_a_fault_stops_the_servo_and_keeps_the_recording(out, twins, monkeypatch
     assert "\n" not in str(caught.value)
     if fault != "servo unplugged":  # then nobody can tell it, protocol 1.0 has no watchdog
         wait_until(lambda: stands(twins), 5)
-    assert repair(recorded(out), recorded(out)).whole
+    assert repair(recorded(out)).whole
 
 
 HARMLESS = {
@@ -338,7 +338,7 @@ def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recordi
         process.send_signal(number)
         _, complaints = process.communicate(timeout=20)
     wait_until(lambda: stands(twins), 5)
-    summary = repair(recorded(out), recorded(out))
+    summary = repair(recorded(out))
     assert stopped_ns - summary.times_ns[1] < 10**9
     assert summary.whole == (number == signal.SIGINT)
     if number == signal.SIGINT:

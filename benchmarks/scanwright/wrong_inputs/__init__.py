@@ -1,0 +1,1 @@
+"""Wrong inputs over all commands and formats that read files."""

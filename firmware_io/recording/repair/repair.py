@@ -1,0 +1,114 @@
+"""`scanwright repair`: every message of a damaged recording whose bytes are whole, in a new file with a new index.
+
+An MCAP file is a chain of records (https://mcap.dev/spec). What proves that bytes are whole is not the chain:
+
+- messages stand in chunks, and a chunk carries the checksum of what is in it. Its opcode, lengths, sizes, times and the
+  name of its compression may all be damaged: each is tried in every way it can be, and the checksum decides;
+- topics and types stand in chunks too, and once more in the summary at the end, which has a checksum of its own;
+- where the chain breaks, it begins anew where two records in a row can be read to their last byte.
+
+A file is called whole only when all of that holds, indexes say what they index, and the readers read it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from mcap import records as mcap
+from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.writer import Writer
+
+from design.atomic_file import whole_file
+from design.errors import RecordingError
+from firmware_io.foreign import foreign
+from firmware_io.recording.mcap_chunks import read_messages
+from firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages
+
+
+def repair(path: Path, out: Path | None = None) -> RepairSummary:
+    """Write all that is whole in a recording to another file; nothing is written where nothing is damaged.
+
+    Args:
+        path: stays as it is.
+        out: another file; None for `repaired_place(path)`.
+
+    Raises:
+        RecordingError: the file cannot be read, holds not one whole message, or `out` is the same file.
+    """
+    out = repaired_place(path) if out is None else out
+    if not path.is_file():
+        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+    if out.suffix != ".mcap":
+        raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
+    if out.exists() and path.samefile(out):
+        raise RecordingError(f"{out}: the damaged recording itself: it stays as it is, name another file")
+    size = path.stat().st_size
+    data = foreign(f"{path}: cannot read", np.memmap, path, np.uint8, "r").data if size else memoryview(b"")
+    found = survey(data)
+    summary = found.summary
+    for message in whole_messages(data, found):
+        topic = found.topic(message)
+        if topic is None:
+            summary.lost_messages += 1
+            continue
+        first, last = summary.times_ns
+        summary.messages[topic] += 1
+        summary.times_ns = min(first, message.log_time), max(last, message.log_time)
+    if not summary.messages:
+        raise RecordingError(f"{path}: no whole message in it, there is nothing to save (is it an MCAP recording?)")
+    summary.lost_messages = max(summary.lost_messages, found.announced - summary.messages.total())
+    if summary.whole and not _read_alike(path, summary.messages):
+        summary.mended["what readers stumble over"] += 1
+    if not summary.whole:
+        with whole_file(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
+            _write(Writer(stream), data, found)
+    return summary
+
+
+def repaired_place(path: Path) -> Path:
+    """Where the repaired recording goes: beside the damaged one."""
+    return path.with_name(f"{path.stem}.repaired.mcap")
+
+
+def _read_alike(path: Path, messages: Counter[str]) -> bool:
+    """Whether every reader finds in a file what was found here."""
+    try:
+        with path.open("rb") as stream:
+            for reader in (SeekingReader(stream, validate_crcs=True), NonSeekingReader(stream, validate_crcs=True)):
+                stream.seek(0)
+                if messages != Counter(channel.topic for _, channel, _ in reader.iter_messages(log_time_order=False)):
+                    return False
+            stream.seek(0)
+            extras = SeekingReader(stream)
+            for items in (extras.iter_metadata(), extras.iter_attachments()):
+                list(items)
+        return messages == Counter(topic for topic, _ in read_messages(path, messages))
+    except Exception:  # a reader that refuses a file does so in a dozen ways
+        return False
+
+
+def _write(writer: Writer, data: memoryview, found: Survey) -> None:
+    """Everything anew, schemas and channels under numbers of their own."""
+    header = found.header or mcap.Header("ros2", "scanwright")
+    writer.start(header.profile, header.library)
+    for extra in found.extras:
+        if isinstance(extra, mcap.Metadata):
+            writer.add_metadata(extra.name, extra.metadata)
+        else:
+            writer.add_attachment(extra.create_time, extra.log_time, extra.name, extra.media_type, extra.data)
+    numbers: dict[int, int] = {}
+    for message in whole_messages(data, found):
+        if found.topic(message) is None:
+            continue
+        if message.channel_id not in numbers:
+            channel = found.channels[message.channel_id]
+            schema = found.schemas.get(channel.schema_id)
+            number = writer.register_schema(schema.name, schema.encoding, schema.data) if schema else 0
+            numbers[message.channel_id] = writer.register_channel(
+                channel.topic, channel.message_encoding, number, channel.metadata
+            )
+        number = numbers[message.channel_id]
+        writer.add_message(number, message.log_time, message.data, message.publish_time, message.sequence)
+    writer.finish()  # type: ignore[no-untyped-call]

@@ -1,0 +1,187 @@
+"""What can be read of a damaged recording, where it is, and what is lost."""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from mcap import records as mcap
+from mcap.writer import MCAP0_MAGIC
+
+from firmware_io.recording.repair.salvage import (
+    RECORD_HEAD,
+    WholeChunk,
+    between_magics,
+    chunk_at,
+    fits,
+    index_at_the_end,
+    inside_of,
+    next_record,
+    record_at,
+    sealed,
+    unpacked_at,
+)
+
+
+@dataclass(slots=True)
+class RepairSummary:
+    """What is left of a recording.
+
+    Attributes:
+        messages: topic -> whole messages.
+        lost_messages: messages that are not whole, where the file still tells how many.
+        damaged_chunks: chunks whose checksum does not hold.
+        lost_bytes: what is in no record that can be read, damaged chunks among it.
+        mended: what else is damaged and is made anew -> how often.
+        times_ns: log times of the first and of the last message.
+    """
+
+    messages: Counter[str] = field(default_factory=Counter)
+    lost_messages: int = 0
+    damaged_chunks: int = 0
+    lost_bytes: int = 0
+    mended: Counter[str] = field(default_factory=Counter)
+    times_ns: tuple[int, int] = (2**64, 0)
+
+    @property
+    def whole(self) -> bool:
+        """There is nothing to repair."""
+        return not (self.lost_bytes or self.lost_messages or self.mended)
+
+    def lines(self, path: Path, out: Path) -> list[str]:
+        """What was found in the recording `path` and written to `out`, in words."""
+        first_ns, last_ns = self.times_ns
+        kept = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(self.messages.items()))
+        found = [f"{path}: {kept}, {(last_ns - first_ns) / 1e9:.1f} s"]
+        if self.whole:
+            return [*found, "it is whole: nothing to repair, nothing written"]
+        if self.lost_bytes or self.lost_messages:
+            chunks = f"{self.damaged_chunks} damaged chunks, {self.lost_messages:,} messages known to be lost"
+            found.append(f"left out {self.lost_bytes:,} bytes that are not whole ({chunks})")
+        else:
+            found.append("every message is whole")
+        if self.mended:
+            found.append(f"made anew: {', '.join(f'{what} ({count})' for what, count in sorted(self.mended.items()))}")
+        return [*found, f"wrote {out}"]
+
+
+@dataclass(slots=True)
+class Survey:
+    """What can be read of a file, and where it is."""
+
+    summary: RepairSummary = field(default_factory=RepairSummary)
+    header: mcap.Header | None = None
+    schemas: dict[int, mcap.Schema] = field(default_factory=dict)
+    channels: dict[int, mcap.Channel] = field(default_factory=dict)
+    extras: list[mcap.Metadata | mcap.Attachment] = field(default_factory=list)
+    chunks: list[WholeChunk] = field(default_factory=list)
+    loose: list[tuple[int, int]] = field(default_factory=list)  # where messages outside of chunks begin and end
+    announced: int = 0
+
+    def learn(self, records: Iterable[Any]) -> None:
+        """Keep schemas and channels, the first of each number."""
+        for record in records:
+            if isinstance(record, mcap.Schema):
+                self.schemas.setdefault(record.id, record)
+            elif isinstance(record, mcap.Channel):
+                self.channels.setdefault(record.id, record)
+
+    def topic(self, message: mcap.Message) -> str | None:
+        """Where a message belongs, if its topic and type are known."""
+        channel = self.channels.get(message.channel_id)
+        return channel.topic if channel and (not channel.schema_id or channel.schema_id in self.schemas) else None
+
+
+def survey(data: memoryview) -> Survey:
+    """Find everything that can be read, and count what cannot."""
+    found = Survey()
+    lost, mended = found.summary, found.summary.mended
+    index, end_of_data = index_at_the_end(data)
+    chunk_indexes = {record.chunk_start_offset: record for record in index if isinstance(record, mcap.ChunkIndex)}
+    found.announced = sum(record.message_count for record in index if isinstance(record, mcap.Statistics))
+    found.learn(index)
+    mended["the index at the end"] += not index
+    mended["the first or last bytes"] += not between_magics(data)
+    unsure: list[Any] = []
+    closed = False
+    due: Counter[tuple[int, int, int]] | None = None  # what message indexes have to say of the chunk before them
+    at = len(MCAP0_MAGIC)
+    while at < end_of_data:
+        record, end = record_at(data, at)
+        noted = chunk_indexes.get(at)
+        chunk = chunk_at(data, at, end, noted) if record is None or isinstance(record, mcap.Chunk) else None
+        if due is not None and not isinstance(record, mcap.MessageIndex):
+            mended["indexes of chunks"] += due.total() != 0
+            due = None
+        if chunk is not None:
+            inside = list(inside_of(unpacked_at(data, chunk.begin, chunk.end, chunk.packing)[0]))
+            found.learn(item for _, item in inside)
+            found.chunks.append(chunk)
+            held = Counter(
+                (item.channel_id, item.log_time, place) for place, item in inside if isinstance(item, mcap.Message)
+            )
+            due = held if noted is None or noted.message_index_offsets else None
+            mended["heads of chunks"] += chunk.doubtful or not fits(record, noted, held)
+            end = chunk.end
+        elif isinstance(record, mcap.Chunk):
+            lost.damaged_chunks += 1
+            lost.lost_bytes += end - at
+        elif isinstance(record, mcap.MessageIndex):
+            if due is None:
+                lost.lost_messages += len(record.records)
+            else:
+                said = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
+                mended["indexes of chunks"] += bool(said - due)
+                due -= said
+        elif record is None:
+            end = min(next_record(data, at, end, noted), end_of_data)
+            lost.damaged_chunks += noted is not None
+            lost.lost_bytes += end - at
+        elif isinstance(record, mcap.Message):
+            # any bytes are a message: one of a damaged length ends where nothing begins, and others begin within it
+            begins = end if record_at(data, end)[0] is not None else next_record(data, at, at, None)
+            if begins < end:
+                lost.lost_bytes += begins - at
+                end = begins
+            else:
+                found.loose.append((at, end))
+        elif isinstance(record, mcap.Attachment) and not sealed(data, at, end):
+            lost.lost_bytes += end - at
+        elif isinstance(record, mcap.Attachment | mcap.Metadata):
+            found.extras.append(record)
+        elif isinstance(record, mcap.Header) and found.header is None:
+            found.header = record
+        else:
+            if isinstance(record, mcap.DataEnd):
+                closed = not record.data_section_crc or record.data_section_crc == zlib.crc32(data[:at])
+            unsure.append(record)
+        at = end
+    found.learn(unsure)
+    if found.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
+        lost.lost_bytes += sum(end - at for at, end in found.loose)
+        found.loose.clear()
+    mended["the end of the data"] += bool(index) and not closed
+    mended["the header"] += found.header is None
+    for what in [what for what, count in mended.items() if not count]:
+        del mended[what]
+    return found
+
+
+def whole_messages(data: memoryview, found: Survey) -> Iterator[mcap.Message]:
+    """The whole messages as they stand in the file, whether their topic is known or not."""
+    places: list[tuple[int, WholeChunk | None]] = [(chunk.begin, chunk) for chunk in found.chunks]
+    places += [(at, None) for at, _ in found.loose]
+    for at, chunk in sorted(places, key=itemgetter(0)):
+        if chunk is None:
+            yield record_at(data, at)[0]
+            continue
+        unpacked, _ = unpacked_at(data, chunk.begin, chunk.end, chunk.packing)
+        sure = len(unpacked) - 4 * chunk.doubtful
+        for place, item in inside_of(unpacked):
+            if isinstance(item, mcap.Message) and place + RECORD_HEAD.size + 22 + len(item.data) <= sure:
+                yield item
