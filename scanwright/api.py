@@ -463,6 +463,7 @@ def register(
     *,
     poses: str | Path | None = None,
     start: str | Path | None = None,
+    angles: AngleSet | str | Path | None = None,
     spacing_m: float = 0.1,
     map_spacing_m: float = 0.02,
     say: Say = _quiet,
@@ -474,19 +475,24 @@ def register(
         out: map to write.
         poses: TUM file to write; None for one beside the map.
         start: TUM file of start poses, a line for each cloud; found if not given.
+        angles: calibrated angle set that all clouds were assembled with: what its covariance means for the poses is
+            part of their covariance. Without it the calibration is taken to be right.
         spacing_m: distance of the points that are registered.
         map_spacing_m: distance of the points of the map.
         say: is told what is being done.
 
     Raises:
-        RecordingError: a file cannot be read or written, or there is only one cloud.
+        RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
+            covariance.
     """
     from firmware_io.registration.register_files import register_files
 
     target = Path(out)
     tum = target.with_suffix(".tum") if poses is None else Path(poses)
     given = None if start is None else Path(start)
-    return register_files([Path(cloud) for cloud in clouds], target, tum, given, spacing_m, map_spacing_m, say)
+    scanner = None if angles is None else _angles(angles)
+    paths = [Path(cloud) for cloud in clouds]
+    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, say)
 
 
 def read_cloud(path: str | Path) -> Cloud:

@@ -1,8 +1,9 @@
-"""Where one stand is as seen from another: small_gicp from a start, its covariance, and whether to believe it.
+"""Where one stand is as seen from another: small_gicp from a start, all beams from there, and whether to believe it.
 
-The last word is not the solver's "converged", which a wrong room reaches as well, but three facts that a person would
-check: how much of either cloud lies on the other, how much of it hangs where the other scanner looked straight
-through, and whether the surfaces in common hold all six degrees of freedom.
+The last word on the pose has an adjustment of the flat surfaces in common (`firmware_io.registration.surfels`), or
+small_gicp where there are too few. Whether to believe it is not the solver's "converged", which a wrong room reaches as
+well, but three facts that a person would check: how much of either cloud lies on the other, how much of it hangs where
+the other scanner looked straight through, and whether the surfaces in common hold all six degrees of freedom.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from design import frames
 from design.arrays import Floats, Pose
 from firmware_io.registration.cube_map import cells_of
 from firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
+from firmware_io.registration.surfels.adjust import adjust
 
 _COARSE_REACH_M = 1.0
 _COARSE_NEAR = 3  # times the spacing
@@ -33,6 +35,7 @@ _ALIKE = 0.5  # cosine between normals of one surface: two noisy normals, or a c
 
 MIN_OVERLAP = 0.2
 MAX_CONTRADICTION = 0.07
+_BLOCK = 10  # times the spacing: ten neighbours make a normal, and voxels are targets of several
 _CLEARLY = 0.3  # of what a surface square to the motion does
 _MIN_RESIST = 0.03
 
@@ -70,7 +73,9 @@ def align(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     """Register b to a from a start that is right to about a metre and ten degrees."""
     near = align_coarsely(a, b, T_a_b)
     T, converged = _gicp(a.fine, b.fine, near, _FINE_REACH * a.spacing_m, THREADS)
-    return judge_pair(a, b, T, converged)
+    pair = judge_pair(a, b, T, converged)
+    exact = None if pair.why_not else adjust(a.beams, b.beams, T, a.spacing_m)
+    return pair if exact is None else replace(pair, T_a_b=exact.T_a_b, covariance=exact.covariance)
 
 
 def refused(pair: Pair, why: str) -> Pair:
@@ -98,10 +103,10 @@ def judge_pair(a: SensorView, b: SensorView, T_a_b: Pose, converged: bool) -> Pa
     normals = a.fine.normals[target]
     residual_m = np.einsum("ij,ij->i", normals, points_m - a.fine.points_m[target])
     loose = _loose(points_m, normals, turned[on_a], a.name)
-    variance_m2 = residual_m @ residual_m / max(len(residual_m) - 6, 1) * len(points_b) / len(b.fine.points_m)
-    J = _jacobian(normals, points_m, T_a_b)
-    known = not loose and len(J) > 6
-    covariance = variance_m2 * np.linalg.inv(J.T @ J) if known else np.full((6, 6), np.nan)
+    covariance = np.full((6, 6), np.nan)
+    if not loose and len(residual_m) > _FEW:
+        J = _jacobian(normals, points_m, T_a_b)
+        covariance = _sandwich(J, residual_m, _blocks(points_m, normals, _BLOCK * a.spacing_m))
     why_not = []
     if not converged:
         why_not.append(f"small_gicp had not settled after {_MAX_STEPS} steps")
@@ -203,6 +208,27 @@ def _jacobian(
     points_b = frames.apply(np.linalg.inv(T_a_b), points_a)
     normals_b = normals @ T_a_b[:3, :3]
     return np.hstack([np.cross(points_b, normals_b), normals_b])
+
+
+def _blocks(points_m: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], edge_m: float) -> Int64[ndarray, " n"]:
+    """Number of the piece of surface that each point lies on: its cube, and the axis that its normal is nearest to."""
+    cubes = np.column_stack([np.floor(points_m / edge_m).astype(np.int64), np.abs(normals).argmax(axis=1)])
+    return np.unique(cubes, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _sandwich(
+    J: Float64[ndarray, "n 6"], residual_m: Float64[ndarray, " n"], block: Int64[ndarray, " n"]
+) -> Float64[ndarray, "6 6"]:
+    """Covariance of least squares whose residuals belong together within a block: neighbours share targets and normals.
+
+    H. White, "Asymptotic Theory for Econometricians" (1984); K.-Y. Liang and S. L. Zeger, "Longitudinal data analysis
+    using generalized linear models", Biometrika 73 (1986).
+    """
+    inverse = np.linalg.inv(J.T @ J)
+    free = residual_m - J @ (inverse @ (J.T @ residual_m))
+    pulls = np.stack([np.bincount(block, column) for column in (J * free[:, None]).T], axis=1)
+    scatter = pulls.T @ pulls * len(pulls) / max(len(pulls) - 6, 1)
+    return np.asarray(inverse @ scatter @ inverse, float)
 
 
 def _loose(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from design.angles import AngleSet
 from design.atomic_file import check_place
 from design.errors import RecordingError
 from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
@@ -73,6 +74,7 @@ def register_files(
     start: Path | None,
     spacing_m: float,
     map_spacing_m: float,
+    scanner: AngleSet | None,
     say: Callable[[str], None],
 ) -> RegisteredFiles:
     """Register clouds, write map, poses, covariances and picture; nothing at all unless every cloud found its place.
@@ -84,10 +86,13 @@ def register_files(
         start: TUM file of start poses; without it the poses in the files, if there are any, are the start.
         spacing_m: between the points that are registered.
         map_spacing_m: edge of the voxels of the map.
+        scanner: angle set that all clouds were assembled with: what its covariance means for the poses is part of
+            theirs. None takes the calibration to be right.
         say: progress.
 
     Raises:
-        RecordingError: a file cannot be read or written, or there is only one cloud.
+        RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
+            covariance.
     """
     for name, value in (("spacing", spacing_m), ("map spacing", map_spacing_m)):
         if not (np.isfinite(value) and value > 0):
@@ -119,7 +124,9 @@ def register_files(
     views = []
     for name, cloud in zip(names, clouds, strict=True):
         say(f"{name}: {len(cloud.points_m):,} points")
-        views.append(make_view(name, cloud.points_m.astype(float), spacing_m))
+        joint = cloud.columns.get("joint_rad") if scanner else None
+        joint_rad = None if joint is None else joint.astype(float)
+        views.append(make_view(name, cloud.points_m.astype(float), spacing_m, scanner, joint_rad))
     found = register(views, given, say)
     if not found.complete:
         return RegisteredFiles(tuple(names), found, 0, (), tuple(said))

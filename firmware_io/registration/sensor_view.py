@@ -10,8 +10,10 @@ import small_gicp
 from jaxtyping import Float64
 from numpy import ndarray
 
+from design.angles import AngleSet
 from design.errors import RecordingError
 from firmware_io.registration.cube_map import DepthMap, depth_map
+from firmware_io.registration.surfels.beams import Beams
 from firmware_io.registration.thin import thin, voxel_means
 
 THREADS = os.cpu_count() or 1
@@ -48,6 +50,7 @@ class SensorView:
         fine: points about `spacing_m` apart.
         coarse: points about four times as far apart.
         depth: how far the scanner saw in each direction.
+        beams: everything, as it was measured.
     """
 
     name: str
@@ -55,29 +58,41 @@ class SensorView:
     fine: Level
     coarse: Level
     depth: DepthMap
+    beams: Beams
 
 
-def make_view(name: str, points_m: Float64[ndarray, "n 3"], spacing_m: float) -> SensorView:
+def make_view(
+    name: str,
+    points_m: Float64[ndarray, "n 3"],
+    spacing_m: float,
+    scanner: AngleSet | None = None,
+    joint_rad: Float64[ndarray, " n"] | None = None,
+) -> SensorView:
     """Make a cloud ready.
 
     Args:
         name: for messages.
         points_m: shape (n, 3), in the order in which they were measured; rows with NaN are left out.
         spacing_m: edge of the finest voxels.
+        scanner: angle set that the cloud was assembled with, if its covariance is to count.
+        joint_rad: angle of the axis at each point, shape (n,), where `scanner` is given.
 
     Raises:
-        RecordingError: too few points to be registered.
+        RecordingError: too few points to be registered, or `scanner` or `joint_rad` do not say what is needed.
     """
     points_m = np.ascontiguousarray(points_m, float)
     finite = np.isfinite(points_m).all(axis=1)
-    points_m = points_m if finite.all() else points_m[finite]
+    joint_rad = _joints(name, scanner, joint_rad)
+    if not finite.all():
+        points_m, joint_rad = points_m[finite], joint_rad[finite[: len(joint_rad)]]
     thinned = thin(points_m, spacing_m) if len(points_m) > 1 else points_m
     if len(thinned) < _MIN_POINTS:
         raise RecordingError(
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m, np.zeros(len(thinned), np.uint8))
-    return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE))
+    beams = _beams(points_m, joint_rad, spacing_m, scanner)
+    return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE), beams)
 
 
 def make_level(points_m: Float64[ndarray, "n 3"]) -> Level:
@@ -88,3 +103,33 @@ def make_level(points_m: Float64[ndarray, "n 3"]) -> Level:
     normals = np.asarray(cloud.normals())[:, :3]
     away = np.einsum("ij,ij->i", normals, points_m) > 0
     return Level(points_m, np.where(away[:, None], -normals, normals), cloud, tree)
+
+
+def _joints(
+    name: str, scanner: AngleSet | None, joint_rad: Float64[ndarray, " n"] | None
+) -> Float64[ndarray, " joints"]:
+    if scanner is None:
+        return np.empty(0)
+    if scanner.covariance is None:
+        raise RecordingError("the angle set states no covariance: `scanwright calibrate` makes one that does")
+    if joint_rad is None:
+        raise RecordingError(
+            f"{name}: no column joint_rad, without which nobody knows what an error of the calibration does to a "
+            "point: assemble the cloud with it, or register without the angle set"
+        )
+    return joint_rad
+
+
+def _beams(
+    points_m: Float64[ndarray, "n 3"],
+    joint_rad: Float64[ndarray, " joints"],
+    spacing_m: float,
+    scanner: AngleSet | None,
+) -> Beams:
+    voxels_m, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
+    eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
+    if scanner is not None:
+        T = scanner.T_world_rot(0.0)
+        eye_m, frame, covariance = T[:3, 3].copy(), T[:3, :2].copy(), np.array(scanner.covariance)
+    turned = np.remainder(joint_rad, 2 * np.pi).astype(np.float32)
+    return Beams(points_m.astype(np.float32), voxels_m, counts, eye_m, turned, frame, covariance)

@@ -148,6 +148,9 @@ def register(
     start: Annotated[
         Path | None, typer.Option(metavar="FILE.tum", help="Start poses, a line for each cloud; found if not given.")
     ] = None,
+    angles: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Calibrated angle set of the clouds: its error counts too.")
+    ] = None,
     spacing_m: Annotated[float, typer.Option(help="Distance of the points that are registered.")] = 0.1,
     map_spacing_m: Annotated[float, typer.Option(help="Distance of the points of the map.")] = 0.02,
 ) -> None:
@@ -155,7 +158,13 @@ def register(
     from scanwright import api
 
     found = api.register(
-        clouds, out, poses=poses, start=start, spacing_m=spacing_m, map_spacing_m=map_spacing_m, say=say
+        *(clouds, out),
+        poses=poses,
+        start=start,
+        angles=angles,
+        spacing_m=spacing_m,
+        map_spacing_m=map_spacing_m,
+        say=say,
     )
     show(found.lines())
     raise typer.Exit(0 if found.complete else 1)

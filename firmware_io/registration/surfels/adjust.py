@@ -1,0 +1,184 @@
+"""Pose of a pair by least squares over all beams of all pieces; every piece's plane and the calibration are unknown.
+
+Each piece has a plane of its own, which both stands' beams determine together and which is eliminated (a Schur
+complement): what is left says how the two stands disagree about it. No number is used twice: normals are no averages
+of shared neighbours, and a beam belongs to one piece. So the inverse of the normal equations is the covariance.
+What the stated covariance of the scanner's angles allows is unknown too, the same four numbers in both stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
+
+from design import frames
+from design.arrays import Floats, Pose
+from firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
+from firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
+
+_ROUNDS = 8
+_SETTLED = 1e-2  # squared sigmas of a step: a hundredth of what is stated is no longer an error
+_SAME_REACH = 0.9
+_REACH = 5  # sigmas: what a wall's noise never does
+_FOREIGN = 0.02
+_MIN_CELLS = 12
+_SHARED_BEAMS = 20  # how many beams of the whole cloud's noise a piece's own is mixed with
+_OUTLIER = 36.0  # times the median of what pieces disagree by, in squared sigmas: moved, or not the same thing
+_DOUBTED = 9.0  # from here on a piece pulls in proportion to its distance only
+_REWEIGHTED = 8
+_MEDIAN_CHI2 = 2.37  # of three degrees of freedom
+_VAGUE = 0.1  # of the spacing: flat pieces that leave a position this open leave out what holds it
+_RIDGE = 1e-9  # of a plane's information: keeps what one line leaves open solvable
+_RANK = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Adjusted:
+    """A pose, and how well it is known.
+
+    Attributes:
+        T_a_b: shape (4, 4).
+        covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (6, 6).
+        pieces: how many pieces of surface hold it.
+        scale: by how much the pieces disagree more than the noise of their beams explains, at least 1; it is in
+            the covariance.
+    """
+
+    T_a_b: Pose
+    covariance: Float64[ndarray, "6 6"]
+    pieces: int
+    scale: float
+
+
+def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None:
+    """The pose from a start right to a fraction of `spacing_m`; None where the flat surfaces do not hold it."""
+    cells = find_cells(
+        np.concatenate([a.voxels_m, frames.apply(T_a_b, b.voxels_m)]),
+        np.concatenate([a.counts, b.counts]),
+        np.arange(len(a.counts) + len(b.counts)) < len(a.counts),
+        np.stack([a.eye_m, T_a_b[:3, :3] @ b.eye_m + T_a_b[:3, 3]]),
+        spacing_m,
+    )
+    prior = np.zeros((UNKNOWNS - 3, UNKNOWNS - 3))
+    free = 6
+    if a.covariance is not None:
+        free = UNKNOWNS - 3
+        prior[6:, 6:] = np.linalg.inv(a.covariance)
+    T, answer = T_a_b, None
+    for _ in range(_ROUNDS):
+        if len(cells) < _MIN_CELLS:
+            return None
+        lookup = look_up(cells)
+        one, on_a, off_a = _summed(a, cells, lookup, np.eye(4), False)
+        two, on_b, off_b = _summed(b, cells, lookup, T, True)
+        enough = (np.minimum(on_a, on_b) > 3) & (off_a <= _FOREIGN * on_a) & (off_b <= _FOREIGN * on_b)
+        cells, one, two, on_a, on_b = cells.kept(enough), one[enough], two[enough], on_a[enough], on_b[enough]
+        if len(cells) < _MIN_CELLS:
+            return None
+        solved = _solve(one, two, on_a, on_b, prior, free)
+        if max(np.abs(solved.x[3:6]).max(), np.sqrt(solved.covariance[3:, 3:].trace()) / _VAGUE) > spacing_m:
+            return None
+        T = T @ frames.rigid(frames.rotvec_to_matrix(solved.x[:3]), solved.x[3:6])
+        answer = Adjusted(T, solved.covariance, int(solved.agrees.sum()), solved.scale)
+        reach_m = min(cells.reach_m, _REACH * solved.noise_m)
+        still = solved.x[:6] @ np.linalg.solve(solved.covariance, solved.x[:6]) < _SETTLED
+        if still and solved.agrees.all() and reach_m > _SAME_REACH * cells.reach_m:
+            break
+        cells = cells.moved(solved.planes, reach_m).kept(solved.agrees)
+    return answer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    x: Float64[ndarray, " 10"]
+    covariance: Float64[ndarray, "6 6"]
+    planes: Float64[ndarray, "m 3"]
+    agrees: Bool[ndarray, " m"]
+    noise_m: float
+    scale: float
+
+
+def _summed(
+    beams: Beams, cells: Cells, lookup: Lookup, T: Pose, moves: bool
+) -> tuple[Floats, Int64[ndarray, " m"], Int64[ndarray, " m"]]:
+    beam, cell = (beams.points_m, beams.eye_m, beams.joint_rad, beams.frame), cells
+    known = (lookup.edge_m, lookup.keys, lookup.first, lookup.cells)
+    axes = np.ascontiguousarray(cells.axes)
+    return sum_beams(
+        *beam, np.ascontiguousarray(T), moves, *known, cell.low_m, cell.edge_m, cell.centre_m, axes, cell.reach_m
+    )
+
+
+def _solve(
+    one: Floats, two: Floats, on_a: Int64[ndarray, " m"], on_b: Int64[ndarray, " m"], prior: Floats, free: int
+) -> _Solved:
+    """Weigh, eliminate the planes, solve; pieces that cannot be the same thing in both stands are left out."""
+    weights = [_weights(sums, on) for sums, on in ((one, on_a), (two, on_b))]
+    one, two = (sums * weight[:, None, None] for sums, weight in zip((one, two), weights, strict=True))
+    left = _without_plane(one + two)
+    alone = [_without_plane(one), _without_plane(two)]
+    rank_a, rank_b, rank = (_rank(sums[:, :3, :3]) for sums in (one, two, one + two))
+    freedom = rank_a + rank_b - rank
+    some = freedom > 0
+    trust = np.ones(len(one))
+    for _ in range(_REWEIGHTED):
+        x, _ = _least_squares(left, trust, prior, free)
+        apart = _apart(left, alone, x)
+        usual = max(1.0, float(np.median(np.append(apart[some] / freedom[some], 0.0))) * 3 / _MEDIAN_CHI2)
+        # P. J. Huber, "Robust Estimation of a Location Parameter" (1964)
+        trust = 1 / np.sqrt(np.maximum(1.0, apart / (_DOUBTED * usual)))
+    agrees = apart <= _OUTLIER * usual
+    x, H = _least_squares(left, agrees.astype(float), prior, free)
+    apart = _apart(left, alone, x)
+    scale = max(1.0, float(np.sqrt(apart[agrees].sum() / max(freedom[agrees].sum() - 6, 1))))
+    both = one + two
+    A, rest = both[:, :3, :3], both[:, :3, -1] - both[:, :3, 3:-1] @ x
+    planes = np.linalg.solve(_ridged(A), rest[..., None])[..., 0]
+    noise_m = float(np.sqrt(1 / min(np.median(weight) for weight in weights)))
+    covariance = scale**2 * np.linalg.inv(H[:free, :free])[:6, :6]
+    return _Solved(x, covariance, planes, agrees, noise_m, scale)
+
+
+def _least_squares(
+    left: Floats, trust: Float64[ndarray, " m"], prior: Floats, free: int
+) -> tuple[Float64[ndarray, " 10"], Floats]:
+    """Solution and normal equations of pieces whose planes are eliminated."""
+    sums = np.einsum("m,mij->ij", trust, left)
+    H = sums[:-1, :-1] + prior
+    x = np.zeros(UNKNOWNS - 3)
+    x[:free] = np.linalg.solve(H[:free, :free], sums[:-1, -1][:free])
+    return x, H
+
+
+def _weights(sums: Floats, on: Int64[ndarray, " m"]) -> Float64[ndarray, " m"]:
+    """One over the variance of a range [m^-2], piece by piece, from what its beams leave about a plane of their own."""
+    rest = np.maximum(_without_plane(sums)[:, -1, -1], 0.0)
+    freedom = np.maximum(on - 3, 0)
+    usual = float(np.median(rest[freedom > 0] / freedom[freedom > 0]))
+    return (freedom + _SHARED_BEAMS) / (rest + _SHARED_BEAMS * usual)
+
+
+def _without_plane(sums: Floats) -> Floats:
+    """Schur complement of the first three unknowns, shape (m, 11, 11)."""
+    across = sums[:, :3, 3:]
+    return sums[:, 3:, 3:] - np.swapaxes(across, 1, 2) @ np.linalg.solve(_ridged(sums[:, :3, :3]), across)
+
+
+def _ridged(A: Floats) -> Floats:
+    return A + _RIDGE * np.trace(A, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+
+
+def _apart(left: Floats, alone: list[Floats], x: Floats) -> Float64[ndarray, " m"]:
+    """By how much two planes of their own fit better than a shared one, in squared sigmas."""
+    full = np.append(-x, 1.0)
+    shared, one, two = (np.einsum("i,mij,j->m", full, sums, full) for sums in (left, *alone))
+    return np.maximum(shared - one - two, 0.0)
+
+
+def _rank(A: Floats) -> Int64[ndarray, " m"]:
+    """How many of a plane's three numbers are determined: one line of beams tells two."""
+    values = np.linalg.eigvalsh(A)
+    return (values > _RANK * values[:, -1:]).sum(axis=1)
