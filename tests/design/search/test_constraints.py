@@ -83,7 +83,7 @@ def test_refined_and_rounded_it_still_has_no_hole_and_the_plain_optimum_is_told(
     task = loaded()
     problem = problem_of(task)
     found = search(problem, task.task.angles)
-    assert found.best[0].score.blind_weight == 0
+    assert found.best[0].score.blind_weight <= NO_BLIND_WEIGHT
     assert found.plain.score.blind_weight > 0
     assert found.plain.score.J < found.best[0].score.J
     allowed = search(problem, task.task.angles.model_copy(update={"holes": "allow"}))
@@ -96,7 +96,7 @@ def test_where_nothing_is_free_of_holes_the_smallest_share_is_told(monkeypatch):
     task = loaded(weight=[{"shape": "all"}], angles=RANGES | {"beta_laser_deg": [60, 70]})
     found = search(problem_of(task), task.task.angles)
     everything = every_score(task)
-    assert found.least_blind == pytest.approx(min(s.blind_weight for s in everything), abs=1e-6)
+    assert found.least_blind == pytest.approx(min(s.blind_weight for s in everything), abs=1e-5)
     assert found.best[0].score.J <= min(s.J for s in everything) + 1e-3
 
 
@@ -123,7 +123,8 @@ def test_the_reach_of_a_fan_is_that_of_its_beams():
 
 @pytest.mark.parametrize("half_angle_deg", [0.001, 0.05])
 @pytest.mark.parametrize("axis", [[0, 0, 1], [0.4, 0.2, -0.6]], ids=["pole", "oblique"])
-def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_deg):
+def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_deg, monkeypatch):
+    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     tiny = {"shape": "cone", "axis": axis, "half_angle_deg": half_angle_deg}
     task = loaded(weight=[tiny], angles={"step_deg": 30})
     found = search(problem_of(task), task.task.angles)
@@ -131,7 +132,8 @@ def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_
     assert found.best[0].score.J <= search(problem_of(alike), alike.task.angles).best[0].score.J + 0.05
 
 
-def test_a_small_region_of_a_sweep_is_found():
+def test_a_small_region_of_a_sweep_is_found(monkeypatch):
+    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     task = loaded(**SWEEP | {"weight": [CONE | {"half_angle_deg": 0.3}]})
     found = search(problem_of(task), task.task.angles)
     assert found.best[0].score.J < 0 and found.best[0].score.blind_weight == 0
