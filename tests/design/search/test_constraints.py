@@ -126,9 +126,10 @@ def test_the_reach_of_a_fan_is_that_of_its_beams():
 def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_deg, monkeypatch):
     monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     tiny = {"shape": "cone", "axis": axis, "half_angle_deg": half_angle_deg}
-    task = loaded(weight=[tiny], angles={"step_deg": 30})
+    rough = {"angles": {"step_deg": 30}, "density": {"tolerance": 0.05}}
+    task = loaded(weight=[tiny], **rough)
     found = search(problem_of(task), task.task.angles)
-    alike = loaded(weight=[tiny | {"half_angle_deg": 0.5}], angles={"step_deg": 30})
+    alike = loaded(weight=[tiny | {"half_angle_deg": 0.5}], **rough)
     assert found.best[0].score.J <= search(problem_of(alike), alike.task.angles).best[0].score.J + 0.05
 
 
