@@ -36,7 +36,10 @@ MODULES = {
     "deskew": ("firmware_io/assembly/deskew.py", "tests/firmware_io/assembly"),
     "encoder": ("firmware_io/assembly/axis_curve.py", "tests/firmware_io/assembly/test_axis_curve.py"),
     "clock": ("firmware_io/lidar/scip/device_clock.py", "tests/firmware_io/lidar/test_device_clock.py"),
-    "registers": ("firmware_io/servo/dynamixel/registers.py", "tests/firmware_io/servo/test_servo.py"),
+    "registers": (
+        "firmware_io/servo/dynamixel/registers.py",
+        "tests/firmware_io/servo/test_registers.py tests/firmware_io/servo/test_servo.py",
+    ),
     "scip": (
         "firmware_io/lidar/scip/protocol.py",
         "tests/firmware_io/lidar/test_scip.py tests/firmware_io/lidar/test_lidar.py",
