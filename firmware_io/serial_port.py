@@ -11,6 +11,7 @@ from serial.tools.list_ports import comports
 
 from design.errors import DeviceError
 
+_WRITE_S = 10.0  # only a port that nobody serves any more takes longer; a busy computer can take seconds
 _ADAPTERS = Path("/sys/bus/usb-serial/devices")
 
 
@@ -38,7 +39,7 @@ def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) 
         DeviceError: no such port, it is in use, or may not be opened.
     """
     try:
-        return _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=1.0)
+        return _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)
     except (OSError, ValueError) as error:  # pyserial's own are OSErrors
         raise DeviceError(_why_not_opened(port, error)) from error
 

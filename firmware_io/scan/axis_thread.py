@@ -162,25 +162,27 @@ def _follow(servo: DynamixelServo, axis: AxisThread, done: Event) -> None:
     """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
     began_s = due_s = heard_s = time.monotonic()
     moves: Iterator[Move] = iter(())
-    move = None
+    move, to_hold = None, False
     try:
         while not done.wait(max(due_s - time.monotonic(), 0)):
             now_s = time.monotonic()
             due_s = max(due_s + random.uniform(0.5, 1.5) / SERVO_HZ, now_s)
             if not axis.orders.empty():
                 ordered = axis.orders.get()
+                to_hold = ordered is None
                 began_s, moves = now_s, iter(()) if ordered is None else ordered
                 move = next(moves, None)
-                if ordered is None:
+            try:  # an order that was not answered is given again
+                if to_hold:
                     servo.hold()
+                    to_hold = False
                     axis.held.put(True)
-            if move is not None and now_s - began_s >= move.at_s:
-                if math.isinf(move.goal_rad):
-                    servo.spin(move.rate_rad_s)
-                else:
-                    servo.sweep_to(move.goal_rad, move.rate_rad_s)
-                move = next(moves, None)
-            try:
+                if move is not None and now_s - began_s >= move.at_s:
+                    if math.isinf(move.goal_rad):
+                        servo.spin(move.rate_rad_s)
+                    else:
+                        servo.sweep_to(move.goal_rad, move.rate_rad_s)
+                    move = next(moves, None)
                 axis.told.put(servo.read())
                 heard_s = now_s
             except (DeviceTimeoutError, ProtocolError):

@@ -25,6 +25,7 @@ from firmware_io.lidar.scip.parameters import StampAt
 from firmware_io.lidar.scip.raw_scan import RawScan
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
+_SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
 _TRIES = 3  # a first request may be glued to what a client before us left half said
 _BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
 _FASTER_BAUDS = (250_000, 500_000, 750_000)
@@ -125,14 +126,14 @@ class ScipLidar:
         self._stamp_ms = -1
         self._accepted(self._ask(self._request), "00")
 
-    def read(self, timeout_s: float = 1.0) -> RawScan:
-        """The next scan.
+    def read(self, timeout_s: float | None = None) -> RawScan:
+        """The next scan; it is waited for for a second if nothing else is said.
 
         Raises:
             DeviceTimeoutError: none came in time: switched off, or reset; `reconnect` helps where it is back.
             DeviceError: it was unplugged, or reports a fault.
         """
-        deadline = time.monotonic() + timeout_s
+        deadline = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
         while True:
             told, arrival_ns = self._next(deadline)
             if told.echo[:-2] != self._request[:-2] or told.status == "00":
@@ -270,15 +271,15 @@ class ScipLidar:
             codes=codes,
         )
 
-    def _ask(self, request: bytes, timeout_s: float = _ANSWER_S) -> protocol.Reply:
+    def _ask(self, request: bytes, timeout_s: float | None = None) -> protocol.Reply:
         return self._ask_timed(request, timeout_s)[0]
 
-    def _ask_timed(self, request: bytes, timeout_s: float = _ANSWER_S) -> tuple[protocol.Reply, int]:
+    def _ask_timed(self, request: bytes, timeout_s: float | None = None) -> tuple[protocol.Reply, int]:
         """The reply to a request and when it came; what comes before it is older and dropped."""
         self._waiting.clear()
         with Gone(self._name()):
             self._stream.write(request + b"\n")
-        deadline = time.monotonic() + timeout_s
+        deadline = time.monotonic() + (_ANSWER_S if timeout_s is None else timeout_s)
         while True:
             told, arrival_ns = self._next(deadline)
             if told.echo == request and not protocol.is_scan(told):

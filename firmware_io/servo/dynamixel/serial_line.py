@@ -8,6 +8,8 @@ from design.errors import ProtocolError
 from firmware_io.serial_port import open_serial_port
 
 _MANY = 4096
+_MOST_LATE = 512  # bytes: several of the longest answers
+_OVERSLEPT_S = 0.02
 _SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenever its time-out is changed
 
 
@@ -35,6 +37,7 @@ class SerialLine:
         self.began_ns = self.ended_ns = 0
         self.sent = b""
         self._echo_due = False
+        self._late_bytes = 0
 
     def clearPort(self) -> None:
         """Drop what has come."""
@@ -43,6 +46,15 @@ class SerialLine:
     def isPacketTimeout(self) -> bool:
         """Whether the deadline has passed."""
         return time.monotonic() >= self.deadline_s
+
+    def expect(self, seconds: float) -> None:
+        """Wait that long from now, and then take what has come meanwhile: this computer may have been late, not it."""
+        self.deadline_s = time.monotonic() + seconds
+        self._late_bytes = _MOST_LATE
+
+    def overslept(self) -> bool:
+        """Whether this computer has come back from a wait much later than it meant to."""
+        return time.monotonic() > self.deadline_s + _OVERSLEPT_S
 
     def readPort(self, length: int) -> bytes:
         """Up to that many bytes of an answer; fewer when the deadline passes."""
@@ -63,12 +75,12 @@ class SerialLine:
 
     def listen(self, seconds: float) -> bytes:
         """What comes in that time without having been asked for."""
-        self.deadline_s = time.monotonic() + seconds
+        self.expect(seconds)
         return self._read(_MANY)
 
     def find_echo(self) -> None:
         """Whether the adapter returns what it sends, tried with a byte that no servo answers."""
-        self.deadline_s = time.monotonic() + self.wait_s
+        self.expect(self.wait_s)
         self.clearPort()
         self.write(b"\0")
         self.echoes = self._read(1) == b"\0"
@@ -82,8 +94,12 @@ class SerialLine:
         data = b""
         while len(data) < length:
             over = self.isPacketTimeout()  # told before the last look: what came while we were kept waiting counts
-            data += self.port.read(length - len(data))
+            if over and self._late_bytes <= 0:
+                break
+            more = self.port.read(length - len(data))
+            data += more
             if over:
+                self._late_bytes -= len(more)  # garbage has no end
                 break
         return data
 

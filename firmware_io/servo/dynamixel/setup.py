@@ -15,6 +15,7 @@ from firmware_io.servo.dynamixel.registers import TABLES, ControlTable, Register
 
 _BAUDS = (57600, 1_000_000, 115200, 2_000_000, 3_000_000, 4_000_000, 500_000, 200_000, 9600)
 _PING_S = 0.05  # a servo answers within a millisecond; USB adapters gather bytes for up to 16 ms, both ways
+_PATIENT_PING_S = 0.2
 _NUMBER = Register(0, 2)  # the model number stands there in every control table
 _REBOOT_S = 3.0
 _READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
@@ -68,10 +69,11 @@ def find_servo(bus: ServoBus, model: str | None, servo_id: int | None, *, unmute
         raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; known: {known}")
     bus.find_echo()
     mute = None
-    for baud, protocol in [*product(_BAUDS, protocols)] * 2:  # twice: adapter or servo may still be starting
+    # Twice: adapter or servo may still be starting, or this computer be busy.
+    for wait_s, baud, protocol in product((_PING_S, _PATIENT_PING_S), _BAUDS, protocols):
         bus.protocol = protocol
         if bus.set_baud(baud):
-            found = bus.ping(BROADCAST if servo_id is None else servo_id, _PING_S)
+            found = bus.ping(BROADCAST if servo_id is None else servo_id, wait_s)
             if len(found) > 1:
                 raise DeviceError(f"{bus.port}: servos {found} answer: say which one with --servo-id")
             if found:

@@ -36,11 +36,12 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
     began, at_work = time.monotonic(), tmp_path / "at_work"
     with contextlib.suppress(KeyboardInterrupt), second_process() as begin:
         process = begin(os.getpid)()
-        begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(90)")
-        while not at_work.exists():
+        begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(900)")
+        while not at_work.exists():  # a second, where the computer is not busy
+            assert time.monotonic() - began < 300
             time.sleep(0.01)
         raise KeyboardInterrupt
-    assert time.monotonic() - began < 60
+    assert time.monotonic() - began < 600
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     with pytest.raises(BuildError, match="was killed"), second_process() as begin:

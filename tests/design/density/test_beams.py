@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
+from design.density.beams import (
+    ScanLines,
+    beam_directions_rot,
+    line_spacing,
+    polar_and_azimuth,
+    polar_of_planes,
+    scan_lines,
+    simulated_scan,
+)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +31,7 @@ from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimu
         (2.01, 10, 21, 0.1),
         (0.025, 40, 1, 1.0),
         (0.02, 40, 1, 0.8),
+        (1 + 2**-52, 1, 1, 1.0),  # one line, and a last bit over
         (3600, 40, 144_000, 1.0),
     ],
 )
@@ -106,3 +115,31 @@ def test_all_beams_lie_in_the_scan_plane(alpha, beta):
     normal = (Ry(beta) @ Rx(alpha))[:, 2]
     np.testing.assert_allclose(beams @ normal, 0, atol=1e-12)
     np.testing.assert_allclose(beams[2], (Ry(beta) @ Rx(alpha))[:, 0], atol=1e-12)
+
+
+BEARINGS = np.radians([-120.0, -10.0, 0.0, 77.0])
+lever_arms = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
+
+
+@given(st.floats(-pi, pi), st.floats(-pi, pi), lever_arms)
+def test_with_a_lever_arm_beams_point_from_the_axis_to_where_they_end(alpha, beta, lever):
+    seen = beam_directions_rot(BEARINGS, alpha, beta, lever)
+    for direction, bearing in zip(seen, BEARINGS, strict=True):
+        end = (Ry(beta) @ Rx(alpha) @ Rz(bearing))[:, 0] + lever
+        np.testing.assert_allclose(direction, end / sum(end**2) ** 0.5, atol=1e-12)
+
+
+@given(st.floats(-pi, pi), st.floats(-pi, pi))
+def test_the_polar_angles_of_many_planes_are_those_of_each(alpha, beta):
+    planes = np.array([[alpha, beta], [0.3, -0.2]])
+    found = polar_of_planes(BEARINGS, planes)
+    for row, (a, b) in zip(found, planes, strict=True):
+        np.testing.assert_allclose(row, polar_and_azimuth(beam_directions_rot(BEARINGS, a, b))[0], atol=1e-12)
+
+
+@given(st.floats(-pi, pi), st.floats(-pi, pi))
+def test_lines_are_as_far_apart_as_a_beam_leaves_its_plane_in_one_step(alpha, beta):
+    beams, step = beam_directions_rot(BEARINGS, alpha, beta), 1e-6
+    normal = (Ry(beta) @ Rx(alpha))[:, 2]
+    apart = max(abs((Rz(step) @ beam) @ normal) / step for beam in beams)
+    assert line_spacing(beams, (alpha, beta)) == pytest.approx(apart, abs=1e-5)

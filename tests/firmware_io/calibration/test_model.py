@@ -145,6 +145,27 @@ def test_its_derivatives_are_those_of_finite_differences(seed):
 
 
 @settings(deadline=None, max_examples=30)
+@given(seed=seeds)
+def test_at_even_speed_the_derivative_by_the_lag_is_exact(seed):
+    """Where the log is straight no mean of its speed blurs it, and each harmonic shows."""
+    rng = np.random.default_rng(seed)
+    log = JointLog(START + np.array([0, 2 * 10**9]), np.array([0.0, 1.4]))
+    beam, none = some_beams(rng, 1), np.zeros(1, np.int64)
+    beams = ReturnedBeams(
+        beam.range_m, beam.bearing_rad, np.zeros(1), np.zeros(1), none, none, beam.time_ns, (straight(log),)
+    ).late_by(0.0)
+    mount, x = Mount.of(an_angle_set(rng)), rng.uniform(-1, 1, COUNT) * SIZES
+    x[5:9] = rng.uniform(-0.2, 0.2, 4)
+    q = beam_rays(mount, x, beams)[1][0] + rng.uniform(-0.5, 0.5, 3)
+    q /= 5
+    rows = sums(mount, x, beams.late_by(x[LAG[0]]), np.zeros(1, np.int64), np.ones(1), q[None], np.inf)[0]
+    step = 1e-4 * np.eye(COUNT)[LAG[0]]
+    low, high = (residuals(mount, x + sign * step, beams, q)[0] for sign in (-1, 1))
+    derivative = rows[LAG[0], -1] / residuals(mount, x, beams, q)[0]
+    np.testing.assert_allclose(derivative, (high - low) / 2e-4, rtol=1e-4, atol=1e-5)
+
+
+@settings(deadline=None, max_examples=30)
 @given(seed=seeds, bulge=st.sampled_from([0.0, 0.003, 1.0]))
 def test_eliminating_planes_and_bulges_is_one_dense_least_squares(seed, bulge):
     rng = np.random.default_rng(seed)

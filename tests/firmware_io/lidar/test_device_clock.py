@@ -186,6 +186,15 @@ def test_stamps_are_unwrapped_over_wraps_and_long_pauses(begin, steps_ms, jitter
     assert counter.restarts == 0
 
 
+@pytest.mark.parametrize(("ahead_ms", "restarts"), [(-1, 0), (60_000, 0), (60_001, 1)])
+def test_a_stamp_may_be_a_minute_ahead_of_the_host_and_no_more(ahead_ms, restarts):
+    """What waits in a buffer is late; what runs ahead of the host's clock by more is of another life."""
+    counter = StampCounter()
+    counter.unwrap(500_000, 10**12)
+    assert counter.unwrap(501_000 + ahead_ms, 10**12 + 10**9) == 501_000 + ahead_ms
+    assert counter.restarts == restarts
+
+
 def test_a_stamp_that_cannot_be_is_a_new_life():
     counter = StampCounter()
     assert counter.unwrap(500_000, 10**12) == 500_000

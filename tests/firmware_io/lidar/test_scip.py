@@ -341,3 +341,20 @@ def test_how_many_bytes_a_scan_has(intensity):
     payload = protocol.encode(range(window.size * (2 if intensity else 1)), 3)
     told = protocol.reply(protocol.continuous(window), "99", protocol.data_lines(0, payload))
     assert window.bytes_per_scan == len(told)
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        ("20", "refused"),
+        ("21", "check itself"),
+        ("49", "check itself"),
+        ("50", "hardware"),
+        ("97", "hardware"),
+        ("98", "went on"),
+        ("0E", "unknown"),
+    ],
+)
+def test_a_status_in_words(status, words):
+    """SCIP 2.0, p. 12: 21 to 49 a check, 50 to 97 trouble, 98 resumed."""
+    assert words in protocol.Reply(b"MD0000108001000", status, ()).told()

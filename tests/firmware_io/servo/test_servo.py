@@ -1,15 +1,17 @@
 """The servo driver without a servo: control tables, packets against the e-manual and the SDK's known faults, errors."""
 
+import itertools
 import os
 import random
 import select
 import threading
-import time
 import tty
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from patience import until
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
@@ -202,6 +204,34 @@ def test_a_late_answer_is_not_taken_for_the_next(bus):
     assert None in deadlines and len(wire.sent) == 2
 
 
+def test_a_try_in_which_this_computer_slept_says_nothing_of_the_servo(bus, monkeypatch):
+    now_s, slept = [0.0], []
+
+    def monotonic():
+        now_s[0] += 0.001
+        return now_s[0]
+
+    clock = SimpleNamespace(monotonic=monotonic, monotonic_ns=lambda: round(monotonic() * 1e9))
+    monkeypatch.setattr(serial_line, "time", clock)
+    answers = iter([b"", b"", b"", b"", status(1.0, 1, 0, b"\7\7")])
+    line, wire = bus(1.0, lambda _: next(answers), tries=1)
+    take = wire.read
+
+    def read(length):
+        if len(slept) < 20 and not wire.pending:
+            slept.append(1)
+            now_s[0] += 1.0  # kept from running while it waited
+        return take(length)
+
+    wire.read = read
+    assert line.read(1, Register(36, 2)).data == b"\7\7"
+    assert len(wire.sent) == 5
+    wire.reply, slept[:] = lambda _: b"", [1] * 20  # now it is awake, and the servo dead
+    with pytest.raises(DeviceTimeoutError):
+        line.read(1, Register(36, 2))
+    assert len(wire.sent) == 6
+
+
 def test_of_several_servos_on_a_bus_one_is_named(bus):
     line, wire = bus(1.0, lambda _: status(1.0, 1, 0, b"") + status(1.0, 2, 0, b""))
     with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: say which one with --servo-id"):
@@ -222,15 +252,17 @@ def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):
     assert line.read(1, Register(36, 2)).data == b"\1\2"
 
 
-def test_garbage_without_end_does_not_hold_the_program(bus):
+def test_garbage_without_end_does_not_hold_the_program(bus, monkeypatch):
     """The SDK looks at its clock only when nothing comes."""
     rng = random.Random(1)
     line, wire = bus(1.0, lambda _: b"")
     wire.read = lambda length: rng.randbytes(length)
-    begin = time.monotonic()
+    now_s = itertools.count(step=0.001)  # a clock that goes on by a millisecond with every look at it
+    clock = SimpleNamespace(monotonic=lambda: next(now_s), monotonic_ns=lambda: round(next(now_s) * 1e9))
+    monkeypatch.setattr(serial_line, "time", clock)
     with pytest.raises(DeviceError):
         line.read(1, Register(36, 2))
-    assert time.monotonic() - begin < 1.0
+    assert next(now_s) < 1.0
 
 
 def mutated(rng, packet):
@@ -310,14 +342,6 @@ def pair():
     thread.join()
     os.close(master)
     os.close(slave)
-
-
-def until(condition, seconds=5.0):
-    """Wait for something to be so."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not come to that in time"
-        time.sleep(0.005)
 
 
 def test_the_guard_stops_a_servo_whose_program_leaves_without_a_word(pair):

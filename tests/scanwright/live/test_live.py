@@ -1,11 +1,11 @@
 """The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
 
 import threading
-import time
 from multiprocessing import Pipe
 
 import numpy as np
 import pytest
+from patience import until
 
 from design.angles import Angles, AngleSet
 from firmware_io.assembly.deskew import deskew
@@ -75,20 +75,15 @@ def test_a_viewer_that_sleeps_costs_the_scan_no_time_and_loses_the_oldest():
     receiving, sending = Pipe(duplex=False)
     feed = Feed(sending)
     scan = scan_at(0, beams=20_000)  # one of them fills the pipe
-    slowest = 0.0
-    for index in range(3 * MOST_SCANS):
-        began = time.perf_counter()
+    for index in range(3 * MOST_SCANS):  # none of these waits for the viewer, or this would not end
         feed.scan(scan)
         feed.joint(index, 0.0)
-        slowest = max(slowest, time.perf_counter() - began)
         if index == MOST_SCANS:
-            time.sleep(0.3)  # the sender is in the pipe now
+            until(lambda: not feed._scans)  # the sender is in the pipe now, and stays there
     assert feed.lost > MOST_SCANS // 2
-    began = time.monotonic()
     receiving.close()
     feed.close()
-    assert time.monotonic() - began < 5
-    assert slowest < 1.0
+    until(lambda: not feed._thread.is_alive())
 
 
 def test_angles_that_come_twice_or_late_do_no_harm():

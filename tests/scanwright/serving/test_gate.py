@@ -37,7 +37,7 @@ def page():
 
 def get(gate, path, **headers):
     """Status, headers and body of one request, sent as it is written."""
-    connection = http.client.HTTPConnection("127.0.0.1", gate.port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", gate.port, timeout=100)
     connection.putrequest("GET", path, skip_host=True)
     for name, value in ({"Host": f"127.0.0.1:{gate.port}"} | headers).items():
         connection.putheader(name.replace("_", "-"), value)
@@ -68,7 +68,7 @@ def moves(server, gate, value):
         socket.send(
             msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": handle.uuid, "updates": {"value": value}})
         )
-        until = time.monotonic() + 10
+        until = time.monotonic() + 100
         while server.slider.value != value and time.monotonic() < until:
             time.sleep(0.01)
     return server.slider.value == value
@@ -142,7 +142,7 @@ def test_ten_megabytes_close_the_connection_and_nothing_else(page):
         with pytest.raises(ConnectionClosed) as closed:
             socket.send(b"\xc6" + bytes(10_000_000))
             while True:
-                socket.recv(timeout=10)
+                socket.recv(timeout=100)
         assert closed.value.rcvd is None or closed.value.rcvd.code == 1009
     assert moves(server, gate, 1.25)
 
@@ -167,7 +167,7 @@ def test_uploads_sharing_and_other_attributes_never_reach_viser(page):
         for message in evil:
             socket.send(msgspec.msgpack.encode(message))
         socket.send("text")
-        until = time.monotonic() + 10
+        until = time.monotonic() + 100
         while gate.refused["unknown message"] < before + len(evil) + 1 and time.monotonic() < until:
             time.sleep(0.01)
     assert gate.refused["unknown message"] == before + len(evil) + 1
@@ -203,7 +203,7 @@ def test_a_thousand_random_messages_are_survived(page):
 
 def test_only_so_many_visitors_get_in(page):
     _, gate = page
-    until = time.monotonic() + 10
+    until = time.monotonic() + 100
     while gate.visitors and time.monotonic() < until:
         time.sleep(0.01)
     sockets = [talk(gate) for _ in range(MOST_VISITORS)]

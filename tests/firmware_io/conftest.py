@@ -1,0 +1,15 @@
+"""What the tests of devices share."""
+
+import pytest
+
+from firmware_io.lidar.scip import driver
+from firmware_io.servo.dynamixel import bus, serial_line
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Twins share a computer with the tests, and answer late where it is busy, as no device does: ten times as long."""
+    monkeypatch.setattr(driver, "_ANSWER_S", 5.0)
+    monkeypatch.setattr(driver, "_SCAN_S", 10.0)
+    monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
+    monkeypatch.setattr(bus, "_LATE", 1)
