@@ -116,9 +116,9 @@ class Optimum:
         if found or plain is None:
             return found or ["no direction that matters is blind"]
         return [
-            "no direction that matters is blind to the first row; without asking for that J alone would take the last",
-            *(f"which is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
-            f"the first costs {self._price(best.score.J, plain.score.J)} against it",
+            "no direction that matters is blind; J alone, not asked to avoid that, would take the last row of the table",
+            *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
+            f"what has no hole costs {self._price(best.score.J, plain.score.J)} against it",
         ]
 
     def _price(self, J: float, less: float) -> str:

@@ -23,7 +23,12 @@ class Comparison:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        return [*table(self.rows), *notes(self.optimum.loaded), f"wrote compare.csv and compare.png to {self.folder}"]
+        return [
+            *table(self.rows),
+            *(f"optimum: {line}" for line in self.optimum.hole_lines()),
+            *notes(self.optimum.loaded),
+            f"wrote compare.csv and compare.png to {self.folder}",
+        ]
 
 
 def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None]) -> Comparison:

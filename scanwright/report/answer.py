@@ -10,6 +10,7 @@ from design.angles import AngleSet, standard_settings
 from design.arrays import Array
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
+from design.objective.holes import holes
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.search.optimum import rounded_to_error
@@ -69,11 +70,13 @@ class BuildAnswer:
 
     Attributes:
         own: of the setting itself.
+        holes: where the region is blind, in words.
         rises: by mounting angle, how much J rises when it alone is 1 deg off, the worse of the two ways.
         worst: the largest of `rises` as the share of beams per direction that it costs; None where J is no logarithm.
     """
 
     own: Seen
+    holes: tuple[str, ...]
     standard: tuple[Standard, ...]
     cones: tuple[ConeOnMap, ...]
     masked_fraction: float
@@ -107,6 +110,7 @@ def answer(problem: Problem, angles: AngleSet) -> BuildAnswer:
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     return BuildAnswer(
         own=_seen(problem, setting, score(problem, setting)),
+        holes=tuple(hole.words() for hole in holes(problem, setting)),
         standard=tuple(standard),
         cones=tuple(
             _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(problem, setting).blind_cones

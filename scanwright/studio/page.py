@@ -274,6 +274,8 @@ class Studio:
                     self.kept.rejudge(self.judge)  # with the period that was found
                     self.move(Setting.within_bounds(optimum.search.best[0].angles_deg))
                     self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}")
+                    for line in optimum.hole_lines():
+                        self.say(line)
             except TaskError as error:
                 self.say(str(error), bad=True)
             finally:

@@ -141,8 +141,9 @@ def test_a_small_region_of_a_sweep_is_found(monkeypatch):
 
 
 @pytest.mark.parametrize("ball_radius_deg", [0.9, 1.5, 1.75])
-def test_the_coarse_J_counts_the_equator_once(ball_radius_deg):
+def test_the_coarse_J_counts_the_equator_once(ball_radius_deg, monkeypatch):
     """4 pi / ball + 1 nodes were even for these, and the node in the middle counted one and a half times."""
+    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     task = loaded(
         weight=[CONE | {"half_angle_deg": 2}],
         density={"ball_radius_deg": ball_radius_deg},
