@@ -30,7 +30,7 @@ _MOST_S = 600.0
 MODULES = {
     "density": ("design/density/spin.py", "tests/design/density"),
     "frames": ("design/frames.py", "tests/design/test_frames.py tests/design/test_angles.py"),
-    "beams": ("design/density/beams.py", "tests/design/density/test_beams.py"),
+    "beams": ("design/density/beams.py", "tests/design/density/test_beams.py tests/design/objective/test_holes.py"),
     "score": ("design/objective/score.py", "tests/design/objective"),
     "families": ("design/search/families.py", "tests/design/search"),
     "deskew": ("firmware_io/assembly/deskew.py", "tests/firmware_io/assembly"),
