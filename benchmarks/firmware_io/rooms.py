@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,6 +117,19 @@ class Setup:
     step_deg: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unrest:
+    """What should stand still and does not.
+
+    Attributes:
+        velocity_m_s: of the platform.
+        walkers: how many people walk to and fro, as upright boxes.
+    """
+
+    velocity_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    walkers: int = 0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Beams:
     """All beams of a set-up, each shape (n,)."""
@@ -158,13 +172,45 @@ class _Motion:
         return np.sign(np.diff(self.knots_rad))[piece]
 
 
-def simulate(room: Room, setup: Setup, truth: Truth, seed: int = 0) -> Simulated:
+def random_room(rng: np.random.Generator) -> Room:
+    """6 to 20 m by 5 to 14 m by 2.4 to 5 m, turned about the vertical by any angle, with six blocks in it."""
+    yaw_deg = rng.uniform(0, 90)
+    length, width, height = rng.uniform([6, 5, 2.4], [20, 14, 5])
+    R = Rotation.from_euler("z", yaw_deg, degrees=True).as_matrix()
+    blocks: list[Block] = []
+    while len(blocks) < 6:
+        size = rng.uniform([0.5, 0.5, 0.5], [2.5, 2.5, 2.2])
+        at = rng.uniform([-length / 2, -width / 2], [length / 2, width / 2])
+        if np.linalg.norm(at) > 2.2:  # the scanner stands near the middle
+            x, y, _ = R @ [*at, 0.0]
+            blocks.append(Block((float(x), float(y), size[2] / 2), tuple(size.tolist()), float(rng.uniform(0, 90))))
+    walls = Block((0.0, 0.0, height / 2), (float(length), float(width), float(height)), float(yaw_deg))
+    return Room(walls, tuple(blocks))
+
+
+def random_mount(rng: np.random.Generator, kind: int, **setup: Any) -> Setup:
+    """A set-up near the middle of a room: rolling, pitching, or any mount whose scan plane leans well on the axis."""
+    if kind % 3 == 0:
+        rot_deg, laser_deg = (0.0, 90.0), (0.0, -90.0)
+    elif kind % 3 == 1:
+        rot_deg, laser_deg = (-90.0, 0.0), (90.0, 0.0)
+    else:
+        rot_deg = tuple(rng.uniform([-180, -90], [180, 90]).tolist())
+        laser_deg = (float(rng.uniform(35, 90)), float(rng.uniform(-60, 60)))
+    position_m = tuple(rng.uniform([-1, -1, 0.6], [1, 1, 1.6]).tolist())
+    return Setup(laser_deg=laser_deg, rot_deg=rot_deg, position_m=position_m, **setup)
+
+
+def simulate(room: Room, setup: Setup, truth: Truth, seed: int = 0, unrest: Unrest = Unrest()) -> Simulated:
     """Scan a room with a faulty scanner."""
     rng = np.random.default_rng(seed)
     motion = _Motion.of(setup.sweeps)
     beams = _beams(setup, motion)
     origin, direction = _rays(setup, truth, motion, beams)
+    origin = origin + np.multiply.outer(beams.time_s, unrest.velocity_m_s)
     range_m, _ = cast(room, origin, direction)
+    for _ in range(unrest.walkers):
+        range_m = np.minimum(range_m, _walker(rng, room, setup, beams.time_s, origin, direction))
     range_m = range_m - truth.bias_m + rng.normal(0.0, setup.noise_m, range_m.size)
     range_m[range_m > room.range_max_m] = np.inf
     per_scan = range_m.reshape(-1, setup.beams).astype(np.float32)
@@ -249,6 +295,20 @@ def cast(room: Room, origin: Floats, direction: Floats) -> tuple[Floats, NDArray
         nearer = range_m < best
         best, face = np.where(nearer, range_m, best), np.where(nearer, 6 * k + its, face)
     return best, face
+
+
+def _walker(
+    rng: np.random.Generator, room: Room, setup: Setup, time_s: Floats, origin: Floats, direction: Floats
+) -> Floats:
+    """Range to somebody who walks to and fro at 1 m/s, 1.5 m from the scanner or more, shape (n,)."""
+    R = Rotation.from_euler("z", room.walls.yaw_deg, degrees=True).as_matrix()
+    x, y = np.array(room.walls.size_m[:2]) / 2 - 0.5
+    aside = rng.choice([-1, 1]) * rng.uniform(1.5, max(y, 1.6))
+    along = x * (2 * np.abs((time_s / (2 * x) + rng.random()) % 2 - 1) - 1)
+    at = np.column_stack([along, np.full(time_s.size, aside), np.full(time_s.size, 0.85)]) @ R.T
+    here = np.array([setup.position_m[0], setup.position_m[1], 0.0])
+    person = Block((0.0, 0.0, 0.0), (0.35, 0.5, 1.7), room.walls.yaw_deg)
+    return _through(person, origin - at - here, direction, inside=False)[0]
 
 
 def _through(block: Block, origin: Floats, direction: Floats, *, inside: bool) -> tuple[Floats, NDArray[np.int64]]:

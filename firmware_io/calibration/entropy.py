@@ -3,7 +3,12 @@
     H = -ln mean_ij exp(-|p_i - p_j|^2 / 4 s^2),    i seen by one side, j by the other
 
 No tiles, no planes, no rejection: a cloud whose two halves fall on each other is crisp, whatever its surfaces are.
-Each point weighs the area that it stands for, so that near surfaces do not drown far ones.
+Each point weighs the area that it stands for, so that near surfaces do not drown far ones, nor those about the axis,
+where beams crowd, the rest: r^2 dOmega is r^2 |b'_z| db dpsi with b' the beam's change along the fan (its z is the sine
+of the angle to the axis, for a fan that holds the axis).
+
+A sum over pairs of a sample is known as well as the sample is large: what each point adds to the change of the entropy
+says how well (W. Hoeffding, "A Class of Statistics with Asymptotically Normal Distribution", 1948).
 """
 
 from __future__ import annotations
@@ -18,9 +23,11 @@ from scipy.spatial import cKDTree
 
 from design.arrays import Floats
 from firmware_io.calibration.model import MOUNT, PARAMETERS, Mount, ReturnedBeams, beam_rays
+from firmware_io.calibration.observable import stood_still
 
 _SAMPLE = 15_000  # points of each side
-_RADII = 10  # rings in which pairs are counted
+_REACH = 4.0  # widths: pairs farther apart add nothing
+_SURE = 3.0  # sampling errors: less is no change
 _PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
 
 
@@ -32,6 +39,7 @@ class Witness:
         width_m: of the kernel.
         before: entropy with the parameters it began with.
         after: with those that were found.
+        change_sd: sampling error of `after - before`.
         minima: where the entropy's own minimum lies from the result, for each mounting error [SI]; None where the
             two sides see too little in common for it to have one.
     """
@@ -39,7 +47,13 @@ class Witness:
     width_m: float
     before: float
     after: float
+    change_sd: float
     minima: dict[str, float | None]
+
+    @property
+    def less_crisp(self) -> bool:
+        """Whether the cloud has become less crisp beyond what another sample of its points might say."""
+        return self.after - self.before > _SURE * self.change_sd
 
 
 def witness(
@@ -57,16 +71,20 @@ def witness(
     sample = np.concatenate([rng.choice(half, min(half.size, _SAMPLE), replace=False) for half in halves])
     few, one = beams.taken(sample), side[sample] == 0
 
-    def entropy(x: Floats) -> float:
+    # The same weights for all, or their own change would pass for one of the cloud
+    forward, left = mount.plane(found)[0][2]
+    climb = np.abs(left * np.cos(few.bearing_rad) - forward * np.sin(few.bearing_rad))
+    weight = few.range_m**2 * climb * (np.ones(one.size) if stood_still(few) else np.abs(few.speed_rad_s))
+
+    def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
         origin, direction = beam_rays(mount, x, late)
-        point = origin + (late.range_m + x[4])[:, None] * direction
-        return _between(point, late.range_m**2, one, width_m)
+        return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, one, width_m)
 
-    after = entropy(found)
-    return Witness(
-        width_m, entropy(start), after, {PARAMETERS[k].name: _minimum(entropy, found, k, after) for k in MOUNT}
-    )
+    before, after = crispness(start), crispness(found)
+    around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, found, k, after.entropy) for k in MOUNT}
+    spread = (after.share - before.share) * after.weight
+    return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
 
 
 def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float) -> float | None:
@@ -79,14 +97,25 @@ def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float)
     return 0.5 * step * (low - high) / bend if min(low, high) > here else None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Crispness:
+    """Entropy; of each point its weight among those of its side, and its share: 1 if all were alike, shape (n,)."""
+
+    entropy: float
+    weight: Floats
+    share: Floats
+
+
 def _between(
     point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
-) -> float:
-    """Entropy of the pairs across: pairs are counted in rings, which for a Gaussian is as good as one by one."""
-    edges = np.linspace(0, 4 * width_m, _RADII + 1)[1:]
-    trees = [cKDTree(point[half]) for half in (one, ~one)]
-    weights = (weight[one] / weight[one].sum(), weight[~one] / weight[~one].sum())
-    counted = trees[0].count_neighbors(trees[1], edges, weights=weights)
-    rings = np.diff(counted, prepend=0.0)
-    middle = edges - edges[0] / 2
-    return float(-np.log(max(rings @ np.exp(-(middle**2) / (4 * width_m**2)), 1e-300)))
+) -> _Crispness:
+    """Entropy of the pairs across."""
+    halves = np.flatnonzero(one), np.flatnonzero(~one)
+    weight = weight / np.where(one, weight[one].sum(), weight[~one].sum())
+    trees = [cKDTree(point[half]) for half in halves]
+    pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
+    i, j = halves[0][pairs["i"]], halves[1][pairs["j"]]
+    near = np.exp(-(pairs["v"] ** 2) / (4 * width_m**2))
+    total = max(float(near @ (weight[i] * weight[j])), 1e-300)
+    share = np.bincount(i, near * weight[j], len(one)) + np.bincount(j, near * weight[i], len(one))
+    return _Crispness(-float(np.log(total)), weight, share / total)

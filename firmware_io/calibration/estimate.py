@@ -25,6 +25,7 @@ from firmware_io.calibration.observable import Choice, check_fan, choose_observa
 from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, moved_by_last, reduced, step, sums
 from firmware_io.calibration.surfaces import group, without_misfits
 from firmware_io.calibration.tiles import FlatTiles, flat_tiles
+from firmware_io.calibration.unrest import Drift, drifts
 
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
@@ -51,6 +52,7 @@ class Estimate:
         clear: which of their beams surely met these, and were used, shape (n,).
         noise_m: standard deviation of a range, after all.
         bulge_m: standard deviation of the walls from planes; 0 where the noise hides it.
+        drifts: how the platform seems to have moved, recording by recording.
     """
 
     x: Float64[ndarray, " parameters"]
@@ -62,6 +64,7 @@ class Estimate:
     clear: Bool[ndarray, " beams"]
     noise_m: float
     bulge_m: float
+    drifts: tuple[Drift, ...]
 
 
 def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " parameters"]) -> Estimate:
@@ -103,6 +106,7 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
         clear=clear,
         noise_m=tiles.noise_m * float(np.sqrt(scale)),
         bulge_m=last.bulge_m,
+        drifts=drifts(mount, x, tiles, grouping, normal, choice.free, last.bulge_m, scale),
     )
 
 

@@ -15,8 +15,12 @@ from firmware_io.calibration.entropy import Witness
 from firmware_io.calibration.estimate import Estimate
 from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
+from firmware_io.calibration.tiles import fan_side
+from firmware_io.calibration.unrest import contradicted_share
+from firmware_io.calibration.unrest import warnings as unrest
 
 _WALLS = 3
+_LESS_CRISP = "the entropy says that the cloud has become less crisp: do not trust this calibration"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +28,7 @@ class Agreement:
     """How well beams and planes agree under one vector of parameters.
 
     Attributes:
-        residual_m: root mean square of the ranges' residuals, nothing rejected.
+        residual_m: root mean square of the ranges' residuals about the surfaces that they belong to.
         walls_m: straightness of the largest surfaces: root mean square height of what each side of the fan sees in
             each square metre. Noise averages out of it; bent and double walls do not.
     """
@@ -36,7 +40,7 @@ class Agreement:
 def agreement(found: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
     """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
     tiles, grouping = found.tiles, found.grouping
-    on = found.clear
+    on = found.clear & (grouping.surface[tiles.tile] >= 0)
     beams, tile = tiles.beams.taken(on).late_by(x[LAG[0]]), tiles.tile[on]
     weight = np.ones(tile.size)
     grouping = planes_alone(mount, x, beams, tile, weight / found.noise_m**2, grouping)
@@ -69,6 +73,7 @@ def calibration_report(
     applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
     fits = {"before": start, "after": found.x, "as_assembled": applied}
     fit = {name: agreement(found, mount, x) for name, x in fits.items()}
+    contradicted = contradicted_share(mount, found.x, beams, fan_side(beams, mount))
     return {
         "schema": "scanwright/calibration/1",
         "beams": int(beams.range_m.size),
@@ -93,7 +98,21 @@ def calibration_report(
         },
         "singular_values": found.spectrum.tolist(),
         "held": [{"names": list(held.names), "words": held.words, "why": held.why} for held in found.choice.held],
-        "notes": list(found.choice.notes),
+        "notes": [
+            *found.choice.notes,
+            *unrest(found.drifts, contradicted, fit["after"].residual_m, found.tiles.noise_m),
+            *([_LESS_CRISP] if witness.less_crisp else []),
+        ],
+        "drift": [
+            {
+                "recording": drift.recording,
+                "velocity_mm_s": (drift.velocity_m_s * 1e3).tolist(),
+                "turn_deg_s": np.degrees(drift.turn_rad_s).tolist(),
+                "chi2_of_6": drift.chi2,
+            }
+            for drift in found.drifts
+        ],
+        "contradicted_share": contradicted,
         "range_noise_mm": found.noise_m * 1e3,
         "wall_bulge_mm": found.bulge_m * 1e3,
         "residual_mm": {name: one.residual_m * 1e3 for name, one in fit.items()},
@@ -102,6 +121,7 @@ def calibration_report(
             "kernel_mm": witness.width_m * 1e3,
             "before": witness.before,
             "after": witness.after,
+            "change_sd": witness.change_sd,
             "minimum_from_result": {
                 PARAMETERS[k].name: None
                 if (off := witness.minima[PARAMETERS[k].name]) is None
@@ -133,14 +153,15 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     )
     pairs = ", ".join(f"{a:.1f} -> {b:.1f}" for a, b in zip(walls["before"], walls["after"], strict=True))
     yield f"walls straight    {pairs} mm"
+    fallen = entropy["after"] - entropy["before"]
     own = [
         f"{name.rsplit('_', 1)[0]} {off['value']:+.3f} {off['unit']}" if off else f"{name.rsplit('_', 1)[0]} ?"
         for name, off in entropy["minimum_from_result"].items()
     ]
-    change = f"{entropy['before']:.3f} -> {entropy['after']:.3f}"
+    change = (
+        f"{entropy['before']:.3f} -> {entropy['after']:.3f}, changed by {fallen:+.3f} +- {entropy['change_sd']:.3f}"
+    )
     yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
-    if entropy["after"] > entropy["before"]:
-        yield "warning: the entropy says that the cloud has become less crisp: do not trust this calibration"
     for note in record["notes"]:
         yield f"warning: {note}"
     by_name = {one["name"]: one for one in record["parameters"]}

@@ -121,10 +121,9 @@ def test_pieces_lie_on_the_walls():
 
 
 def test_what_cannot_be_told_of_the_calibration_is_one_line(command, tmp_path):
-    points = scan(room(), frames.rigid(np.eye(3), [0, 0, 1.0]), 60, 181, 0)
     clouds = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    for path in clouds:
-        write_clouds(path, [Cloud(points)])
+    for seed, path in enumerate(clouds):
+        write_clouds(path, [Cloud(scan(room(), frames.rigid(np.eye(3), [0, 0, 1.0]), 60, 181, seed))])
     calibrated, designed = tmp_path / "calibrated.json", tmp_path / "designed.json"
     calibrated.write_text(scanner().to_json())
     designed.write_text(scanner().model_copy(update={"covariance": None}).to_json())
