@@ -142,7 +142,7 @@ class Evaluation:
 def evaluate(
     loaded: LoadedTask, problem: Problem, angles_rad: Setting, pole: str | None, progress: Callable[[str], None]
 ) -> Evaluation:
-    """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Requirements the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Args:
         loaded: the task.

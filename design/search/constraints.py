@@ -88,7 +88,7 @@ def fan_reach(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndar
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
+class Requirements:
     """Scores settings in degrees, and refuses those that break what a search may not break."""
 
     problem: Problem

@@ -15,7 +15,7 @@ from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score
 from design.search.coarse import Landscape
-from design.search.constraints import Judge
+from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
 from design.search.tolerance import worst_within
 from design.task.task import NAMES, AngleRanges
@@ -70,7 +70,7 @@ class Leader:
 
 
 def find_leaders(
-    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], judge: Judge
+    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], judge: Requirements
 ) -> list[Leader]:
     """Local minima of J over what keeps the constraints, lowest first, then settings on their slopes.
 
@@ -116,7 +116,7 @@ def find_leaders(
     return minima + slopes
 
 
-def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Judge, kept: bool = True) -> Leader | None:
+def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Requirements, kept: bool = True) -> Leader | None:
     """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
 
     None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
@@ -182,7 +182,7 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
 
 
 def refine_leaders(
-    problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Judge, rounds: int = len(REFINE_ROUNDS)
+    problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Requirements, rounds: int = len(REFINE_ROUNDS)
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
     families: list[Family] = []
@@ -236,7 +236,7 @@ def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
 
 
 def _refined(
-    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], judge: Judge
+    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], judge: Requirements
 ) -> Setting:
     """The nearest minimum of J that keeps the constraints, rounded to 0.01 deg.
 

@@ -116,7 +116,7 @@ class Optimum:
         if found or plain is None:
             return found or ["no direction that matters is blind"]
         return [
-            "no direction that matters is blind; J alone, not asked to avoid that, would take the last row of the table",
+            "no direction that matters is blind; J alone, not asked for that, would take the last row of the table",
             *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
             f"what has no hole costs {self._price(best.score.J, plain.score.J)} against it",
         ]
@@ -131,7 +131,7 @@ class Optimum:
         lines = ["  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings"]
         lines += [_row(family) for family in self.search.best]
         if self.search.plain is not None:
-            lines.append(f"{_row(self.search.plain)} [J alone, blind]".replace("  [", " ["))
+            lines.append(f"{_row(self.search.plain).rstrip()} [J alone, blind]")
         lines += self.hole_lines()
         best = self.search.best[0].score
         for name, other in self.standard.items():

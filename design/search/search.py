@@ -16,7 +16,7 @@ from design.objective.named_objectives import Moment, Objective
 from design.objective.problem import Problem
 from design.search.coarse import Landscape, Progress, coarse_landscape
 from design.search.coarse_sweep import swept_landscape
-from design.search.constraints import Judge
+from design.search.constraints import Requirements
 from design.search.families import Family, best_leader, find_leaders, refine_leaders
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.limits import allowed_planes
@@ -79,7 +79,7 @@ def search(
         progress("no setting of the grid sees all of the region: the lowest J of all")
         land, exact = _landscape(problem, fine, progress, limits, avoid_holes=False)
         avoid = False
-    judge = Judge(problem, limits, avoid)
+    judge = Requirements(problem, limits, avoid)
     winner = best_leader(land, *fine, judge)
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
@@ -134,7 +134,7 @@ def _plain(
     problem: Problem, ranges: AngleRanges, limits: Limits, land: Landscape, grid: Grid, best: Family
 ) -> Family | None:
     """The optimum of J alone, where it has a hole: what the answer is compared with."""
-    judge = Judge(problem, limits, avoid_holes=False)
+    judge = Requirements(problem, limits, avoid_holes=False)
     leader = best_leader(land, *grid, judge, kept=False)
     if leader is None or leader.score is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
         return None
@@ -152,14 +152,14 @@ def _least_blind(problem: Problem, land: Landscape, grid: Grid) -> float:
     ways = (both_ways if problem.sweep is None else one_way)(moment, land.blind, weights)
     low, _ = lowest(blind, [ways], planes.has | planes.own, axes.has)
     least = replace(land, objective=blind, g=land.blind[None], weights=(weights,), constraints=(), plain=low, kept=low)
-    leader = best_leader(least, planes, axes, Judge(problem, NONE, avoid_holes=False))
+    leader = best_leader(least, planes, axes, Requirements(problem, NONE, avoid_holes=False))
     assert leader is not None and leader.score is not None
     return leader.score.blind_weight
 
 
 def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -> str:
     """Why a search has no answer, with what the setting of the lowest J reaches."""
-    nearest = best_leader(land, *grid, Judge(problem, NONE, avoid_holes=False), kept=False)
+    nearest = best_leader(land, *grid, Requirements(problem, NONE, avoid_holes=False), kept=False)
     assert nearest is not None and nearest.score is not None
     asked = ", ".join(
         f"{name} = {value:g}"
