@@ -72,9 +72,7 @@ def witness(
     few, one = beams.taken(sample), side[sample] == 0
 
     # The same weights for all, or their own change would pass for one of the cloud
-    forward, left = mount.plane(found)[0][2]
-    climb = np.abs(left * np.cos(few.bearing_rad) - forward * np.sin(few.bearing_rad))
-    weight = few.range_m**2 * climb * (np.ones(one.size) if stood_still(few) else np.abs(few.speed_rad_s))
+    weight = _areas(mount, found, few)
 
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
@@ -85,6 +83,13 @@ def witness(
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, found, k, after.entropy) for k in MOUNT}
     spread = (after.share - before.share) * after.weight
     return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
+
+
+def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
+    """The area across each beam that it stands for, up to a common factor, shape (n,)."""
+    forward, left = mount.plane(x)[0][2]
+    climb = np.abs(left * np.cos(beams.bearing_rad) - forward * np.sin(beams.bearing_rad))
+    return beams.range_m**2 * climb * (np.ones(climb.size) if stood_still(beams) else np.abs(beams.speed_rad_s))
 
 
 def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float) -> float | None:

@@ -11,9 +11,9 @@ from benchmarks.firmware_io.calibration_errors import BEAMS, STEP_DEG
 from benchmarks.firmware_io.rooms import FURNISHED, NAMES, Setup, Truth, Unrest, simulate, write
 from design.angles import STANDARD_DEG
 from firmware_io.calibration.calibrate import calibrate_recordings
-from firmware_io.calibration.entropy import _between, witness
+from firmware_io.calibration.entropy import _areas, _between, witness
 from firmware_io.calibration.estimate import estimate
-from firmware_io.calibration.model import gather, start_vector
+from firmware_io.calibration.model import beam_rays, gather, start_vector
 from firmware_io.calibration.report import lines
 from firmware_io.calibration.tiles import fan_side
 from firmware_io.calibration.unrest import contradicted_share
@@ -76,6 +76,14 @@ def test_residuals_are_those_of_beams_on_their_own_surfaces(tmp_path):
     """Patches that fit no surface had been held against the first one: 1.9 m of residual in a room at rest."""
     record = calibrated(tmp_path, Unrest(velocity_m_s=(3e-3, 0.0, 0.0)))
     assert record["residual_mm"]["after"] < 20
+
+
+def test_points_weigh_the_area_that_they_stand_for(beams):
+    """A fan that holds the axis: r^2 times the sine of the angle to it, for beams crowd there."""
+    mount, start = mount_of(PITCHING)
+    height = beam_rays(mount, start, beams)[1][:, 2]
+    ratio = _areas(mount, start, beams) / (beams.range_m**2 * np.sqrt(1 - height**2) * np.abs(beams.speed_rad_s))
+    np.testing.assert_allclose(ratio, 1, rtol=1e-6)
 
 
 def test_entropy_is_the_sum_over_all_pairs_and_its_shares_add_up():
