@@ -68,7 +68,8 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
 def _trajectory(what: str, rows: list[_Row]) -> Trajectory:
     values = np.array([row for _, row in rows], float).reshape(-1, 7)
     quaternion = values[:, 3:]
-    norm = np.linalg.norm(quaternion, axis=1, keepdims=True)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(quaternion, axis=1, keepdims=True)
     close = np.abs(norm - 1) < 0.01
     try:
         return Trajectory(

@@ -71,7 +71,8 @@ class Trajectory:
             raise RecordingError(f"pose {int(np.argmin(np.isfinite(values).all(axis=1))) + 1}: not a finite number")
         if (farthest_m := float(np.abs(self.position_m).max())) > _FARTHEST_M:
             raise RecordingError(f"a position of {farthest_m:.3g} m: at most {_FARTHEST_M:g}")
-        norm = np.linalg.norm(self.quaternion, axis=1)
+        with np.errstate(over="ignore"):
+            norm = np.linalg.norm(self.quaternion, axis=1)
         if np.any(np.abs(norm - 1) > _NORM_ERROR):
             worst = int(np.argmax(np.abs(norm - 1)))
             raise RecordingError(

@@ -24,6 +24,7 @@ COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring":
 """What the columns of our own clouds hold. Others keep the type of their file."""
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
+_COLUMN_KINDS = {"f4", "f8", *(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
 _EVER_NS = 2**63
 _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
@@ -58,8 +59,10 @@ class Cloud:
             row = int(np.argmax(far.any(axis=1)))
             raise RecordingError(f"row {row + 1}: a point at {self.points_m[row]} m: at most {_FARTHEST_M:g} from 0")
         for name, column in self.columns.items():
-            if column.shape != (n,) or column.dtype.kind not in "iufb":
-                raise RecordingError(f"column {name}: shape {column.shape}, {column.dtype}: {n} numbers")
+            if column.shape != (n,) or column.dtype.kind + str(column.dtype.itemsize) not in _COLUMN_KINDS:
+                raise RecordingError(
+                    f"column {name}: shape {column.shape}, {column.dtype}: {n} whole numbers, float32 or float64"
+                )
         if min(self.shape) < 0 or self.shape[0] * self.shape[1] != n:
             object.__setattr__(self, "shape", (1, n))
         check_pose(self.T_world_cloud)

@@ -9,6 +9,7 @@ naming it, takes more than 2 GB or 30 s of processor time; with its seed, which 
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import random
 import re
@@ -21,12 +22,13 @@ import traceback
 from collections import Counter
 from dataclasses import dataclass
 from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.scanwright.wrong_inputs.accidents import damage, number
-from benchmarks.scanwright.wrong_inputs.workshop import Job, furnish, jobs
+from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, Job, furnish, jobs
 from design.errors import ScanwrightError
 from firmware_io.clouds.formats import read_clouds
 from scanwright.cli.app import run
@@ -34,6 +36,7 @@ from scanwright.cli.app import run
 _MOST_BYTES = 2 << 30
 _MOST_S = 30
 _KILL_S = 2 * _MOST_S
+_HANGS_S = 3 * _KILL_S  # by the clock on the wall: other people's work may share the processor
 _ROOM_BYTES = 3 << 30  # of addresses beyond what the program has before it begins
 _FARTHEST_M = 1e8
 _LOADED = (  # once, and not anew by every child
@@ -49,7 +52,8 @@ class Ended:
     """How a command ended.
 
     Attributes:
-        code: its exit code; -1 after a traceback, -2 where it was killed.
+        code: its exit code; -1 after a traceback, -2 where a signal ended it.
+        signal: that signal, else 0.
         said: on standard output.
         complaints: lines on standard error, without progress.
         seconds: of processor time.
@@ -57,6 +61,7 @@ class Ended:
     """
 
     code: int
+    signal: int
     said: str
     complaints: tuple[str, ...]
     seconds: float
@@ -75,8 +80,10 @@ class Case:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        last = self.ended.complaints[-1][:300] if self.ended.complaints else self.ended.said.strip()[-300:]
-        return [f"seed {self.seed}: {self.fault}: {' '.join(self.words)[:200]}", f"  {self.accident}", f"  {last}"]
+        last = [line[:300] for line in self.ended.complaints or (self.ended.said.strip(),)]
+        last = last[-12:] if self.ended.code < 0 else last[-1:]
+        begin = f"seed {self.seed}: {self.fault}: {' '.join(self.words)[:200]}"
+        return [begin, f"  {self.accident}", *(f"  {line}" for line in last)]
 
 
 def tried(shop: Path, seed: int, only: str = "") -> Case:
@@ -104,33 +111,34 @@ def tried(shop: Path, seed: int, only: str = "") -> Case:
             accident = f"{named}: {damage(rng, folder / named, sorted(p for p in shop.iterdir() if p.is_file()))}"
         out = f"out{job.out}"
         words = [out if word == "OUT" else word for word in words]
-        ended = _ended(folder, words)
+        ended = _ended(folder, words, folder / out)
         return Case(seed, tuple(words), accident, ended, _fault(job, folder / out, Path(named).name, ended))
     finally:
         shutil.rmtree(folder)
 
 
-def _ended(folder: Path, words: list[str]) -> Ended:
+def _ended(folder: Path, words: list[str], out: Path) -> Ended:
     """Run a command in a child."""
     began = time.monotonic()
     child = os.fork()
     if not child:
-        _in_the_child(folder, words)
+        _in_the_child(folder, words, out)
     while True:
         done, status, used = os.wait4(child, os.WNOHANG)
         if done:
             break
-        if time.monotonic() - began > 4 * _KILL_S:
+        if time.monotonic() - began > _HANGS_S:
             os.kill(child, 9)
         time.sleep(0.005)
     said, complaints = ((folder / name).read_text(errors="replace") for name in (".said", ".complaints"))
     code = os.waitstatus_to_exitcode(status)
     lines = tuple(line for line in complaints.splitlines() if line and not line.startswith("  .."))
     seconds = used.ru_utime + used.ru_stime
-    return Ended(-2 if code < 0 else -1 if code == 99 else code, said, lines, seconds, used.ru_maxrss * 1024)
+    peak_bytes = used.ru_maxrss * 1024
+    return Ended(-2 if code < 0 else -1 if code == 99 else code, max(-code, 0), said, lines, seconds, peak_bytes)
 
 
-def _in_the_child(folder: Path, words: list[str]) -> None:
+def _in_the_child(folder: Path, words: list[str], out: Path) -> None:
     code = 99
     try:
         os.chdir(folder)
@@ -140,11 +148,17 @@ def _in_the_child(folder: Path, words: list[str]) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (addresses + _ROOM_BYTES,) * 2)
         resource.setrlimit(resource.RLIMIT_CPU, (_KILL_S, _KILL_S))
         sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
+        faulthandler.dump_traceback_later(_HANGS_S - _MOST_S, file=sys.stderr)
         sys.argv = ["scanwright", *words]
-        run()
-        code = 0
-    except SystemExit as stop:
-        code = stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1
+        try:
+            run()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 0 if stop.code is None else 1
+        if (
+            not code and out.suffix[1:] in FORMATS and out.exists()
+        ):  # here: readers begin threads, which no fork survives
+            Path(".rows").write_text(_rows(out))
     except BaseException:
         traceback.print_exc()
     finally:
@@ -158,7 +172,7 @@ def _fault(job: Job, out: Path, named: str, ended: Ended) -> str:
     if ended.code == -1:
         return "traceback"
     if ended.code == -2:
-        return "killed"
+        return f"ended by signal {ended.signal} after {ended.seconds:.1f} s of the processor"
     if ended.seconds > _MOST_S:
         return f"{ended.seconds:.0f} s"
     if ended.peak_bytes > _MOST_BYTES:
@@ -188,20 +202,26 @@ def _nonsense(job: Job, out: Path, ended: Ended) -> str:
         return ""
     if not out.exists():
         return "0 without an output"
-    if out.suffix in (".mcap", ".bag", ".json"):
+    if out.suffix[1:] not in FORMATS:
         return ""
+    rows = (out.parent / ".rows").read_text()
+    if not rows.isdecimal():
+        return f"0 with an output that cannot be: {rows}"
+    said = [word.replace(",", "") for word in re.findall(r"wrote ([\d,]+) (?:rows|points)", ended.said)]
+    return f"{said[-1]} rows said, {rows} there" if said and said[-1] != rows else ""
+
+
+def _rows(out: Path) -> str:
+    """How many rows clouds have, or what is wrong with them."""
     try:
         clouds, _ = read_clouds(out)
     except ScanwrightError as error:
-        return f"0, and its output is refused: {error}"
+        return str(error)
     points_m = np.concatenate([cloud.points_m for cloud in clouds]).astype(float)
     valid = np.isfinite(points_m).all(axis=1)
     if not valid.any() or np.abs(points_m[valid]).max() > _FARTHEST_M:
-        return "0 with points that cannot be"
-    said = [int(word.replace(",", "")) for word in re.findall(r"wrote ([\d,]+) (?:rows|points)", ended.said)]
-    if said and said[-1] != len(points_m):
-        return f"{said[-1]} rows said, {len(points_m)} there"
-    return ""
+        return "no point that can be"
+    return str(len(points_m))
 
 
 def main() -> None:
@@ -213,7 +233,11 @@ def main() -> None:
     slowest, widest = 0.0, 0
     with tempfile.TemporaryDirectory() as name:
         shop = Path(name)
-        furnish(shop)
+        furnishing = get_context("spawn").Process(
+            target=furnish, args=(shop,)
+        )  # its threads must not be here at a fork
+        furnishing.start()
+        furnishing.join()
         for room in _LOADED:
             import_module(room)
         for seed in range(first, first + count):

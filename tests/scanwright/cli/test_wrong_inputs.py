@@ -106,7 +106,13 @@ def test_noise_without_end(noise):
 
 @pytest.mark.parametrize(
     "line",
-    ["1e999999999 0 0 0 0 0 0 1", "1763000000 1e300 0 0 0 0 0 1", "1763000000 0 0 0 0 0 0 5", "1e30 0 0 0 0 0 0 1"],
+    [
+        "1e999999999 0 0 0 0 0 0 1",
+        "1763000000 1e300 0 0 0 0 0 1",
+        "1763000000 0 0 0 0 0 0 5",
+        "1763000000 0 0 0 0 0 0 1e300",
+        "1e30 0 0 0 0 0 0 1",
+    ],
 )
 def test_poses_that_nothing_can_have(refused, shop, line):
     (shop / "far.tum").write_text(f"1762999999 0 0 0 0 0 0 1\n{line}\n")
@@ -148,6 +154,8 @@ def test_a_cloud_registered_to_itself(refused, shop):
         ("start_ns", lambda a: a * 0.5),
         ("column.ring", lambda a: a[:-1]),
         ("column.ring", lambda a: a.astype(str)),
+        ("column.intensity", lambda a: a.astype("f2")),
+        ("column.intensity", lambda a: a > 0),
     ],
 )
 def test_an_archive_whose_arrays_are_no_cloud(refused, shop, name, change):
