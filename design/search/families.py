@@ -70,7 +70,7 @@ class Leader:
 
 
 def find_leaders(
-    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], judge: Requirements
+    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], required: Requirements
 ) -> list[Leader]:
     """Local minima of J over what keeps the constraints, lowest first, then settings on their slopes.
 
@@ -101,7 +101,7 @@ def find_leaders(
                 beaten |= bool((J[beside][:, there] < lowest - EQUAL).any())
                 near.append((beside, there))
         leader = _leader(J[c], planes, axes, c, way, axis)
-        exact = None if beaten else judge.score(leader.angles_deg)
+        exact = None if beaten else required.score(leader.angles_deg)
         if not beaten and exact is None:
             J[c][same] = left[c][same] = np.inf
             refused += 1
@@ -116,7 +116,9 @@ def find_leaders(
     return minima + slopes
 
 
-def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Requirements, kept: bool = True) -> Leader | None:
+def best_leader(
+    land: Landscape, planes: Folded, axes: Folded, required: Requirements, kept: bool = True
+) -> Leader | None:
     """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
 
     None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
@@ -135,7 +137,7 @@ def best_leader(land: Landscape, planes: Folded, axes: Folded, judge: Requiremen
             continue
         way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
         leader = _leader(J, planes, axes, c, int(way), int(axis))
-        exact = judge.score(leader.angles_deg)
+        exact = required.score(leader.angles_deg)
         if exact is not None:
             return replace(leader, score=exact)
         J[J.min() + EQUAL >= J] = np.inf
@@ -182,7 +184,11 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
 
 
 def refine_leaders(
-    problem: Problem, ranges: AngleRanges, leaders: list[Leader], judge: Requirements, rounds: int = len(REFINE_ROUNDS)
+    problem: Problem,
+    ranges: AngleRanges,
+    leaders: list[Leader],
+    required: Requirements,
+    rounds: int = len(REFINE_ROUNDS),
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
     families: list[Family] = []
@@ -191,8 +197,8 @@ def refine_leaders(
         if len(families) == FAMILIES:
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
-            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else rounds], judge)
-            again = judge.score(refined)
+            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else rounds], required)
+            again = required.score(refined)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
@@ -202,7 +208,7 @@ def refine_leaders(
         if len(families) == FAMILIES:
             break
         if leader.score is None and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
-            found = judge.score(leader.angles_deg)
+            found = required.score(leader.angles_deg)
             families += [] if found is None else [_family(leader.angles_deg, found, leader)]
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
@@ -236,7 +242,7 @@ def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
 
 
 def _refined(
-    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], judge: Requirements
+    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], required: Requirements
 ) -> Setting:
     """The nearest minimum of J that keeps the constraints, rounded to 0.01 deg.
 
@@ -255,7 +261,7 @@ def _refined(
             setting[free] = moved
             if ranges.tolerance_deg:
                 return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
-            return judge.J(setting, nodes)
+            return required.J(setting, nodes)
 
         start, step = angles[free], reach * ranges.step_deg
         shift = np.where(start + step <= limits[free, 1], step, -step)
@@ -280,6 +286,6 @@ def _refined(
     for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
         setting = angles.copy()
         setting[free] = corner
-        if np.isfinite(judge.J(setting, finest)):
+        if np.isfinite(required.J(setting, finest)):
             return setting + 0.0  # -0.0 is 0.0
     return leader.angles_deg

@@ -79,17 +79,17 @@ def search(
         progress("no setting of the grid sees all of the region: the lowest J of all")
         land, exact = _landscape(problem, fine, progress, limits, avoid_holes=False)
         avoid = False
-    judge = Requirements(problem, limits, avoid)
-    winner = best_leader(land, *fine, judge)
+    required = Requirements(problem, limits, avoid)
+    winner = best_leader(land, *fine, required)
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
-        leaders = find_leaders(land, *fine, mirrors, judge)
+        leaders = find_leaders(land, *fine, mirrors, required)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
-        leaders = find_leaders(_landscape(problem, coarse, progress, limits, avoid)[0], *coarse, mirrors, judge)
+        leaders = find_leaders(_landscape(problem, coarse, progress, limits, avoid)[0], *coarse, mirrors, required)
     progress("refining the minima")
-    families = refine_leaders(problem, ranges, [winner, *leaders], judge)
+    families = refine_leaders(problem, ranges, [winner, *leaders], required)
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
     return SearchResult(
@@ -134,11 +134,11 @@ def _plain(
     problem: Problem, ranges: AngleRanges, limits: Limits, land: Landscape, grid: Grid, best: Family
 ) -> Family | None:
     """The optimum of J alone, where it has a hole: what the answer is compared with."""
-    judge = Requirements(problem, limits, avoid_holes=False)
-    leader = best_leader(land, *grid, judge, kept=False)
+    required = Requirements(problem, limits, avoid_holes=False)
+    leader = best_leader(land, *grid, required, kept=False)
     if leader is None or leader.score is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
         return None
-    plain = refine_leaders(problem, ranges, [leader], judge, rounds=1)[0]
+    plain = refine_leaders(problem, ranges, [leader], required, rounds=1)[0]
     return plain if plain.score.J < best.score.J else None
 
 
