@@ -68,12 +68,13 @@ def scan_the_twins(folder: Path) -> None:
             while not (folder / "emulated.json").exists():
                 assert twins.poll() is None
                 time.sleep(0.1)
-            run("scan", folder, "-o", folder / "a.mcap")
+            for scan in ("a", "c"):
+                run("scan", folder, "-o", folder / f"{scan}.mcap")
         finally:
             twins.terminate()
     run("assemble", folder / "a.mcap", "--angles", folder / "angles.json", "-o", folder / "b.ply")
     assert (folder / "a.ply").read_bytes() == (folder / "b.ply").read_bytes()
-    assert "sigma" in run("register", folder / "a.ply", folder / "b.ply", "-o", folder / "map.ply")
+    assert "sigma" in run("register", folder / "a.ply", folder / "c.ply", "-o", folder / "map.ply")
 
 
 def refuse_what_needs_an_extra() -> None:
