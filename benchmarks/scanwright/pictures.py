@@ -23,14 +23,17 @@ from benchmarks.scanwright.robot_picture import height_colours, points_of, scann
 from design.angles import AngleSet
 
 HERE = Path(__file__).parents[2] / "docs/pictures"
-SETTINGS = {"rolling, a usual mount": (0, 90, 0, -90), "the angles that were found": (-180, 55, 80, -75)}
+ROLLING = (0.0, 90.0, 0.0, -90.0)
 SIZE = (640, 560)
 
 
 def main() -> None:
     """Write the pictures, as far as there is what they show."""
     build = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ground_ahead")
-    sw.draw_density("ground_ahead", SETTINGS).savefig(HERE / "density.png", dpi=80, metadata={"Software": None})
+    found = sw.load_angles(build / "angles.json").angles_deg
+    mounting = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
+    settings = {"rolling, a usual mount": ROLLING, "the angles that were found": mounting}
+    sw.draw_density("ground_ahead", settings).savefig(HERE / "density.png", dpi=80, metadata={"Software": None})
     parts(build / "exploded.glb", HERE / "parts.png")
     emulated_room(sw.load_angles(build / "angles.json"), HERE / "cloud.png")
     diagram = build.parent / "accuracy" / build.name / "work_precision.png"

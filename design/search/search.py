@@ -25,6 +25,7 @@ from design.task.task import NAMES, AngleRanges, Limits
 
 LEADERS_STEP_DEG = 5.0
 NONE = Limits()
+DENSER = 1.05  # where a density is not kept between the nodes
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,22 +73,27 @@ def search(
     progress(_looked_over(problem, fine))
     avoid = ranges.holes == "avoid"
     land, exact = _landscape(problem, fine, progress, limits, avoid)
-    holes_left = avoid and not np.isfinite(land.kept.by_plane).any()
     least_blind = None
-    if holes_left:  # nothing is free of them: the lowest J of all, and what it misses is said
+    if avoid and not np.isfinite(land.kept.by_plane).any():  # nothing is free of holes: the lowest J of all
         least_blind = _least_blind(problem, land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
-        land, exact = _landscape(problem, fine, progress, limits, avoid_holes=False)
         avoid = False
+        land, exact = _landscape(problem, fine, progress, limits, avoid)
     required = Requirements(problem, limits, avoid)
     winner = best_leader(land, *fine, required)
+    asked = limits
+    while winner is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
+        # what is dense enough at the nodes is not between them: ask for more at the nodes
+        asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
+        land, exact = _landscape(problem, fine, progress, asked, avoid)
+        winner = best_leader(land, *fine, required)
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
         leaders = find_leaders(land, *fine, mirrors, required)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
-        leaders = find_leaders(_landscape(problem, coarse, progress, limits, avoid)[0], *coarse, mirrors, required)
+        leaders = find_leaders(_landscape(problem, coarse, progress, asked, avoid)[0], *coarse, mirrors, required)
     progress("refining the minima")
     families = refine_leaders(problem, ranges, [winner, *leaders], required)
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
@@ -160,7 +166,8 @@ def _least_blind(problem: Problem, land: Landscape, grid: Grid) -> float:
 def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -> str:
     """Why a search has no answer, with what the setting of the lowest J reaches."""
     nearest = best_leader(land, *grid, Requirements(problem, NONE, avoid_holes=False), kept=False)
-    assert nearest is not None and nearest.score is not None
+    if nearest is None or nearest.score is None:
+        return "weight: no setting of the grid brings a beam near the region: widen it, the angles, or ball_radius_deg"
     asked = ", ".join(
         f"{name} = {value:g}"
         for name, value in (("min_density", limits.min_density), ("max_blind_weight", limits.max_blind_weight))

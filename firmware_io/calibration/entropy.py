@@ -4,8 +4,8 @@
 
 No tiles, no planes, no rejection: a cloud whose two halves fall on each other is crisp, whatever its surfaces are.
 Each point weighs the area that it stands for, so that near surfaces do not drown far ones, nor those about the axis,
-where beams crowd, the rest: r^2 dOmega is r^2 |b'_z| db dpsi with b' the beam's change along the fan (its z is the sine
-of the angle to the axis, for a fan that holds the axis).
+where beams crowd, the rest: r^2 dOmega is r^2 times the beam's change along the fan towards the axis, db, and
+dpsi (for a fan that holds the axis: times the sine of the angle to it).
 
 A sum over pairs of a sample is known as well as the sample is large: what each point adds to the change of the entropy
 says how well (W. Hoeffding, "A Class of Statistics with Asymptotically Normal Distribution", 1948).

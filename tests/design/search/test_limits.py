@@ -145,3 +145,13 @@ def test_a_rise_within_the_error_of_J_is_none():
     )
     assert rise_words(rises, 1e-5).startswith("J rises by 0.0002 (alpha_rot), 0.0101")
     assert rise_words(rises, 0.02) == "J rises by no more than its error, whichever angle it is"
+
+
+def test_a_region_that_no_setting_sees_is_told():
+    task = loaded(
+        weight=[{"shape": "cone", "axis": [0, 0, 1], "half_angle_deg": 3}],
+        angles={"alpha_rot_deg": 0, "beta_rot_deg": 0, "alpha_laser_deg": 0, "beta_laser_deg": 0},
+        density={"objective": "homogeneity", "ball_radius_deg": 1.0},
+    )
+    with pytest.raises(TaskError, match="no setting of the grid brings a beam near the region"):
+        search(problem_of(task), task.task.angles)
