@@ -17,8 +17,9 @@ import numpy as np
 
 from design.arrays import Array, Counts
 from design.errors import TaskError
+from design.sphere.painting import MAP
 from design.sphere.polar_rule import circle_rule
-from design.sphere.regions import MAP, Field, field_of
+from design.sphere.regions import Field, field_of
 from design.task.shapes import Region
 from design.task.task import LoadedTask
 

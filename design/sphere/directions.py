@@ -9,7 +9,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.errors import TaskError
-from design.sphere.regions import ALL, BAND, CONE, Field, frames_about
+from design.sphere.painting import ALL, BAND, CONE
+from design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
 MOST_LOOKS = 1_000_000  # directions looked at in one patch

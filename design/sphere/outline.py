@@ -9,8 +9,9 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from design.concurrency.parallel import in_chunks
+from design.sphere.painting import MAP
 from design.sphere.polar_rule import around, edge_corners
-from design.sphere.regions import MAP, Field, frames_about
+from design.sphere.regions import Field, frames_about
 
 AROUND = 3600  # points of each edge: what an arc reaches further between two of them is below 4e-7 rad
 BETWEEN = 9  # points of each edge of a cell of a map

@@ -14,7 +14,8 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
 from design.arrays import Vector
-from design.sphere.regions import BAND, CONE, MAP, Field, frames_about
+from design.sphere.painting import BAND, CONE, MAP
+from design.sphere.regions import Field, frames_about
 
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them

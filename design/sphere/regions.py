@@ -13,17 +13,14 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints, Vector
+from design.arrays import Array, Vector
 from design.concurrency.parallel import in_chunks
 from design.scene.surface import Surface
+from design.sphere.painting import ALL, BAND, CONE, MAP, circle_means, first_patch, values_at
 from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, MapRegion, MaskRegion, Region
 from design.task.task import LoadedTask
-
-ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
-EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +78,7 @@ class Field:
 
     def patch_at(self, directions: Float[ndarray, "n 3"]) -> Int[ndarray, " n"]:
         """The first of `patches` that holds each direction; their number where none does. Shape (n,)."""
-        return _first_patch(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables)
+        return first_patch(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables)
 
     def on_circles(
         self, axis: Vector, polar_rad: Float[ndarray, " n"]
@@ -89,7 +86,7 @@ class Field:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
         numbers = self._numbers()
         frame = frames_about(axis[None])
-        parts = in_chunks(lambda chunk: _circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
+        parts = in_chunks(lambda chunk: circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad))
         return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
 
     def on_circles_about(
@@ -98,7 +95,7 @@ class Field:
         """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
         numbers = self._numbers()
         frames = frames_about(axes)
-        parts = in_chunks(lambda chunk: _circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
+        parts = in_chunks(lambda chunk: circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
         return np.concatenate(parts)
 
     def _numbers(self) -> tuple[Array, Array, Array, Array, Array, float]:
@@ -216,131 +213,4 @@ def _stack(tables: list[Array]) -> Array:
 
 
 def _paint(layers: Layers, directions: Float[ndarray, "n 3"], background: float) -> Float[ndarray, " n"]:
-    return _values(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables, background)
-
-
-@njit(cache=True, nogil=True)
-def _value(x: float, y: float, z: float, rows: Array, tables: Array, background: float) -> float:
-    """Value of the last painted region that contains the direction."""
-    for i in range(rows.shape[0] - 1, -1, -1):
-        if _holds(x, y, z, rows[i]):
-            return rows[i, 7] * _of_cell(x, y, z, rows[i], tables)
-    return background
-
-
-@njit(cache=True, nogil=True)
-def _holds(x: float, y: float, z: float, row: Array) -> bool:
-    """Whether a region contains the direction; edges are inclusive."""
-    if row[0] == CONE:
-        return x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE
-    if row[0] == BAND:
-        if not row[1] - EDGE <= z <= row[2] + EDGE:
-            return False
-        return x * row[3] + y * row[4] >= row[5] * np.sqrt(x * x + y * y) - EDGE
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
-    """What a map holds at the direction; 1 of any other region."""
-    if row[0] != MAP:
-        return 1.0
-    theta = np.arctan2(np.sqrt(x * x + y * y), z)
-    phi = np.arctan2(y, x)
-    height, width = int(row[2]), int(row[3])
-    r = min(int(theta / np.pi * height), height - 1)
-    c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
-    return tables[int(row[1]), r, c]
-
-
-@njit(cache=True, nogil=True)
-def _first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
-    out = np.full(directions.shape[0], rows.shape[0])
-    for i in range(directions.shape[0]):
-        x, y, z = directions[i]
-        for k in range(rows.shape[0]):
-            if _holds(x, y, z, rows[k]) and _of_cell(x, y, z, rows[k], tables) > 0.0:
-                out[i] = k
-                break
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _values(directions: Array, rows: Array, tables: Array, background: float) -> Array:
-    out = np.empty(directions.shape[0])
-    for i in range(directions.shape[0]):
-        out[i] = _value(directions[i, 0], directions[i, 1], directions[i, 2], rows, tables, background)
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _sort(values: Array, n: int) -> None:
-    """Sort the first n values in place: by insertion while they are few, as on nearly every circle."""
-    if n > 32:
-        values[:n] = np.sort(values[:n])
-        return
-    for i in range(1, n):
-        value = values[i]
-        j = i - 1
-        while j >= 0 and values[j] > value:
-            values[j + 1] = values[j]
-            j -= 1
-        values[j + 1] = value
-
-
-@njit(cache=True, nogil=True)
-def _circle_means(
-    frames: Array,
-    polar: Array,
-    planes: Array,
-    weight_rows: Array,
-    weight_tables: Array,
-    mask_rows: Array,
-    mask_tables: Array,
-    background: float,
-) -> tuple[Array, Array]:
-    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles)."""
-    weights = np.empty((len(frames), len(polar)))
-    shares = np.empty((len(frames), len(polar)))
-    cuts = np.empty(2 * len(planes) + 1)
-    inside = np.empty((len(planes), 3))
-    for f in range(len(frames)):
-        frame = frames[f]
-        for k in range(len(planes)):
-            for axis in range(3):
-                m = planes[k]
-                inside[k, axis] = m[0] * frame[axis, 0] + m[1] * frame[axis, 1] + m[2] * frame[axis, 2]
-        for i in range(len(polar)):
-            st, ct = np.sin(polar[i]), np.cos(polar[i])
-            n = 0
-            for k in range(len(planes)):
-                a, b = st * inside[k, 0], st * inside[k, 1]
-                c = planes[k, 3] - ct * inside[k, 2]
-                r = np.sqrt(a * a + b * b)
-                if r > abs(c):
-                    middle, half = np.arctan2(b, a), np.arccos(c / r)
-                    cuts[n] = (middle - half) % (2 * np.pi)
-                    cuts[n + 1] = (middle + half) % (2 * np.pi)
-                    n += 2
-            if n == 0:
-                cuts[0] = 0.0
-                n = 1
-            _sort(cuts, n)
-            weight, share = 0.0, 0.0
-            for j in range(n):
-                after = cuts[j + 1] if j + 1 < n else cuts[0] + 2 * np.pi
-                arc = after - cuts[j]
-                if arc <= 0.0:
-                    continue
-                p = 0.5 * (cuts[j] + after)
-                u, v = st * np.cos(p), st * np.sin(p)
-                x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
-                y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]
-                z = u * frame[0, 2] + v * frame[1, 2] + ct * frame[2, 2]
-                if _value(x, y, z, mask_rows, mask_tables, 0.0) > 0.0:
-                    continue
-                share += arc
-                weight += arc * _value(x, y, z, weight_rows, weight_tables, background)
-            weights[f, i] = weight / (2 * np.pi)
-            shares[f, i] = share / (2 * np.pi)
-    return weights, shares
+    return values_at(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables, background)
