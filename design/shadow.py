@@ -49,7 +49,10 @@ def load_own_body(path: Path) -> tuple[Shadow, Float[ndarray, " beams"]]:
     Raises:
         BuildError: the file is missing, damaged, or its arrays do not fit each other.
     """
-    held = read_npz(path, BuildError)
+    try:
+        held = read_npz(path, BuildError)
+    except BuildError as error:
+        raise BuildError(f"{error}: build the folder again") from error
     bearings_rad, beams, stator = held.get("bearing_rad"), held.get("beams"), held.get("stator")
     if bearings_rad is None or bearings_rad.dtype != float or bearings_rad.ndim != 1 or bearings_rad.size < 2:
         raise BuildError(f"{path}: bearing_rad: two or more numbers: build the folder again")

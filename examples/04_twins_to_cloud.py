@@ -32,8 +32,7 @@ def main() -> None:
     print("\n".join([*scanned.recorded.lines(), *scanned.assembled.lines()]))
 
     cloud = sw.read_cloud(folder / "turn.ply")
-    rows, beams = cloud.shape
-    print(f"{rows} scans of {beams} beams; columns {', '.join(cloud.columns)}")
+    print(f"{len(cloud.points_m):,} points; columns {', '.join(cloud.columns)}")
 
 
 if __name__ == "__main__":

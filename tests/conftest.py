@@ -112,6 +112,7 @@ CHROMIUM = [
     "--enable-unsafe-swiftshader",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]
+NOT_OURS = ("THREE.Clock: This module has been deprecated",)  # the page server's own drawing library says so
 AT_HOME = ("file://", "data:", "blob:", "about:", "http://127.0.0.1:", "ws://127.0.0.1:")
 
 
@@ -130,13 +131,17 @@ class Browser:
         """A page of its own, with nothing kept from another one, once it has loaded; options as Playwright has them."""
         page = self.chromium.new_context(viewport={"width": width, "height": height}, **options).new_page()
         page.set_default_timeout(60_000)  # for a machine that has much else to do
-        page.on("console", lambda said: said.type in ("error", "warning") and self.complaints.append(said.text))
+        page.on("console", lambda said: self._said(said.type, said.text))
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda asked: self._seen(asked.url))
         page.on("dialog", self._asked)
         page.on("websocket", lambda asked: self._seen(asked.url))
         page.goto(address)
         return page
+
+    def _said(self, kind, text):
+        if kind in ("error", "warning") and not text.startswith(NOT_OURS):
+            self.complaints.append(text)
 
     def _asked(self, dialog):
         self.complaints.append(f"asked the person: {dialog.message}")

@@ -12,7 +12,7 @@ SAID = {  # script -> what its output must hold
     "01_task_to_angles.py": r"(?P<factor>[\d.]+) times the beams where it matters",
     "02_density_picture.py": r"wrote out/examples/density\.png",
     "03_linkage_as_shape.py": r"linkage: \d+\.\d cm3",
-    "04_twins_to_cloud.py": r"\d+ scans of 1081 beams; columns time_s, joint_rad, ring",
+    "04_twins_to_cloud.py": r"[\d,]+ points; columns time_s, joint_rad, ring",
     "05_simulate_and_deskew_by_hand.py": r"at most 0\.\d+ um from the library's",
     "06_write_a_recording.py": r"wrote [\d,]+ points of 86,480 beams",
     "07_calibrate.py": r"x \[deg\]  built  0\.400, found  0\.\d+ \+- 0\.\d+",

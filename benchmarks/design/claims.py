@@ -25,11 +25,12 @@ from design.arrays import Array
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.objective.problem import Problem, problem_of
-from design.objective.score import Score, quick_J, score
+from design.objective.score import Score, score
 from design.scene.surface import Surface, cell_directions
+from design.search.constraints import Requirements
 from design.search.families import EQUAL, Family
 from design.search.search import search
-from design.task.task import NAMES, AngleRanges, LoadedTask, Task, load_task, shipped_tasks
+from design.task.task import NAMES, AngleRanges, Limits, LoadedTask, Task, load_task, shipped_tasks
 
 MOST_ERROR = 1e-3  # that a score may state at the default
 SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")
@@ -144,11 +145,12 @@ def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int,
     low, high = np.array([ranges.limits(name) for name in NAMES]).T
     drawn = np.random.default_rng(seed).uniform(low, high, (draws, 4))
     free = high > low
+    required = Requirements(problem, Limits(), ranges.holes == "avoid" and found.least_blind is None)
 
     def J(moved: Array) -> float:
         setting = low.copy()
         setting[free] = moved
-        return quick_J(problem, np.radians(setting), LOOKS[0][0])
+        return required.J(setting, LOOKS[0][0])
 
     bounds = np.column_stack([low, high])[free]
     evolved = differential_evolution(J, bounds, maxiter=generations, tol=1e-6, polish=False, rng=seed)
@@ -158,21 +160,21 @@ def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int,
     return Contest(
         best=found.best[0],
         rivals={
-            f"{draws:,} random settings": best_of(problem, drawn),
+            f"{draws:,} random settings": best_of(required, drawn),
             f"differential evolution, {evolved.nfev:,} settings": (setting, score(problem, np.radians(setting))),
         },
         once=bool((np.diff(J_found) > EQUAL).all()),
     )
 
 
-def best_of(problem: Problem, settings_deg: Array) -> tuple[Array, Score]:
-    """The best of many settings: all looked at roughly, the best of them more closely, the last few scored."""
+def best_of(required: Requirements, settings_deg: Array) -> tuple[Array, Score]:
+    """The best of many settings that are no refused ones: all looked at roughly, the best more closely, then scored."""
     left = settings_deg
     for nodes, kept in LOOKS:
-        J = [quick_J(problem, setting, nodes) for setting in np.radians(left)]
+        J = [required.J(setting, nodes) for setting in left]
         left = left[np.argsort(J)[:kept]]
-    scores = [score(problem, setting) for setting in np.radians(left)]
-    best = int(np.argmin([s.J for s in scores]))
+    scores = [score(required.problem, setting) for setting in np.radians(left)]
+    best = int(np.argmin([s.J if required.keeps(s, at) else np.inf for s, at in zip(scores, left, strict=True)]))
     return left[best], scores[best]
 
 

@@ -149,7 +149,7 @@ def coarse_landscape(
         progress(f"all axes of all {len(exact):,} scan planes")
         plain, kept = lowest_of(everything, everything)
         bounds = by_plane((plain, kept))
-        best = bounds[:, exact].min(axis=1)
+        best = np.where(exact, bounds, np.inf).min(axis=1)
         if not np.any(may_win(bounds, best) & ~exact):
             break
     return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())

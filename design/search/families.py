@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -259,19 +260,20 @@ def _refined(
         def J(moved: Array, nodes: int = nodes) -> float:
             setting = angles.copy()
             setting[free] = moved
-            if ranges.tolerance_deg:
-                return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
-            return required.J(setting, nodes)
+            designed = required.J(setting, nodes)
+            if not ranges.tolerance_deg or not np.isfinite(designed):
+                return designed
+            return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
 
-        start, step = angles[free], reach * ranges.step_deg
-        shift = np.where(start + step <= limits[free, 1], step, -step)
+        start = angles[free]
+        corners = _simplex(J, start, reach * ranges.step_deg, limits[free])
         found = minimize(
             J,
             start,
             method="Nelder-Mead",
             bounds=limits[free],
             options={
-                "initial_simplex": np.vstack([start, start + np.diag(shift)]),
+                "initial_simplex": np.vstack([start, corners]),
                 "xatol": FINEST_DEG / 2,
                 "fatol": 1e-7,
                 "maxfev": 30 * len(start),
@@ -289,3 +291,13 @@ def _refined(
         if np.isfinite(required.J(setting, finest)):
             return setting + 0.0  # -0.0 is 0.0
     return leader.angles_deg
+
+
+def _simplex(J: Callable[[Array], float], start: Array, step: float, limits: Array) -> Array:
+    """A setting a step along each angle, (free, free): to the side of the lower J, for one may be refused."""
+    corners = np.tile(start, (len(start), 1))
+    for i, (low, high) in enumerate(limits):
+        sides = [np.where(np.arange(len(start)) == i, start + sign * step, start) for sign in (1, -1)]
+        allowed = [side for side in sides if low <= side[i] <= high] or [np.clip(sides[0], *limits.T)]
+        corners[i] = min(allowed, key=J)
+    return corners

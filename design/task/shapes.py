@@ -16,7 +16,7 @@ Number = Annotated[float, Strict()]
 
 Span = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
-Value = Annotated[Number, Field(ge=0, le=1e100)]
+Value = Annotated[Number, Field(ge=0, le=1e300)]
 
 
 def _divides_the_half_circle(step: float) -> float:

@@ -20,7 +20,6 @@ from numpy import ndarray
 from design.angles import AngleSet
 from design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
 from design.concurrency.parallel import in_chunks
-from design.errors import RecordingError
 from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import PosePieces, Trajectory, at_rest
@@ -111,10 +110,6 @@ class _Fan(NamedTuple):
 
 
 def _fan(scan: Scan, angles: AngleSet, own_body: OwnBody | None) -> _Fan:
-    if not scan.time_increment_s >= 0:
-        raise RecordingError(
-            f"time_increment = {scan.time_increment_s} s: beams are fired one after the other, 0 or more"
-        )
     bearing_rad, T_rot_laser = scan.bearing_rad, angles.T_rot_laser()
     x, y, z = np.ascontiguousarray(
         np.multiply.outer(T_rot_laser[:3, 0], np.cos(bearing_rad))

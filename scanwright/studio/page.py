@@ -273,9 +273,8 @@ class Studio:
                     self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
                     self.kept.rejudge(self.judge)  # with the period that was found
                     self.move(Setting.within_bounds(optimum.search.best[0].angles_deg))
-                    self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}")
-                    for line in optimum.hole_lines():
-                        self.say(line)
+                    holes = "; ".join(optimum.hole_lines())
+                    self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}: {holes}")
             except TaskError as error:
                 self.say(str(error), bad=True)
             finally:

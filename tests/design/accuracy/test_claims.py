@@ -14,7 +14,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.objective import score as scoring
 from design.objective.problem import problem_of
 from design.objective.score import score
-from design.search import coarse, coarse_sweep, families
+from design.search import coarse, families
 from design.search.coarse import coarse_landscape
 from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.optimum import directions_left_out
@@ -104,7 +104,6 @@ def test_densities_bounded_and_computed(motion, monkeypatch):
     problem, ranges = case({"weight": [BAND]} | motion, {"step_deg": 45, "alpha_rot_deg": 0, "beta_rot_deg": [0, 45]})
     bounded = search(problem, ranges)
     monkeypatch.setattr(coarse, "MARGIN", np.inf)
-    monkeypatch.setattr(coarse_sweep, "MARGIN", np.inf)
     computed = search(problem, ranges)
     told = {entry.what: entry for entry in bounded.left_out}
     assert told["exact densities"].saved > 0

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import time
 from contextlib import contextmanager
 
@@ -100,7 +101,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     enter(page, 1, -50.0)
     until(lambda: studio.facts.exact and studio.facts.setting == Setting((0, -50, 0, -90)))
     code, printed, _ = command("evaluate", folder / "small.toml", "--angles=0,-50,0,-90")
-    J = printed.split()[1]
+    J = re.search(r"^J +(\S+)", printed, re.M)[1]
     assert code == 0 and f"{studio.facts.J:.5f}" == J
     page.get_by_text(J, exact=True).wait_for()
 

@@ -83,7 +83,7 @@ def test_periods_and_mountings_take_the_place_of_those_of_the_task(tmp_path):
     assert found[3].loaded.task.angles == base.angles
     assert upright.loaded.task.motion.period_s == 2.0
     assert shortest.loaded.task.motion.mode == "shortest"
-    assert "MX-64R': turns at" in fast.refused  # 120 rpm
+    assert "servo = 'MX-64R' turns at 63 rpm" in fast.refused  # 120 rpm
     with pytest.raises(TaskError, match="no period"):
         _with_period({"mode": "stop_and_go"}, 2.0)
 
