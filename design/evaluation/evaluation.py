@@ -99,11 +99,12 @@ class Evaluation:
     def lines(self) -> list[str]:
         """The same, a line for each figure."""
         J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
+        ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
             *self._doubts(),
             *(
                 [f"hole           {hole.words()}" for hole in self.holes]
-                or ["holes          none: no direction that matters is blind"]
+                or [f"holes          none: every direction that matters has beams within {ball_deg:g} deg"]
             ),
             f"J              {J.J:.5f} +- {J.J_error:.1e}   mean of g(true count) over the start phase",
             f"J_lower        {J.J_lower:.5f}             g of the mean count: a lower bound",

@@ -113,10 +113,11 @@ class Optimum:
             found.insert(
                 0, f"no setting of the grid sees all of the region: at least {percent(least)} of the weight is blind"
             )
+        seen = f"every direction that matters has beams within {np.degrees(self.problem.ball_rad):g} deg"
         if found or plain is None:
-            return found or ["no direction that matters is blind"]
+            return found or [seen]
         return [
-            "no direction that matters is blind; J alone, not asked for that, would take the last row of the table",
+            f"{seen}; J alone, not asked for that, would take the last row of the table",
             *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
             f"what has no hole costs {self._price(best.score.J, plain.score.J)} against it",
         ]
