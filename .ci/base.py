@@ -24,7 +24,7 @@ ANGLES = {
     "angles_deg": {"alpha_rot": 0, "beta_rot": -55, "alpha_laser": -80, "beta_laser": 75},
     "sensor": "URG-04LX",
     "servo": "MX-64R",
-    "motion": {"mode": "spin", "period_s": 2.0},
+    "motion": {"mode": "spin", "period_s": 5.0},
 }
 COMMAND = Path(sys.executable).with_name("scanwright")
 

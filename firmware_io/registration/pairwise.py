@@ -73,9 +73,11 @@ def align(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     """Register b to a from a start that is right to about a metre and ten degrees."""
     near = align_coarsely(a, b, T_a_b)
     T, converged = _gicp(a.fine, b.fine, near, _FINE_REACH * a.spacing_m, THREADS)
-    pair = judge_pair(a, b, T, converged)
+    pair = judge_pair(a, b, T)
     exact = None if pair.why_not else adjust(a.beams, b.beams, T, a.spacing_m)
-    return pair if exact is None else replace(pair, T_a_b=exact.T_a_b, covariance=exact.covariance)
+    if exact is not None:  # from wherever small_gicp was: in sparse clouds its neighbours change at every step
+        return replace(pair, T_a_b=exact.T_a_b, covariance=exact.covariance)
+    return pair if converged else refused(pair, f"small_gicp had not settled after {_MAX_STEPS} steps")
 
 
 def refused(pair: Pair, why: str) -> Pair:
@@ -88,7 +90,7 @@ def align_coarsely(a: SensorView, b: SensorView, T_a_b: Pose) -> Pose:
     return _gicp(a.coarse, b.coarse, T_a_b, _COARSE_REACH_M, 1)[0]
 
 
-def judge_pair(a: SensorView, b: SensorView, T_a_b: Pose, converged: bool) -> Pair:
+def judge_pair(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     """Weigh a pose by what both scanners saw."""
     near_m = _FINE_REACH * a.spacing_m
     T_b_a = np.linalg.inv(T_a_b)
@@ -108,8 +110,6 @@ def judge_pair(a: SensorView, b: SensorView, T_a_b: Pose, converged: bool) -> Pa
         J = _jacobian(normals, points_m, T_a_b)
         covariance = _sandwich(J, residual_m, _blocks(points_m, normals, _BLOCK * a.spacing_m))
     why_not = []
-    if not converged:
-        why_not.append(f"small_gicp had not settled after {_MAX_STEPS} steps")
     if overlap < MIN_OVERLAP:
         why_not.append(
             f"only {overlap:.0%} of the points lie on the other cloud: at least {MIN_OVERLAP:.0%} are needed"
