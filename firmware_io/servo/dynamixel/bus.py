@@ -193,8 +193,7 @@ class ServoBus:
                         tries += 1
                     if tries == _TRIES:
                         raise type(error)(f"{self.port}: servo {servo_id}: {error}") from error
-                    if silent:
-                        self._let_pass()
+                    self._let_pass()
 
     def _send(self, request: bytes, wait_s: float) -> None:
         self._line.clearPort()
@@ -202,10 +201,12 @@ class ServoBus:
         self._line.expect(len(request) * self._line.byte_s + wait_s)
 
     def _let_pass(self) -> None:
-        """Wait for an answer that is late, and drop it: answers carry no number, so it would be taken for the next."""
+        """Wait for answers that are late, and drop them: they carry no number, so one would be taken for the next."""
         self._line.expect(_LATE * self._line.wait_s)
-        with suppress(DeviceTimeoutError, ProtocolError):
-            self._receive()
+        with suppress(DeviceTimeoutError):
+            while True:
+                with suppress(ProtocolError):
+                    self._receive()
 
     def _receive(self, servo_id: int | None = None) -> _Status:
         """The next status of a servo, or of any.
