@@ -186,6 +186,22 @@ def test_a_damaged_answer_is_asked_again(bus):
     assert len(wire.sent) == 3
 
 
+def test_late_answers_to_orders_are_not_taken_for_those_to_questions(bus):
+    """Three orders were given twice on a busy computer: their answers come one by one, each after the next request."""
+    late = [status(1.0, 1, 0, b"")] * 3
+    line, wire = bus(1.0, lambda _: late.append(status(1.0, 1, 0, b"\1\2")) or b"", tries=3, wait_s=0.02)
+    take, deadlines = wire.read, set()
+
+    def read(length):
+        if line._line.deadline_s not in deadlines:
+            deadlines.add(line._line.deadline_s)
+            wire.pending += late.pop(0)
+        return take(length)
+
+    wire.read = read
+    assert line.read(1, Register(36, 2)).data == b"\1\2"
+
+
 def test_a_late_answer_is_not_taken_for_the_next(bus):
     """Answers carry no number; the one that comes while the next is asked for tells of an earlier moment."""
     answers = iter([b"", status(1.0, 1, 0, b"\7\7")])
