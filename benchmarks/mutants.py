@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 _MOST_S = 600.0
@@ -125,13 +126,14 @@ def _other(number: float) -> float:
 def _changed(source: str, place: int) -> str:
     """The source with one node changed; comments are lost, nothing else is."""
     tree = copy.deepcopy(ast.parse(source))
+    node: Any  # which fields it has follows from the kind of change
     node, field, _ = list(_places(tree))[place]
     if field == "op":
-        node.op = _SWAPPED[type(node.op)]()  # type: ignore[attr-defined]
+        node.op = _SWAPPED[type(node.op)]()
     elif field == "ops":
-        node.ops[0] = _SWAPPED[type(node.ops[0])]()  # type: ignore[attr-defined]
+        node.ops[0] = _SWAPPED[type(node.ops[0])]()
     elif field == "value":
-        node.value = _other(node.value)  # type: ignore[attr-defined]
+        node.value = _other(node.value)
     elif isinstance(node, ast.UnaryOp):
         if isinstance(node.op, ast.USub):
             node.op = ast.UAdd()

@@ -135,17 +135,17 @@ def coarse_landscape(
     exact = np.zeros(g.shape[1], dtype=bool)
     best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
     while True:
-        for todo in _batches(bounds):
-            todo = todo[may_win(bounds[:, todo], best + SCOUTED) & ~exact[todo]]
-            if not len(todo):
+        for batch in _batches(bounds):
+            batch = batch[may_win(bounds[:, batch], best + SCOUTED) & ~exact[batch]]
+            if not len(batch):
                 continue
             if exact.sum() // REPORT > (exact.sum() - BATCH) // REPORT:
                 progress(f"exact densities: {exact.sum()} of at most {len(exact):,} scan planes")
-            g[:, todo], least[todo] = _exact(problem, polar, shown[todo])
-            exact[todo] = True
+            g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
+            exact[batch] = True
             if limits.min_density is not None:
-                thin[todo] = least[todo] < limits.min_density
-            best = np.minimum(best, by_plane(lowest_of(todo, scouts)).min(axis=1))
+                thin[batch] = least[batch] < limits.min_density
+            best = np.minimum(best, by_plane(lowest_of(batch, scouts)).min(axis=1))
         progress(f"all axes of all {len(exact):,} scan planes")
         plain, kept = lowest_of(everything, everything)
         bounds = by_plane((plain, kept))

@@ -302,12 +302,16 @@ def _check_speed(task: Task, products: Catalogue, source: Path) -> None:
     motion = task.motion
     if not isinstance(motion, Spin | Sweep):
         return
-    rpm = 60 / motion.period_s if isinstance(motion, Spin) else motion.cruise_deg_s / 6
     most, field = fastest_rpm(task, products)
+    if isinstance(motion, Spin):
+        rpm, least_s = 60 / motion.period_s, 60 / most
+    else:
+        span_deg, cruise_deg_s = motion.limits_deg[1] - motion.limits_deg[0], 6 * most
+        rpm, least_s = motion.cruise_deg_s / 6, 2 * (span_deg / cruise_deg_s + cruise_deg_s / motion.accel_deg_s2)
     if rpm > most:
         raise TaskError(
             f"{source}: motion.period_s = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} "
-            f"rpm at most, without a load: take {motion.period_s * rpm / most:.3g} or more"
+            f"rpm at most, without a load: take {np.ceil(1000 * least_s) / 1000:g} or more"
         )
 
 

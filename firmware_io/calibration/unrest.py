@@ -135,8 +135,8 @@ def warnings(found: tuple[Drift, ...], contradicted: float, residual_m: float, n
             )
     if contradicted > _MANY:
         said.append(
-            f"{contradicted:.1%} of the beams end before what the other side of the fan saw there: somebody walked, or "
-            "something was moved"
+            f"{100 * contradicted:.2g} % of the beams end before what the other side of the fan saw there: somebody "
+            "walked, or something was moved"
         )
     if residual_m > _RESIDUAL * noise_m:
         said.append(

@@ -15,7 +15,14 @@ from scanwright.cli import clouds, design, devices, pages, parts
 from scanwright.cli.console import complain, notes_of
 
 _OF_THE_SYSTEM = {
-    *(errno.ENAMETOOLONG, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
+    errno.EACCES,
+    errno.EDQUOT,
+    errno.EFBIG,
+    errno.EIO,
+    errno.ENAMETOOLONG,
+    errno.ENOSPC,
+    errno.EPERM,
+    errno.EROFS,
 }
 """What a disk refuses, wherever it does: never a bug of ours."""
 

@@ -158,7 +158,8 @@ def register(
     from scanwright import api
 
     found = api.register(
-        *(clouds, out),
+        clouds,
+        out,
         poses=poses,
         start=start,
         angles=angles,

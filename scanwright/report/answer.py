@@ -71,12 +71,14 @@ class BuildAnswer:
     Attributes:
         own: of the setting itself.
         holes: where the region is blind, in words.
+        ball_deg: within which a beam counts for a direction.
         rises: by mounting angle, how much J rises when it alone is 1 deg off, the worse of the two ways.
         worst: the largest of `rises` as the share of beams per direction that it costs; None where J is no logarithm.
     """
 
     own: Seen
     holes: tuple[str, ...]
+    ball_deg: float
     standard: tuple[Standard, ...]
     cones: tuple[ConeOnMap, ...]
     masked_fraction: float
@@ -111,6 +113,7 @@ def answer(problem: Problem, angles: AngleSet) -> BuildAnswer:
     return BuildAnswer(
         own=_seen(problem, setting, score(problem, setting)),
         holes=tuple(hole.words() for hole in holes(problem, setting)),
+        ball_deg=float(np.degrees(problem.ball_rad)),
         standard=tuple(standard),
         cones=tuple(
             _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(problem, setting).blind_cones
@@ -158,5 +161,7 @@ def hidden_by(shadow: Shadow) -> Hidden:
 def _on_map(axis: Array, half_angle_deg: float) -> ConeOnMap:
     x, y, z = np.round(axis, 9) + 0.0  # straight up and straight back have one name each
     return ConeOnMap(
-        half_angle_deg, float(np.degrees(np.arccos(np.clip(z, -1, 1)))), float(np.degrees(np.arctan2(y, x)))
+        half_angle_deg,
+        float(np.degrees(np.arccos(np.clip(z, -1, 1)))),
+        float(np.degrees(np.arctan2(y, x)).round(1) + 0.0),  # straight ahead is 0.0, never -0.0
     )

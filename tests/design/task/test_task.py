@@ -1,5 +1,7 @@
 """The task file: what is wrong in it is one clear line; what is right is written out and read back the same."""
 
+import re
+
 import numpy as np
 import pytest
 from matplotlib.image import imsave
@@ -429,3 +431,17 @@ def test_a_spinning_servo_that_cannot_read_all_around_is_told(tmp_path):
     assert load_text(tmp_path, BASE).warnings() == []
     (warning,) = load_text(tmp_path, BASE.replace('"MX-64R"', '"AX-12A"')).warnings()
     assert "60 deg of every turn" in warning
+
+
+@pytest.mark.parametrize(
+    "motion, period_s",
+    [({"mode": "spin"}, 0.5), ({"mode": "sweep", "limits_deg": [-170, 170], "accel_deg_s2": 2000.0}, 2.0)],
+)
+def test_a_servo_that_cannot_turn_that_fast_is_refused_and_the_period_named_is_one_that_it_can(motion, period_s):
+    table = {"name": "fast", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
+    with pytest.raises(TaskError, match=r"rpm, and servo = 'MX-64R' turns at 63 rpm at most") as refused:
+        load_task(table | {"motion": motion | {"period_s": period_s}})
+    least_s = float(re.search(r"take ([\d.]+) or more", str(refused.value))[1])
+    load_task(table | {"motion": motion | {"period_s": least_s}})
+    with pytest.raises(TaskError, match="take"):
+        load_task(table | {"motion": motion | {"period_s": least_s - 0.002}})

@@ -239,7 +239,7 @@ def test_the_answer_says_what_the_files_say(page):
     assert "1.00 times the beams" in answer
     assert f"{720 * 1081:,} beams: 720 lines of 1081" in answer
     # the field of view of 270 deg leaves 90 deg open, straight behind the axis that points ahead
-    assert "A cone of 45.0 deg half angle about theta 90.0, phi 180.0." in answer
+    assert "No beam enters the cone of 45.0 deg half angle about theta 90.0, phi 180.0." in answer
 
 
 def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
