@@ -1,13 +1,14 @@
 """Whether the stated errors of J hold, and whether anything beats the reported optima: what would break is printed.
 
-    uv run python -m benchmarks.design.claims [errors] [optima] [--pairs 300] [--draws 100000] [--tasks NAME...]
-        [--seed 1]
+    uv run python -m benchmarks.design.claims [errors] [optima] [evolution] [--pairs 300] [--draws 100000]
+        [--tasks NAME...] [--random 100] [--seed 1]
 
 Errors: random tasks at random settings (bands, cones, fine maps, masks of meshes, scenes; regions down to a thousandth
 of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against `benchmarks.design.reference`, which
 shares no code with the program.
 Optima: settings drawn at random from the ranges of each shipped task, and scipy's `differential_evolution`. All are
 looked at roughly, the best of them with all nodes.
+Evolution: as many random tasks as asked for, the optimum of each against 500 evaluations of `differential_evolution`.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from design.search.families import EQUAL, Family
 from design.search.search import search
 from design.task.task import NAMES, AngleRanges, Limits, LoadedTask, Task, load_task, shipped_tasks
 
-MOST_ERROR = 1e-3  # that a score may state at the default
+SMALL_ERROR = 1e-3  # what most scores state at the default
 SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")
 PERIODS_S = 1.0, 60.0
 BALLS_DEG = 0.3, 15.0
@@ -41,6 +42,8 @@ FIELDS = {"painted": 0.5, "tiny": 0.15, "map": 0.15, "mesh mask": 0.1, "scene": 
 MOTIONS = {"spin": 0.7, "sweep": 0.15, "stop_and_go": 0.15}
 LOOKS = ((120, 1000), (1215, 30))  # quadrature nodes, and how many of the settings are looked at again
 GENERATIONS = 40
+POPULATION = 15  # of the evolution, times the angles that are free
+EVALUATIONS = 500  # of the evolution against a random task
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +62,8 @@ class Claim:
 
     @property
     def kept(self) -> bool:
-        """Whether the stated error holds and is small."""
-        return self.off <= self.score.J_error <= MOST_ERROR
+        """Whether the stated error holds."""
+        return self.off <= self.score.J_error
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +81,10 @@ class Contest:
     once: bool
 
     @property
-    def unbeaten(self) -> bool:
-        """Whether no rival is better by more than both stated errors."""
+    def beaten_by(self) -> float:
+        """How far the best rival lies below the optimum, beyond both stated errors; at most 0 where none does."""
         own = self.best.score
-        return all(rival.J + rival.J_error >= own.J - own.J_error for _, rival in self.rivals.values())
+        return max((own.J - own.J_error - rival.J - rival.J_error for _, rival in self.rivals.values()), default=0.0)
 
 
 def random_claim(rng: np.random.Generator, largest_ball_deg: float = BALLS_DEG[1]) -> Claim:
@@ -140,10 +143,9 @@ def random_task(rng: np.random.Generator, largest_ball_deg: float) -> LoadedTask
 
 
 def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int, seed: int) -> Contest:
-    """The search of a task against settings drawn at random and against evolution."""
+    """The search of a task against settings drawn at random, if any are, and against evolution."""
     found = search(problem, ranges)
     low, high = np.array([ranges.limits(name) for name in NAMES]).T
-    drawn = np.random.default_rng(seed).uniform(low, high, (draws, 4))
     free = high > low
     required = Requirements(problem, Limits(), ranges.holes == "avoid" and found.least_blind is None)
 
@@ -153,18 +155,20 @@ def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int,
         return required.J(setting, LOOKS[0][0])
 
     bounds = np.column_stack([low, high])[free]
-    evolved = differential_evolution(J, bounds, maxiter=generations, tol=1e-6, polish=False, rng=seed)
+    evolved = differential_evolution(
+        J, bounds, maxiter=generations, popsize=POPULATION, tol=1e-6, polish=False, rng=seed
+    )
     setting = low.copy()
     setting[free] = evolved.x
+    rivals = {}
+    if draws:
+        drawn = np.random.default_rng(seed).uniform(low, high, (draws, 4))
+        rivals[f"{draws:,} random settings"] = best_of(required, drawn)
+    at_evolved = required.score(setting)
+    if at_evolved is not None:
+        rivals[f"differential evolution, {evolved.nfev:,} settings"] = (setting, at_evolved)
     J_found = np.sort([family.score.J for family in found.best])
-    return Contest(
-        best=found.best[0],
-        rivals={
-            f"{draws:,} random settings": best_of(required, drawn),
-            f"differential evolution, {evolved.nfev:,} settings": (setting, score(problem, np.radians(setting))),
-        },
-        once=bool((np.diff(J_found) > EQUAL).all()),
-    )
+    return Contest(found.best[0], rivals, once=bool((np.diff(J_found) > EQUAL).all()))
 
 
 def best_of(required: Requirements, settings_deg: Array) -> tuple[Array, Score]:
@@ -185,6 +189,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=300)
     parser.add_argument("--draws", type=int, default=100_000)
     parser.add_argument("--tasks", nargs="*", default=shipped_tasks())
+    parser.add_argument("--random", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
     if "errors" in asked.what:
@@ -192,6 +197,8 @@ def main() -> None:
     if "optima" in asked.what:
         for name in asked.tasks:
             print_contest(load_task(Path(name)), asked.draws, asked.seed)
+    if "evolution" in asked.what:
+        print_evolution(asked.random, asked.seed)
 
 
 def print_errors(pairs: int, seed: int) -> None:
@@ -205,8 +212,9 @@ def print_errors(pairs: int, seed: int) -> None:
             print(f"{i + 1} pairs, {sum(not claim.kept for claim in claims)} broken", flush=True)
     stated = np.array([claim.score.J_error for claim in claims])
     off = np.array([claim.off for claim in claims])
-    print(f"stated errors kept and at most {MOST_ERROR:g}: {sum(c.kept for c in claims)} of {pairs}")
-    print(f"stated: median {np.median(stated):.1e}, largest {stated.max():.1e}")
+    print(f"stated errors kept: {sum(claim.kept for claim in claims)} of {pairs}")
+    large = int((stated > SMALL_ERROR).sum())
+    print(f"stated: median {np.median(stated):.1e}, largest {stated.max():.1e}, above {SMALL_ERROR:g} in {large} pairs")
     share = (off / stated).max()
     print(f"true:   median {np.median(off):.1e}, largest {off.max():.1e}, at most {share:.2f} of the stated")
     truths = np.array([claim.truth.J_error for claim in claims])
@@ -222,12 +230,33 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
         return
     result = contest(problem_of(loaded), ranges, draws, GENERATIONS, seed)
     best = result.best
-    verdict = "unbeaten" if result.unbeaten else "BEATEN"
+    verdict = "BEATEN" if result.beaten_by > 0 else "unbeaten"
     once = "each family once" if result.once else "A FAMILY TWICE"
     print(f"{loaded.task.name}: {verdict}, {once}")
     print(f"  {best.angles_deg}: J = {best.score.J:.6f} +- {best.score.J_error:.0e} {best.word}")
     for name, (setting, rival) in result.rivals.items():
         print(f"  {setting.round(2).tolist()}: J = {rival.J:.6f} +- {rival.J_error:.0e} {name}", flush=True)
+
+
+def print_evolution(tasks: int, seed: int) -> None:
+    """Random tasks whose optimum evolution beats, with all that repeats them, then how many."""
+    beaten = refused = 0
+    for i in range(tasks):
+        rng = np.random.default_rng([seed, i])
+        loaded = random_task(rng, BALLS_DEG[1])
+        generations = EVALUATIONS // (POPULATION * len(NAMES)) - 1
+        try:
+            result = contest(problem_of(loaded), loaded.task.angles, 0, generations, i)
+        except TaskError as error:
+            refused += 1
+            print(f"task {i} refused: {error}", flush=True)
+            continue
+        if result.beaten_by > 0:
+            beaten += 1
+            print(f"BEATEN task {i} by {result.beaten_by:.1e}: {result} {loaded.task.model_dump(mode='json')}")
+        if (i + 1) % 10 == 0:
+            print(f"{i + 1} tasks: {beaten} beaten, {refused} refused", flush=True)
+    print(f"evolution of {EVALUATIONS} settings beats the optimum of {beaten} of {tasks - refused} random tasks")
 
 
 def _drawn(rng: np.random.Generator, kinds: dict[str, float]) -> str:
