@@ -20,7 +20,7 @@ from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion
 from design.task.task import LoadedTask
 
 SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
-PHASES = 2048
+PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,13 @@ def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = 
     in_laser = np.stack([np.cos(bearings), np.sin(bearings), 0 * bearings], axis=1)
     beams = Rotation.from_euler("YX", angles_rad[[3, 2]]).apply(in_laser)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
-    lines, first, repeats = _lines(loaded)
+    lines, first, repeats, span = _lines(loaded)
     objective = loaded.task.density.objective
     moments, least, none = [], np.iinfo(int).max, 0.0
     for k in range(SETS):
         directions, value, area, required, phase = _weighted(layers, points, np.random.default_rng([seed, k]))
-        counts = repeats * _counts(to_rot.apply(directions), beams[order], phase, lines, first, ball)
+        turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
+        counts = repeats * _counts(to_rot.apply(directions), beams[order], turned, mine, lines, first, ball)
         keep = value > 0
         moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
         least = min(least, int(counts[keep].min()))
@@ -181,16 +182,19 @@ def _weighted(
         value, required = np.where(here, one.value_at(d), value), np.where(here, one.required, required)
     for one in masks:
         value = np.where(one.holds(d) & (one.value_at(d) > 0), 0.0, value)
-    phase = np.minimum((np.concatenate(sobol)[:, 2] * PHASES).astype(int), PHASES - 1)
+    phase = np.concatenate(sobol)[:, 2]
     seen = often > 0  # rounding may put a direction outside the edge that it was drawn at
     return d, np.where(seen, value, 0.0), 1 / np.where(seen, often, np.inf), required, phase
 
 
-def _lines(loaded: LoadedTask) -> tuple[Array, Array, int]:
-    """Sorted joint angles [rad, 0 .. 2 pi] at each start phase, one after the other; where each begins; repeats."""
+def _lines(loaded: LoadedTask) -> tuple[Array, Array, int, float]:
+    """Sorted joint angles [rad, 0 .. 2 pi] of start phases, one after the other; where each begins; repeats.
+
+    And how far the start phase turns all lines alike: a grid of phases would beat with that of the lines.
+    """
     motion, rate = loaded.task.motion, loaded.lidar.scan_rate_hz
-    listed = []
-    for s in (np.arange(PHASES) + 0.5) / PHASES:
+    listed, span = [], 0.0
+    for s in (np.arange(PHASES) + 0.5) / PHASES if isinstance(motion, Sweep) else (0.0,):
         if isinstance(motion, Sweep):
             time = (np.arange(int(np.ceil(motion.period_s * rate - s - 1e-12))) + s) / rate
             lower, upper = motion.limits_deg
@@ -203,19 +207,23 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Array, int]:
             )
             angles = np.radians(degrees)
         elif isinstance(motion, StopAndGo):
-            angles = 2 * np.pi * (np.arange(motion.stops) + s) / motion.stops
+            span = 2 * np.pi / motion.stops
+            angles = span * np.arange(motion.stops)
         else:
             assert isinstance(motion, Spin)
             turns = motion.period_s * rate
             turns = float(round(turns)) if abs(turns - round(turns)) < 1e-9 * turns and turns > 0.5 else turns
-            angles = 2 * np.pi * (np.arange(int(np.ceil(turns))) / turns + s)
+            span = 2 * np.pi
+            angles = span * np.arange(int(np.ceil(turns))) / turns
         listed.append(np.sort(angles % (2 * np.pi)))
     repeats = max(1, int(motion.dwell_s * rate + 1e-9)) if isinstance(motion, StopAndGo) else 1
-    return np.concatenate(listed), np.cumsum([0, *(len(one) for one in listed)]), repeats
+    return np.concatenate(listed), np.cumsum([0, *(len(one) for one in listed)]), repeats, span
 
 
 @njit(cache=True)
-def _counts(directions: Array, beams: Array, phase: Array, lines: Array, first: Array, ball: float) -> Array:
+def _counts(
+    directions: Array, beams: Array, turned: Array, listed: Array, lines: Array, first: Array, ball: float
+) -> Array:
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
@@ -223,8 +231,8 @@ def _counts(directions: Array, beams: Array, phase: Array, lines: Array, first: 
     for i in range(len(directions)):
         x, y, z = directions[i]
         t = np.arctan2(np.hypot(x, y), z)
-        p = np.arctan2(y, x)
-        mine = lines[first[phase[i]] : first[phase[i] + 1]]
+        p = np.arctan2(y, x) - turned[i]
+        mine = lines[first[listed[i]] : first[listed[i] + 1]]
         for b in range(np.searchsorted(polar, t - ball - 1e-7), len(polar)):
             if polar[b] > t + ball + 1e-7:
                 break
