@@ -19,7 +19,7 @@ from scanwright.pipeline.manifest import first_difference, is_current, listed_fi
 if TYPE_CHECKING:
     from cad.findings import PartFinding
     from design.search.optimum import Optimum
-    from design.search.with_parts import Chosen
+    from design.search.with_parts import Chosen, Workshop
 
 Say = Callable[[str], None]
 
@@ -102,13 +102,32 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
         return first_difference(folder, again)
 
 
+def setting_built(optimum: Optimum) -> Chosen:
+    """The setting of an optimum that a build takes: the best with what its parts hide.
+
+    Raises:
+        InstallError: the CAD kernel is not installed.
+        BuildError: no setting can be built.
+    """
+    require_kernel("what parts hide")
+    from cad.assembly.shadow import PartsWorkshop
+
+    return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), lambda _: None)
+
+
+def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
+    from design.search.with_parts import choose_with_parts
+
+    task = optimum.loaded.task
+    return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
+
+
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import build_parts, write_files
     from cad.layout.layout import mount_offset_mm
     from design.evaluation.density_picture import density_picture
     from design.search.optimum import angle_set, find_optimum
-    from design.search.with_parts import choose_with_parts
     from scanwright.pipeline import records
 
     with fresh_folder(target) as work, second_process() as begin:
@@ -121,7 +140,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         from cad.files.workshop_files import export_scanner
 
         workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-        chosen = choose_with_parts(problem, result.best, loaded.task.angles, loaded.task.limits, workshop, say)
+        chosen = _chosen(optimum, workshop, say)
         best = chosen.family
         angles = angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
         angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(loaded.scanner(angles))})

@@ -18,9 +18,11 @@ import numpy as np
 import viser
 
 from design.angles import STANDARD_DEG, standard_settings
+from design.concurrency.second_process import second_process
 from design.errors import ScanwrightError, TaskError
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.pipeline.build import setting_built
 from scanwright.serving.style import note_html
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.controls import (
@@ -269,13 +271,21 @@ class Studio:
         def run() -> None:
             try:
                 optimum = find_optimum(painted(canvas.base, canvas.dabs), told)
-                if canvas == self._canvas:
-                    self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
-                    self.kept.rejudge(self.judge)  # with the period that was found
-                    self.move(Setting.within_bounds(optimum.search.best[0].angles_deg))
-                    holes = "; ".join(optimum.hole_lines())
-                    self.say(f"optimum of {optimum.search.covered:,} settings, {optimum.title}: {holes}")
-            except TaskError as error:
+                if canvas != self._canvas:
+                    return
+                self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
+                self.kept.rejudge(self.judge)  # with the period that was found
+                bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
+                self.move(bare)
+                found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
+                holes = "; ".join(optimum.hole_lines())
+                self.say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
+                with second_process() as begin:
+                    chosen = begin(setting_built, optimum)()
+                if canvas == self._canvas and self.setting == bare:
+                    self.move(Setting.within_bounds(chosen.family.angles_deg))
+                self.say("; ".join([found, *chosen.lines(), holes]))
+            except ScanwrightError as error:
                 self.say(str(error), bad=True)
             finally:
                 c.optimise.disabled, c.progress.visible = False, False
