@@ -45,16 +45,16 @@ class Products:
     def counting(self, moment: Moment, g: Array, weights: Array) -> BothWays:
         """As `both_ways`, each product counted and timed."""
         pair = both_ways(moment, g, weights)
-        axes, nodes = weights.shape
+        nodes = weights.shape[1]
 
-        def counted(piece: slice) -> tuple[Array, Array]:
+        def counted(piece: slice, part: slice) -> tuple[Array, Array]:
             start = time.perf_counter()
-            result = pair(piece)
+            result = pair(piece, part)
             self.seconds += time.perf_counter() - start
-            rows = len(range(len(g))[piece])
-            self.flops += 2.0 * rows * nodes * axes  # even and odd parts together have as many nodes as the whole
-            if rows * axes >= self.largest[0] * self.largest[2]:
-                self.largest = (rows, (nodes + 1) // 2, axes)
+            rows, columns = result[0].shape
+            self.flops += 2.0 * rows * nodes * columns  # even and odd parts together have as many nodes as the whole
+            if rows * columns >= self.largest[0] * self.largest[2]:
+                self.largest = (rows, (nodes + 1) // 2, columns)
             return result
 
         return counted

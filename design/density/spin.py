@@ -25,6 +25,7 @@ from design.concurrency.parallel import in_chunks
 from design.density.beams import ScanLines
 
 TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
+CROWD = 32  # places in one bucket, above which sorting within it would cost more than sorting all
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 
 
@@ -80,7 +81,7 @@ def zones(
     parts = in_chunks(
         lambda chunk: _zones(polar_rad[chunk], polar_b, azimuth_b, lines.count, lines.step_rad, ball_rad, g),
         len(polar_rad),
-        smallest=16,
+        smallest=128,
     )
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
@@ -158,6 +159,30 @@ def _mean_counts(polar: Array, beam_polar: Array, ball: float) -> Array:
 
 
 @njit(cache=True, nogil=True)
+def sort_by_buckets(at: Array, n: int, step: float, order: Array, starts: Array) -> None:
+    """Indices that sort the first n places within a step: spread evenly as they are, twice as fast as by comparing."""
+    starts[: n + 1] = 0
+    for k in range(n):
+        starts[min(int(at[k] * (n / step)), n - 1) + 1] += 1
+    if starts[: n + 1].max() > CROWD:
+        order[:n] = np.argsort(at[:n])
+        return
+    for b in range(n):
+        starts[b + 1] += starts[b]
+    for k in range(n):
+        b = min(int(at[k] * (n / step)), n - 1)
+        order[starts[b]] = k
+        starts[b] += 1
+    for i in range(1, n):
+        k = order[i]
+        j = i - 1
+        while j >= 0 and at[order[j]] > at[k]:
+            order[j + 1] = order[j]
+            j -= 1
+        order[j + 1] = k
+
+
+@njit(cache=True, nogil=True)
 def _zones(
     polar: Array, beam_polar: Array, beam_azimuth: Array, count: int, step: float, ball: float, g: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -170,6 +195,7 @@ def _zones(
     gaps = 1 if regular else count
     size = 4 * len(beam_polar)
     at, rise, low, high = np.empty(size), np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64)
+    order, starts = np.empty(size, np.int64), np.empty(size + 1, np.int64)
     for i in range(n):
         t = polar[i]
         level = 0
@@ -189,7 +215,8 @@ def _zones(
             balance = 2 * half * count / turn
             for side in range(2):
                 # the window of line 0 opens at p_b - delta_b and closes at p_b + delta_b, that of line k k steps on
-                edge = (beam_azimuth[b] + (2 * side - 1) * half) % turn
+                edge = beam_azimuth[b] + (2 * side - 1) * half  # from -pi to 3 pi: no division is needed
+                edge += turn if edge < 0.0 else (-turn if edge >= turn else 0.0)
                 sign = 1 - 2 * side
                 gap = int(edge / step)
                 if regular:
@@ -210,7 +237,7 @@ def _zones(
                     steps += 1
             # what the mean count leaves when all steps are done is open from the start, whatever ties with what
             level += int(np.round(balance))
-        order = np.argsort(at[:steps])
+        sort_by_buckets(at, steps, step, order, starts)
         lowest, highest = level, level
         total = 0.0
         gap_index = 0
@@ -218,7 +245,7 @@ def _zones(
             width = step if regular else min(step, turn - gap_index * step)
             here, before, sum_before = 0.0, level, total
             same_until = gaps
-            for k in order:
+            for k in order[:steps]:
                 if low[k] > gap_index:
                     same_until = min(same_until, low[k])
                 elif high[k] >= gap_index:

@@ -18,7 +18,7 @@ from numpy import ndarray
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
-from design.density.spin import TIE, Zones, half_width
+from design.density.spin import TIE, Zones, half_width, sort_by_buckets
 from design.motion import Sweep
 
 
@@ -80,7 +80,7 @@ def zones_swept(
     """
     t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
     numbers = lines.numbers()
-    parts = in_chunks(lambda chunk: _zones(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad, g), len(t), smallest=16)
+    parts = in_chunks(lambda chunk: _zones(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad, g), len(t))
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
     return Zones(mean_g, mean, least, most)
 
@@ -162,6 +162,7 @@ def _zones(
     n = len(t)
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     at, rise = np.empty(12 * len(t_b)), np.empty(12 * len(t_b), np.int64)
+    order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     pairs = np.empty((6, 2))
     for i in range(n):
         level, steps = 0, 0
@@ -181,9 +182,9 @@ def _zones(
                     at[steps], rise[steps] = 0.0, 0
                 at[steps + 1], rise[steps + 1] = last - np.floor(last), -1
                 steps += 2
-        order = np.argsort(at[:steps])
+        sort_by_buckets(at, steps, 1.0, order, starts)
         here, lowest, highest = 0.0, 1 << 62, 0
-        for k in order:
+        for k in order[:steps]:
             if at[k] > here:
                 mean_g[i] += g[level] * (at[k] - here)
                 if at[k] - here > TIE:

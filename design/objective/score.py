@@ -99,13 +99,21 @@ def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
 
 
 def blind_to_sweep(
-    problem: Problem, directions_rot: Float[ndarray, "n 3"], beams_rot: Float[ndarray, "beams 3"]
+    problem: Problem,
+    directions_rot: Float[ndarray, "n 3"],
+    beams_rot: Float[ndarray, "beams 3"],
+    mean: Float[ndarray, " n"] | None = None,
 ) -> Bool[ndarray, " n"]:
-    """Whether directions of the rotation frame (n, 3) lie beyond a ball radius of all that a sweep passes over."""
+    """Whether directions of the rotation frame (n, 3) lie beyond a ball radius of all that a sweep passes over.
+
+    `mean` are their mean counts within the ball of the problem, where they are known.
+    """
     assert problem.sweep is not None
     # between two beams the fan is continuous: no ball is smaller than half their step
     ball_rad = max(problem.ball_rad, float(np.median(np.diff(problem.bearings_rad))) / 2 + 1e-9)
-    return mean_count_swept(directions_rot, beams_rot, problem.sweep, ball_rad) <= 0
+    if mean is None or ball_rad > problem.ball_rad:
+        mean = mean_count_swept(directions_rot, beams_rot, problem.sweep, ball_rad)
+    return mean <= 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +163,7 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     found = []
     for samples in sets:
         z = zones_swept(samples.directions @ R, beams, problem.sweep, problem.ball_rad, problem.tables[index])
-        blind = blind_to_sweep(problem, samples.directions @ R, beams)
+        blind = blind_to_sweep(problem, samples.directions @ R, beams, z.mean)
         lower = moment.g(z.mean)
         if moment.gathered == "highest":
             found.append(_highest(moment, z, lower, samples.weights, samples.weights, blind))

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numba import njit
 from numpy import ndarray
 
@@ -68,20 +68,18 @@ class Landscape:
     plain: Lowest
     kept: Lowest
 
-    def about_axes(self, plane: int) -> Float[ndarray, "ways axes"]:
-        """J of one plane class, not flipped, about each axis class, not flipped and flipped, shape (2, axes)."""
+    def about_axes(self, planes: slice) -> Float[ndarray, "planes ways axes"]:
+        """J of plane classes, not flipped, about each axis class, not flipped and flipped, shape (planes, 2, axes)."""
         parts = [
-            np.stack([gathered(moment, w, g[plane]), gathered(moment, w, g[plane, ::-1])])
+            np.stack([gathered(moment, w, g[planes]), gathered(moment, w, g[planes, ::-1])], axis=1)
             for moment, w, g in zip(self.objective.moments, self.weights, self.g, strict=True)
         ]
         return self.objective.join(np.stack(parts))
 
-    def broken(self, plane: int) -> Mask:
-        """Settings of that plane class that break a constraint, shape (2, axes)."""
-        out = np.zeros((2, len(self.weights[0])), dtype=bool)
-        for constraint in self.constraints:
-            out |= np.concatenate(constraint.broken(slice(plane, plane + 1)))
-        return out
+    def broken(self, planes: slice) -> Bool[ndarray, "planes ways axes"]:
+        """Settings of those plane classes that break a constraint, shape (planes, 2, axes)."""
+        found = [np.stack(constraint.broken(planes, slice(None)), axis=1) for constraint in self.constraints]
+        return np.any(found, axis=0) if found else np.zeros((1, 1, 1), dtype=bool)
 
 
 def coarse_landscape(

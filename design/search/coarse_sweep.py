@@ -59,7 +59,8 @@ def swept_landscape(
     thin = np.zeros((0, 0), np.float32)
     constraints: list[Constraint] = []
     shares = weigh(problem.field, axes, directions).astype(np.float32)
-    blind = np.stack([blind_to_sweep(problem, directions, b) for b in beams]).astype(np.float32)
+    hidden = [blind_to_sweep(problem, directions, b, row) for b, row in zip(beams, mean, strict=True)]
+    blind = np.stack(hidden).astype(np.float32)
     if avoid_holes:
         constraints.append(AtMost(blind, (shares > 0).astype(np.float32), 0.5, turns=False))
     if limits.max_blind_weight is not None:

@@ -29,8 +29,8 @@ PIECE = 4096  # planes whose beams are looked at together
 class Constraint(Protocol):
     """What pairs of planes and axes must keep."""
 
-    def broken(self, planes: slice) -> tuple[Mask, Mask]:
-        """Pairs of a piece of the planes with all axes that break it, straight and with the planes turned round."""
+    def broken(self, planes: slice, axes: slice) -> tuple[Mask, Mask]:
+        """Pairs of some planes with some axes that break it, straight and with the planes turned round."""
         ...
 
     def of(self, planes: slice | Ints, axes: slice) -> Constraint:
@@ -45,10 +45,10 @@ class NoHole:
     fan_rad: Float[ndarray, "planes 2"]
     region_rad: Float[ndarray, "axes 2"]
 
-    def broken(self, planes: slice) -> tuple[Mask, Mask]:
+    def broken(self, planes: slice, axes: slice) -> tuple[Mask, Mask]:
         """See `Constraint`."""
         low, high = self.fan_rad[planes, 0, None], self.fan_rad[planes, 1, None]
-        first, last = self.region_rad[:, 0] + TOUCHING_RAD, self.region_rad[:, 1] - TOUCHING_RAD
+        first, last = self.region_rad[axes, 0] + TOUCHING_RAD, self.region_rad[axes, 1] - TOUCHING_RAD
         return (low > first) | (high < last), (np.pi - high > first) | (np.pi - low < last)
 
     def of(self, planes: slice | Ints, axes: slice) -> NoHole:
@@ -68,11 +68,12 @@ class AtMost:
     most: float
     turns: bool
 
-    def broken(self, planes: slice) -> tuple[Mask, Mask]:
+    def broken(self, planes: slice, axes: slice) -> tuple[Mask, Mask]:
         """See `Constraint`."""
         rows = self.of_planes[planes].astype(np.float32)
-        straight = rows @ self.of_axes.T > self.most
-        return straight, np.ascontiguousarray(rows[:, ::-1]) @ self.of_axes.T > self.most if self.turns else straight
+        columns = self.of_axes[axes].T
+        straight = rows @ columns > self.most
+        return straight, np.ascontiguousarray(rows[:, ::-1]) @ columns > self.most if self.turns else straight
 
     def of(self, planes: slice | Ints, axes: slice) -> AtMost:
         """See `Constraint`."""

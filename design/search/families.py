@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.optimize import minimize
 
-from design.arrays import Array, Mask, Setting
+from design.arrays import Array, Setting
 from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score
@@ -27,9 +27,12 @@ SINGLE = 2e-6  # rounding of a landscape's lowest values, which are made in sing
 VALLEY_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one answer
 VALLEY_J = 2e-2
 NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
+PIECE = 128  # planes whose J are made together
 MOST_LOOKS = 80  # for local minima, before the list is left shorter
 MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
 REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
+ROUGH = {"xatol": 0.1, "fatol": 1e-4}  # deg, and J: of all that are not built, as far as their stated errors reach
+FINE = {"xatol": 0.005, "fatol": 1e-7}
 FINEST_DEG = 0.01
 
 
@@ -78,42 +81,47 @@ def find_leaders(
     Equal ones are one. A minimum takes its valley with it: settings about nearly the same axis with nearly the same J,
     whatever the plane. What turns out to break a constraint between the nodes of the landscape is left out.
     """
-    rows = [
-        np.where(_open(planes, axes, c) & ~land.broken(c), land.about_axes(c), np.inf) for c in range(len(planes.first))
-    ]
-    J = np.stack(rows)
-    left = J.copy()
+    pieces = [slice(i, i + PIECE) for i in range(0, len(planes.first), PIECE)]
+    J = np.concatenate([_J_kept(land, planes, axes, piece) for piece in pieces])
+    every = _distinct(axes.points)
+    left = J.reshape(len(J), -1).copy()
+    low = left.min(axis=1)  # of each plane
     q = planes.representatives
     u = np.stack([axes.representatives, -axes.representatives])
     minima: list[Leader] = []
     slopes: list[Leader] = []
     looks = refused = 0
     while looks < MOST_LOOKS and refused < MOST_REFUSED and len(minima) < FAMILIES:
-        lowest = left.min()
+        lowest = low.min()
         if not np.isfinite(lowest):
             break
-        c, way, axis = (int(i) for i in np.unravel_index(int((left <= lowest + EQUAL).argmax()), left.shape))
+        c = int((low <= lowest + EQUAL).argmax())
+        way, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
         same = J[c] <= lowest + EQUAL
         around = (u @ u[same].T).max(axis=2) >= np.cos(NEAR_RAD)
-        beaten, near = False, []
-        for mirror in mirrors:
-            for sign, there in ((1, around), (-1, around[::-1])):
-                beside = np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD
-                beaten |= bool((J[beside][:, there] < lowest - EQUAL).any())
-                near.append((beside, there))
-        leader = _leader(J[c], planes, axes, c, way, axis)
+        near = [
+            np.ix_(np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD, there.ravel())
+            for mirror in mirrors
+            for sign, there in ((1, around), (-1, around[::-1]))
+        ]
+        beaten = any((J.reshape(left.shape)[block] < lowest - EQUAL).any() for block in near)
+        leader = _leader(J[c], planes, axes, c, way, axis, every)
         exact = None if beaten else required.score(leader.angles_deg)
         if not beaten and exact is None:
-            J[c][same] = left[c][same] = np.inf
+            J[c][same] = left[c][same.ravel()] = np.inf
+            low[c] = left[c].min()
             refused += 1
             continue
         looks += 1
         (slopes if beaten else minima).append(replace(leader, score=exact))
-        for beside, there in near:
-            left[beside] += np.where(there, np.inf, 0.0)
+        changed = low <= lowest + (EQUAL if beaten else VALLEY_J)
         if not beaten:
-            valley = around | around[::-1]
-            left[:, valley] = np.where(left[:, valley] <= lowest + VALLEY_J, np.inf, left[:, valley])
+            block = np.ix_(changed, (around | around[::-1]).ravel())
+            left[block] = np.where(left[block] <= lowest + VALLEY_J, np.inf, left[block])
+        for block in near:
+            left[block] = np.inf
+            changed[block[0]] = True
+        low[changed] = left[changed].min(axis=1)
     return minima + slopes
 
 
@@ -126,18 +134,18 @@ def best_leader(
     """
     lowest = (land.kept if kept else land.plain).by_plane.min(axis=0)
     rows: dict[int, Array] = {}
+    every = _distinct(axes.points)
     refused = 0
     while refused < MOST_REFUSED and np.isfinite(lowest.min()):
         c = int((lowest <= lowest.min() + SINGLE).argmax())
         if c not in rows:
-            closed = ~_open(planes, axes, c) | (land.broken(c) if kept else False)
-            rows[c] = np.where(closed, np.inf, land.about_axes(c))
+            rows[c] = _J_kept(land, planes, axes, slice(c, c + 1), kept)[0]
         J = rows[c]
         if J.min() > lowest[c] + SINGLE:  # what was lowest has been refused
             lowest[c] = J.min()
             continue
         way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
-        leader = _leader(J, planes, axes, c, int(way), int(axis))
+        leader = _leader(J, planes, axes, c, int(way), int(axis), every)
         exact = required.score(leader.angles_deg)
         if exact is not None:
             return replace(leader, score=exact)
@@ -147,17 +155,23 @@ def best_leader(
     return None
 
 
-def _open(planes: Folded, axes: Folded, plane: int) -> Mask:
-    """Entries (way round, axis class) of one plane class that the grid holds, shape (2, axes)."""
-    p = planes.has[:, plane, None]
-    return np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)])
+def _J_kept(land: Landscape, planes: Folded, axes: Folded, piece: slice, kept: bool = True) -> Array:
+    """Coarse J of a piece of the plane classes, (planes, ways round, axes): inf where the grid has none, or breaks."""
+    p = planes.has[:, piece, None]
+    there = np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)], axis=1)
+    return np.where(there & ~land.broken(piece) if kept else there, land.about_axes(piece), np.inf)
 
 
-def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int) -> Leader:
+def _distinct(points: Float[ndarray, "n 3"]) -> int:
+    """How many different points there are."""
+    return len(np.unique(np.round(points, 9) + 0.0, axis=0))
+
+
+def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, every: int) -> Leader:
     """All grid settings that equal one entry by symmetry, shown by the one that builds best.
 
     `J` is that of the plane class about all axes, shape (2, axes); `way` is 1 where just one of plane and axis is
-    flipped.
+    flipped; `every` is how many different axes the grid has.
     """
     same = np.abs(J - J[way, axis]) <= EQUAL
     p = np.flatnonzero(planes.classes == plane)
@@ -166,7 +180,7 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
     which_p, which_a = np.nonzero(member)
     angles = np.hstack([axes.settings_deg[which_a], planes.settings_deg[p[which_p]]])
     u = axes.points[which_a]
-    distinct = np.unique(np.round(u, 9) + 0.0, axis=0)
+    distinct = _distinct(u)
     # builds best: stands rather than hangs, blind wedge of the fan to the servo, axis upright, angles small
     preference = (
         angles[:, 3],
@@ -179,9 +193,9 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
         angles[:, 3] > 0,
         u[:, 2] < -1e-9,
     )
-    every = len(axes.settings_deg) > 1 and len(distinct) == len(np.unique(np.round(axes.points, 9) + 0.0, axis=0))
     best = angles[np.lexsort(preference)[0]]
-    return Leader(best, float(J[way, axis]), None, len(angles), len(distinct), every)
+    any_axis = len(axes.settings_deg) > 1 and distinct == every
+    return Leader(best, float(J[way, axis]), None, len(angles), distinct, any_axis)
 
 
 def refine_leaders(
@@ -274,9 +288,8 @@ def _refined(
             bounds=limits[free],
             options={
                 "initial_simplex": np.vstack([start, corners]),
-                "xatol": FINEST_DEG / 2,
-                "fatol": 1e-7,
                 "maxfev": 30 * len(start),
+                **(FINE if len(rounds) > 1 else ROUGH),
             },
         )
         angles[free] = found.x

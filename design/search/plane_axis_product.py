@@ -15,15 +15,20 @@ from design.concurrency.parallel import in_chunks
 from design.objective.named_objectives import Moment, Objective
 from design.search.constraints import Constraint
 
-PIECE = 128  # planes per piece of the product
+PIECE, PART = 128, 4096  # planes and axes per tile of the product: the cache holds it until it is looked through
 
-BothWays = Callable[[slice], tuple[Array, Array]]
-"""A moment of a piece of planes about all axes, (planes, axes): straight, and with the planes turned round."""
+BothWays = Callable[[slice, slice], tuple[Array, Array]]
+"""A moment of some planes about some axes, (planes, axes): straight, and with the planes turned round."""
 
 
-def gathered(moment: Moment, weights: Float[ndarray, "... axes nodes"], g: Float[ndarray, " nodes"]) -> Array:
-    """A moment of one plane about each axis, from its g over the nodes, shape (axes,)."""
-    return weights @ g if moment.gathered == "mean" else np.where(weights > 0, g, -np.inf).max(axis=1)
+def gathered(
+    moment: Moment, weights: Float[ndarray, "axes nodes"], g: Float[ndarray, "planes nodes"]
+) -> Float[ndarray, "planes axes"]:
+    """A moment of planes about each axis, from their g over the nodes, shape (planes, axes)."""
+    if moment.gathered == "mean":
+        return np.asarray(g @ weights.T)
+    seen = weights > 0
+    return np.stack([np.where(seen, row, -np.inf).max(axis=1) for row in g])
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,83 +66,107 @@ def lowest(
     """
     closed_axis = np.where(has_axis, 0, np.inf).astype(np.float32)
     closed_plane = np.where(has_plane, 0, np.inf).astype(np.float32)
-    plain: list[_Piece] = []
-    kept: list[_Piece] = []
-    for first in range(0, has_plane.shape[1], PIECE):
-        piece = slice(first, min(first + PIECE, has_plane.shape[1]))
-        pairs = [way(piece) for way in ways]
-        both = [np.ascontiguousarray(objective.join(np.stack([pair[i] for pair in pairs]))) for i in (0, 1)]
-        plain.append(_lowest_of_piece(both, closed_plane[:, piece], closed_axis))
-        for constraint in constraints:
-            for J, broken in zip(both, constraint.broken(piece), strict=True):
-                J[broken] = np.inf
-        kept.append(_lowest_of_piece(both, closed_plane[:, piece], closed_axis) if constraints else plain[-1])
-    return _joined(plain), _joined(kept)
+    plain, kept = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
+    for part in _slices(has_axis.shape[1], PART):
+        for piece in _slices(has_plane.shape[1], PIECE):
+            pairs = [way(piece, part) for way in ways]
+            straight, turned = (_joined(objective, [pair[i] for pair in pairs]) for i in (0, 1))
+            plain.meets(straight, turned, piece, part)
+            for constraint in constraints:
+                for J, broken in zip((straight, turned), constraint.broken(piece, part), strict=True):
+                    np.copyto(J, np.inf, where=broken)
+            if constraints:
+                kept.meets(straight, turned, piece, part)
+    return plain.lowest, kept.lowest if constraints else plain.lowest
 
 
-_Piece = tuple[Array, Ints, Ints, Array]
+def _joined(objective: Objective, moments: list[Array]) -> Array:
+    return np.asarray(objective.join(np.stack(moments) if len(moments) > 1 else moments[0][None]))
 
 
-def _joined(pieces: list[_Piece]) -> Lowest:
-    by_plane, its_class, its_flip = (np.concatenate([piece[i] for piece in pieces], axis=1) for i in range(3))
-    by_axis = np.minimum.reduce([piece[3] for piece in pieces])
-    return Lowest(by_plane.astype(float), its_class, its_flip, by_axis.astype(float))
+def _slices(count: int, size: int) -> list[slice]:
+    return [slice(first, min(first + size, count)) for first in range(0, count, size)]
 
 
-def _lowest_of_piece(both: list[Array], closed_plane: Array, closed_axis: Array) -> _Piece:
-    parts = _in_parts(both[0], both[1], closed_plane, closed_axis)
-    starts = np.cumsum([0, *(part[3].shape[1] for part in parts)])[:-1]
-    lows = np.stack([part[0] for part in parts])
-    which = lows.argmin(axis=0)
-    flips, rows = np.indices(which.shape)
-    its_class = np.stack([part[1] for part in parts])[which, flips, rows] + starts[which]
-    its_flip = np.stack([part[2] for part in parts])[which, flips, rows]
-    return lows[which, flips, rows], its_class, its_flip, np.concatenate([part[3] for part in parts], axis=1)
+@dataclass(frozen=True, slots=True)
+class _Running:
+    """The lowest so far, in arrays that each tile lowers; see `Lowest` for their shapes."""
+
+    closed_plane: Array
+    closed_axis: Array
+    by_plane: Array
+    its_class: Ints
+    its_flip: Ints
+    by_axis: Array
+
+    @classmethod
+    def over(cls, closed_plane: Array, closed_axis: Array) -> _Running:
+        """Of as many planes and axes, nothing met yet."""
+        none = np.zeros(closed_plane.shape, np.intp)
+        by_plane, by_axis = (np.full(closed.shape, np.inf, np.float32) for closed in (closed_plane, closed_axis))
+        return cls(closed_plane, closed_axis, by_plane, none, none.copy(), by_axis)
+
+    def meets(self, straight: Array, turned: Array, piece: slice, part: slice) -> None:
+        """Lower it by a tile of J, of a piece of the planes about a part of the axes."""
+        planes = self.closed_plane[:, piece]
+        axes, by_axis = (np.ascontiguousarray(of[:, part]) for of in (self.closed_axis, self.by_axis))  # vectorises
+        of_planes = (self.by_plane[:, piece], self.its_class[:, piece], self.its_flip[:, piece])
+        # one thread: handing a tile to others takes as long as looking through it
+        _lower_planes(straight, turned, planes, axes, part.start, *of_planes)
+        _lower_axes(straight, turned, planes, axes, by_axis)
+        self.by_axis[:, part] = by_axis
+
+    @property
+    def lowest(self) -> Lowest:
+        """What was met."""
+        return Lowest(self.by_plane.astype(float), self.its_class, self.its_flip, self.by_axis.astype(float))
 
 
-def _in_parts(
-    straight: Array, turned: Array, closed_plane: Array, closed_axis: Array
-) -> list[tuple[Array, Ints, Ints, Array]]:
-    """`_lowest_of` the axes in parts, on all cores."""
-    return in_chunks(
-        lambda chunk: _lowest_of(straight[:, chunk], turned[:, chunk], closed_plane, closed_axis[:, chunk]),
-        straight.shape[1],
-        smallest=256,
-    )
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "reassoc"})
+def _lower_planes(
+    straight: Array,
+    turned: Array,
+    closed_plane: Array,
+    closed_axis: Array,
+    first: int,
+    by_plane: Array,
+    its_class: Array,
+    its_flip: Array,
+) -> None:
+    """Lowest J of each plane about axes from `first` on, which axis that is and its flip."""
+    for c in range(len(straight)):
+        lows = np.full(2, np.float32(np.inf))
+        for a in range(straight.shape[1]):
+            # an axis that is flipped as well comes the same way round
+            J0, J1 = straight[c, a] + closed_axis[0, a], turned[c, a] + closed_axis[1, a]
+            J = J0 if J0 < J1 else J1
+            lows[0] = J if lows[0] > J else lows[0]
+            J0, J1 = turned[c, a] + closed_axis[0, a], straight[c, a] + closed_axis[1, a]
+            J = J0 if J0 < J1 else J1
+            lows[1] = J if lows[1] > J else lows[1]
+        for flip in range(2):
+            low = lows[flip]
+            if not low + closed_plane[flip, c] < by_plane[flip, c]:
+                continue
+            by_plane[flip, c] = low + closed_plane[flip, c]
+            same, cross = (straight[c], turned[c]) if flip == 0 else (turned[c], straight[c])
+            for a in range(len(same)):
+                unflipped = same[a] + closed_axis[0, a] == low
+                if unflipped or cross[a] + closed_axis[1, a] == low:
+                    its_class[flip, c], its_flip[flip, c] = first + a, 0 if unflipped else 1
+                    break
 
 
 @njit(cache=True, nogil=True)
-def _lowest_of(
-    straight: Array, turned: Array, closed_plane: Array, closed_axis: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Lowest J of planes, the axis it is about and its flip, (2, planes) each, and about axes, (2, axes)."""
-    planes, axes = straight.shape
-    by_plane = np.full((2, planes), np.float32(np.inf))
-    its_class = np.zeros((2, planes), np.intp)
-    its_flip = np.zeros((2, planes), np.intp)
-    by_axis = np.full((2, axes), np.float32(np.inf))
-    for c in range(planes):
+def _lower_axes(straight: Array, turned: Array, closed_plane: Array, closed_axis: Array, by_axis: Array) -> None:
+    """Lowest J about each axis."""
+    for c in range(len(straight)):
         for flip in range(2):
-            low, where, other = np.float32(np.inf), 0, 0
-            for a in range(axes):
-                same = straight[c, a] if flip == 0 else turned[c, a]
-                cross = turned[c, a] if flip == 0 else straight[c, a]
-                # an axis that is flipped as well comes the same way round
-                J0 = same + closed_axis[0, a]
-                J1 = cross + closed_axis[1, a]
-                if low > J0:
-                    low, where, other = J0, a, 0
-                if low > J1:
-                    low, where, other = J1, a, 1
-            by_plane[flip, c] = low + closed_plane[flip, c]
-            its_class[flip, c], its_flip[flip, c] = where, other
-        for flip in range(2):
-            for a in range(axes):
-                same = straight[c, a] if flip == 0 else turned[c, a]
-                cross = turned[c, a] if flip == 0 else straight[c, a]
-                J = min(same + closed_plane[0, c], cross + closed_plane[1, c]) + closed_axis[flip, a]
-                by_axis[flip, a] = min(by_axis[flip, a], J)
-    return by_plane, its_class, its_flip, by_axis
+            same, cross = (straight[c], turned[c]) if flip == 0 else (turned[c], straight[c])
+            for a in range(len(same)):
+                J0, J1 = same[a] + closed_plane[0, c], cross[a] + closed_plane[1, c]
+                J = (J0 if J0 < J1 else J1) + closed_axis[flip, a]
+                by_axis[flip, a] = J if by_axis[flip, a] > J else by_axis[flip, a]
 
 
 def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:
@@ -148,19 +177,20 @@ def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:
     """
     if moment.gathered == "highest":
         seen = weights > 0
-        return lambda piece: (_highest(g[piece], seen), _highest(np.ascontiguousarray(g[piece, ::-1]), seen))
+        turned_g = np.ascontiguousarray(g[:, ::-1])
+        return lambda piece, part: (_highest(g[piece], seen[part]), _highest(turned_g[piece], seen[part]))
     g_even, g_odd = (part.astype(np.float32) for part in _parts(g))
     w_even, w_odd = (np.ascontiguousarray(part.T, dtype=np.float32) for part in _parts(weights))
     w_even[:-1] *= 2
     w_odd *= 2
 
-    room = np.empty((3, PIECE, len(weights)), np.float32)  # fresh memory for each piece costs more than its product
+    room = np.empty((3, PIECE, min(PART, len(weights))), np.float32)  # fresh memory costs as much as the product
 
-    def pair(piece: slice) -> tuple[Array, Array]:
-        rows = len(range(len(g))[piece])
-        even, odd, straight = room[:, :rows]
-        np.matmul(g_even[piece], w_even, out=even)
-        np.matmul(g_odd[piece], w_odd, out=odd)
+    def pair(piece: slice, part: slice) -> tuple[Array, Array]:
+        rows, columns = len(range(len(g))[piece]), len(range(len(weights))[part])
+        even, odd, straight = (flat[: rows * columns].reshape(rows, columns) for flat in room.reshape(3, -1))
+        np.matmul(g_even[piece], w_even[:, part], out=even)
+        np.matmul(g_odd[piece], w_odd[:, part], out=odd)
         np.add(even, odd, out=straight)
         return straight, np.subtract(even, odd, out=even)
 
@@ -171,9 +201,9 @@ def one_way(moment: Moment, g: Array, weights: Array) -> BothWays:
     """A moment over directions that nothing turns round: both ways are the same, and the grid has only one."""
     if moment.gathered == "highest":
         seen = weights > 0
-        return lambda piece: (_highest(g[piece], seen),) * 2
+        return lambda piece, part: (_highest(g[piece], seen[part]),) * 2
     single = np.ascontiguousarray(weights.T, dtype=np.float32)
-    return lambda piece: (g[piece].astype(np.float32) @ single,) * 2
+    return lambda piece, part: (g[piece].astype(np.float32) @ single[:, part],) * 2
 
 
 def _highest(g: Array, seen: Mask) -> Array:

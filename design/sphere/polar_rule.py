@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from design.arrays import Vector
 from design.sphere.painting import BAND, CONE, MAP
-from design.sphere.regions import Field, frames_about
+from design.sphere.regions import Field, cross, frames_about
 
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
@@ -49,21 +49,18 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
         breaks_rad: where else the integrand breaks.
         nodes: about how many, spread over the segments; none where no direction has a weight.
     """
-    segments = weighted_segments(field, axis, breaks_rad)
-    length = sum(b - a for a, b in segments)
-    polar, fine, coarse = [np.empty(0)], [np.empty(0)], [np.empty(0)]
-    for a, b in segments:
-        thirds = max(3, round(nodes / 3 * (b - a) / length))
-        s = np.pi * (np.arange(3 * thirds) + 0.5) / (3 * thirds)
-        width = (b - a) / 2 * np.sin(s) * np.pi / (3 * thirds)
-        polar.append(a + (b - a) * np.sin(s / 2) ** 2)
-        fine.append(width)
-        coarse.append(np.where(np.arange(3 * thirds) % 3 == 1, 3 * width, 0.0))
-    t = np.concatenate(polar)
+    ends = np.array(weighted_segments(field, axis, breaks_rad)).reshape(-1, 2)
+    length = ends[:, 1] - ends[:, 0]
+    thirds = np.maximum(3, np.round(nodes / 3 * length / length.sum())).astype(int)
+    segment = np.repeat(np.arange(len(ends)), 3 * thirds)
+    k = np.arange(len(segment)) - np.repeat(np.cumsum(3 * thirds) - 3 * thirds, 3 * thirds)
+    step = (np.pi / (3 * thirds))[segment]
+    s = (k + 0.5) * step
+    t = ends[segment, 0] + length[segment] * np.sin(s / 2) ** 2
+    width = length[segment] / 2 * np.sin(s) * step
     means, _ = field.on_circles(axis, t)
-    around = 2 * np.pi * np.sin(t) * means
-    segment = np.repeat(np.arange(len(polar)), [len(p) for p in polar])
-    return PolarRule(t, np.concatenate(fine) * around, np.concatenate(coarse) * around, segment)
+    fine = width * 2 * np.pi * np.sin(t) * means
+    return PolarRule(t, fine, np.where(k % 3 == 1, 3 * fine, 0.0), segment)
 
 
 def breaks_of(field: Field, axis: Vector, more_rad: Float[ndarray, " more"]) -> Float[ndarray, " n"]:
@@ -100,7 +97,7 @@ def _reach(field: Field, patch: int, axis: Vector) -> Float[ndarray, "2 n"]:
         centres, radii = row[None, 1:4], np.arccos(row[4:5])
     elif row[0] in (BAND, MAP):
         centres, radii = _cells(field, patch)
-    polar = np.arctan2(np.linalg.norm(np.cross(centres, axis), axis=1), centres @ axis)
+    polar = _polar_about(axis, centres)
     return np.stack([polar - radii, polar + radii]) + np.array([[-LOOK_RAD], [LOOK_RAD]])
 
 
@@ -128,9 +125,13 @@ def _breaks(field: Field, axis: Vector) -> Float[ndarray, " n"]:
     """Polar angles at which a circle about `axis` touches an edge or passes a corner; 0 and pi too."""
     touched = _touched(_breaking(field), axis)
     points = np.concatenate([touched[_is_edge(field, touched)], edge_corners(field)])
-    passing = np.arctan2(np.linalg.norm(np.cross(points, axis), axis=1), points @ axis)
     grid = np.linspace(0, np.pi, GRID + 1) if field.edges > MANY_EDGES else np.array([0.0, np.pi])
-    return np.concatenate([grid, passing])
+    return np.concatenate([grid, _polar_about(axis, points)])
+
+
+def _polar_about(axis: Vector, points: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
+    """Polar angles of unit vectors (n, 3) about an axis; accurate close to it too."""
+    return np.arctan2(np.linalg.norm(cross(points, axis[None]), axis=1), points @ axis)
 
 
 def _breaking(field: Field) -> Float[ndarray, "edges 4"]:
@@ -176,13 +177,13 @@ def _corners(planes: Float[ndarray, "edges 4"]) -> Float[ndarray, "n 3"]:
     """Points of the sphere where two edge planes meet, shape (n, 3)."""
     i, j = np.triu_indices(len(planes), 1)
     m, n = planes[i, :3], planes[j, :3]
-    along = np.cross(m, n)
+    along = cross(m, n)
     square = (along**2).sum(axis=1)
     meet = square > 1e-18
     m, n, along, square = m[meet], n[meet], along[meet], square[meet]
     c, d = planes[i, 3][meet], planes[j, 3][meet]
     # the point of the common line next to the centre, then along the line to the sphere
-    foot = (np.cross(n, along) * c[:, None] + np.cross(along, m) * d[:, None]) / square[:, None]
+    foot = (cross(n, along) * c[:, None] + cross(along, m) * d[:, None]) / square[:, None]
     rest = 1 - (foot**2).sum(axis=1)
     on = rest > 0
     reach = (along * np.sqrt(np.maximum(rest, 0) / square)[:, None])[on]
