@@ -123,6 +123,29 @@ def _block(scans: list[Scan]) -> Block:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class JointSample:
+    """One angle of the servo [rad], unwrapped (it counts turns)."""
+
+    time_ns: int
+    position_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSample:
+    """Where the platform was at one time: the `world` frame on the map.
+
+    Attributes:
+        time_ns: since 1970, or on whatever clock the scans are.
+        position_m: x y z.
+        quaternion: x y z w.
+    """
+
+    time_ns: int
+    position_m: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLog:
     """Servo angles over time.

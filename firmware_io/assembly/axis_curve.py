@@ -11,7 +11,7 @@ what the axis does between two samples without a trace in them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +38,7 @@ class SmoothAxis:
     Attributes:
         curve: the angle.
         knot_s: usual time from knot to knot.
+        per_knot: samples to a knot.
         step_rad: step of the encoder; 0 where the positions have none.
         residual_rad: rms of samples against the curve.
         error_rad: rms error of the curve, from its residuals and from what a curve with half the knots makes of them.
@@ -45,6 +46,7 @@ class SmoothAxis:
 
     curve: AxisCurve
     knot_s: float
+    per_knot: float
     step_rad: float
     residual_rad: float
     error_rad: float
@@ -67,8 +69,14 @@ def axis_curve(log: JointLog, *, held: bool) -> tuple[AxisCurve, str]:
     )
 
 
-def smooth(log: JointLog) -> SmoothAxis | str:
-    """Fit a spline to the log, or say why straight lines between its samples are better."""
+def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float | None = None) -> SmoothAxis | str:
+    """Fit a spline to the log, or say why straight lines between its samples are better.
+
+    Args:
+        log: at least 32 samples, or nothing can be averaged.
+        longest_knot_s: no knots farther apart, whatever cross-validation says.
+        per_knot: samples to a knot, where that has been chosen already; else cross-validation chooses.
+    """
     count = log.time_ns.size
     if count < _LEAST:
         return f"{count} samples are too few to smooth"
@@ -78,18 +86,14 @@ def smooth(log: JointLog) -> SmoothAxis | str:
     per_step = _samples_per_step(position, step_rad)
     if per_step * np.median(np.diff(seconds)) > _REST_S:
         return f"the angle rests {per_step * np.median(np.diff(seconds)):.2g} s on each value: does the axis stop?"
-    least = max(_FINEST, per_step * _STEPS_PER_KNOT)
-    fits: list[_Fit] = []
-    per_knot = float(least)
-    while per_knot < count / 4 or not fits:
-        fits.append(_fit(seconds, position, per_knot))
-        if fits[-1].score > 2 * min(fit.score for fit in fits):
-            break
-        per_knot *= 2
-    best = min(fits, key=lambda fit: fit.score)
+    least = float(max(_FINEST, per_step * _STEPS_PER_KNOT))
+    most = longest_knot_s / float(np.median(np.diff(seconds)))
+    if least > most:
+        return f"{least:.0f} samples to a knot would be more than {longest_knot_s:.3g} s apart"
+    best = _best(seconds, position, least, most) if per_knot is None else _fit(seconds, position, per_knot)
     if best.score >= _straight_score(seconds, position, step_rad):
         return "a smooth curve predicts them no better"
-    residual = position - best.spline(seconds)
+    residual = best.residual
     rms = float(np.sqrt(np.mean(residual**2)))
     if step_rad and rms > _MISSED * step_rad:
         return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain"
@@ -104,6 +108,7 @@ def smooth(log: JointLog) -> SmoothAxis | str:
     return SmoothAxis(
         curve=curve,
         knot_s=float(np.median(np.diff(knots))),
+        per_knot=best.per_knot,
         step_rad=step_rad,
         residual_rad=rms,
         error_rad=_error(seconds, position, best, rms, per_step),
@@ -114,10 +119,23 @@ def smooth(log: JointLog) -> SmoothAxis | str:
 class _Fit:
     """A least-squares spline; `score` is the mean squared error it will make on a new sample (cross-validation)."""
 
-    spline: Callable[[Floats], Floats]
+    spline: BSpline
+    residual: Floats
     per_knot: float
     unknowns: int
     score: float
+
+
+def _best(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], least: float, most: float) -> _Fit:
+    """The fit of the lowest score with `least` to `most` samples to a knot."""
+    fits: list[_Fit] = []
+    per_knot = least
+    while per_knot <= most and (per_knot < seconds.size / 4 or not fits):
+        fits.append(_fit(seconds, position, per_knot))
+        if fits[-1].score > 2 * min(fit.score for fit in fits):
+            break
+        per_knot *= 2
+    return min(fits, key=lambda fit: fit.score)
 
 
 def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_knot: float) -> _Fit:
@@ -125,16 +143,19 @@ def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_
     # knots at samples, evenly by number and not by time: none is left without samples in a gap
     inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    # normal equations of cubic B-splines: four beside each other overlap, so the matrix is a band
+    # normal equations of cubic B-splines: at each sample four beside each other are not 0, so the matrix is a band
     basis = BSpline.design_matrix(seconds, knots, 3)
+    value, first = basis.data.reshape(count, 4), basis.indices[::4]
     unknowns = knots.size - 4
-    square = basis.T @ basis
-    band = np.zeros((4, unknowns))
-    for diagonal in range(4):
-        band[diagonal, : unknowns - diagonal] = square.diagonal(-diagonal)
-    spline = BSpline(knots, solveh_banded(band, basis.T @ position, lower=True), 3)
-    score = np.mean((position - spline(seconds)) ** 2) / (1 - unknowns / count) ** 2
-    return _Fit(spline, per_knot, unknowns, float(score))
+    band, right = np.zeros((4, unknowns)), np.zeros(unknowns)
+    for k in range(4):
+        right += np.bincount(first + k, value[:, k] * position, unknowns)
+        for below in range(4 - k):
+            band[below] += np.bincount(first + k, value[:, k] * value[:, k + below], unknowns)
+    weight = solveh_banded(band, right, lower=True)
+    residual = position - np.sum(value * weight[first[:, None] + np.arange(4)], axis=1)
+    score = np.mean(residual**2) / (1 - unknowns / count) ** 2
+    return _Fit(BSpline(knots, weight, 3), residual, per_knot, unknowns, float(score))
 
 
 def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], step_rad: float) -> float:
@@ -156,7 +177,7 @@ def _error(
     count = seconds.size
     noise = rms**2 * best.unknowns / count * max(correlated, 1.0)
     coarse = _fit(seconds, position, 2 * best.per_knot)
-    differs = float(np.mean((coarse.spline(seconds) - best.spline(seconds)) ** 2))
+    differs = float(np.mean((coarse.residual - best.residual) ** 2))
     missed = max(differs - noise / 2, 0.0) / 15**2
     return float(np.sqrt(noise + missed))
 

@@ -9,10 +9,8 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from design.errors import RecordingError, suggest
-from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.assembly.trajectory import Trajectory, trajectory_of
 from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.mcap_chunks import read_messages, read_topics
@@ -66,17 +64,8 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
 
 
 def _trajectory(what: str, rows: list[_Row]) -> Trajectory:
-    values = np.array([row for _, row in rows], float).reshape(-1, 7)
-    quaternion = values[:, 3:]
-    with np.errstate(over="ignore"):
-        norm = np.linalg.norm(quaternion, axis=1, keepdims=True)
-    close = np.abs(norm - 1) < 0.01
     try:
-        return Trajectory(
-            np.array([time_ns for time_ns, _ in rows], np.int64),
-            np.ascontiguousarray(values[:, :3]),
-            np.where(close, quaternion / np.where(close, norm, 1.0), quaternion),
-        )
+        return trajectory_of([time_ns for time_ns, _ in rows], [row for _, row in rows])
     except RecordingError as error:
         raise RecordingError(f"{what}: {error}") from error
 

@@ -6,6 +6,7 @@ by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -139,6 +140,24 @@ class Trajectory:
         step = (R[:-2].inv() * R[2:]).as_rotvec()
         miss = (R[:-2] * Rotation.from_rotvec(part[:, None] * step)).inv() * R[1:-1]
         return float(np.linalg.norm(miss_m, axis=1).max() / 4), float(miss.magnitude().max() / 4)
+
+
+def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]]) -> Trajectory:
+    """Poses as files and messages have them: x y z qx qy qz qw each, the quaternion printed with a few digits.
+
+    Raises:
+        RecordingError: as for `Trajectory`.
+    """
+    values = np.array(poses, float).reshape(-1, 7)
+    quaternion = values[:, 3:]
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(quaternion, axis=1, keepdims=True)
+    close = np.abs(norm - 1) < _NORM_ERROR
+    return Trajectory(
+        np.array(time_ns, np.int64),
+        np.ascontiguousarray(values[:, :3]),
+        np.where(close, quaternion / np.where(close, norm, 1.0), quaternion),
+    )
 
 
 def at_rest(T_world_rot: Pose) -> PosePieces:

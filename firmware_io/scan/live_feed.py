@@ -19,14 +19,14 @@ from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
 from design.angles import AngleSet
-from firmware_io.assembly.deskew_kernel import place_block
+from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.samples import JointLog, Scan, blocks, straight
+from firmware_io.assembly.streaming import Assembler
+from firmware_io.samples import JointSample, Scan
 
 MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
 MOST_ANGLES = 2000
 EVERY_S = 0.2
-LOG_NS = 10_000_000_000  # of angles are kept where scans are placed
 
 
 class Watch(Protocol):
@@ -149,39 +149,28 @@ class CloudGrowth:
 
 
 class Placing:
-    """Batches in, points out; the frame chain is that of `deskew`, the axis straight between its samples."""
+    """Batches in, points out, as `Assembler` places them; the axis straight between its samples, so that none waits."""
 
     def __init__(self, angles: AngleSet, own_body: OwnBody | None) -> None:
-        self._angles, self._own_body = angles, own_body
-        self._time_ns, self._position_rad = np.empty(0, np.int64), np.empty(0)
+        self._assembler = Assembler(angles, own_body=own_body, smooth=False)
         self._first_ns: int | None = None
 
     def place(self, batch: Batch) -> CloudGrowth:
         """Points of the scans of a batch; beams without a place are left out of the view."""
-        time_ns = np.concatenate([self._time_ns, batch.time_ns])
-        position_rad = np.concatenate([self._position_rad, batch.position_rad])
-        rising = np.r_[True, np.diff(np.maximum.accumulate(time_ns)) > 0] if time_ns.size else np.zeros(0, bool)
-        time_ns, position_rad = time_ns[rising], position_rad[rising]
-        recent = time_ns > time_ns[-1] - LOG_NS if time_ns.size else np.zeros(0, bool)
-        self._time_ns, self._position_rad = time_ns[recent], position_rad[recent]
-        points, intensity, seconds = (
-            [np.empty((0, 3), np.float32)],
-            [np.empty(0, np.float32)],
-            [np.empty(0, np.float32)],
-        )
-        if time_ns.size < 2:
-            return CloudGrowth(points[0], intensity[0], seconds[0], batch.lines, batch.lost)
-        curve = straight(JointLog(time_ns, position_rad))
-        for block in blocks(batch.scans):
+        angles = map(JointSample, batch.time_ns.tolist(), batch.position_rad.tolist())
+        came: list[JointSample | Scan] = [*angles, *batch.scans]
+        placed = [line for what in came for line in self._assembler.push(what)]
+        points = [np.empty((0, 3), np.float32)]
+        intensity, seconds = [np.empty(0, np.float32)], [np.empty(0, np.float32)]
+        for line in placed:
             if self._first_ns is None:
-                self._first_ns = int(block.stamp_ns[0])
-            placed = place_block(block, curve, self._angles, own_body=self._own_body, with_joint=False)
-            there = np.isfinite(placed.points_m[:, :, 0])
-            points.append(placed.points_m[there])
-            told = block.intensity if block.intensity.size else np.zeros_like(block.range_m)
+                self._first_ns = line.scan.stamp_ns
+            there = line.verdict == Verdict.POINT
+            points.append(line.points_m[there])
+            told = line.scan.intensity if line.scan.intensity.size else np.zeros_like(line.scan.range_m)
             intensity.append(told[there])
-            after_s = ((block.stamp_ns - self._first_ns) / 1e9).astype(np.float32)
-            seconds.append(np.broadcast_to(after_s[:, None], there.shape)[there])
+            after_s = np.float32((line.scan.stamp_ns - self._first_ns) / 1e9)
+            seconds.append(np.full(len(points[-1]), after_s))
         return CloudGrowth(
             np.concatenate(points), np.concatenate(intensity), np.concatenate(seconds), batch.lines, batch.lost
         )

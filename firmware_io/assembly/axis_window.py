@@ -1,0 +1,84 @@
+"""The axis angle while it comes: the newest samples of the servo, and the curve through them.
+
+The curve is that of `axis_curve`, fitted to a few seconds instead of to all of a recording. The end of a spline is
+known worse than its middle, so a beam waits until the servo has been heard for a while after it: the look-ahead. Knots
+are no farther apart than that allows, which is its price: where the axis turns so evenly that a knot every second would
+do, a shorter look-ahead averages fewer samples, and the curve is noisier than the one of the whole recording.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+
+from firmware_io.assembly.axis_curve import smooth
+from firmware_io.samples import AxisCurve, JointLog, JointSample, straight
+
+HISTORY_NS = 4_000_000_000  # of samples are fitted: a dozen knots, so that cross-validation has something to judge
+_MOST_SAMPLES = 20_000  # 5 kHz for that long
+_AT_LEAST = 0.75  # of the look-ahead lies behind every beam; the rest is how long a curve serves
+_CHOOSE_NS = 1_000_000_000  # how often the distance of the knots is chosen anew
+_NO_CURVE = AxisCurve(np.array([-(2**62), -(2**62) + 1]), np.zeros((1, 4)))  # longer ago than anything
+
+
+class AxisWindow:
+    """The newest samples of one joint, at most `HISTORY_NS` of them and what `forget` was told to keep."""
+
+    def __init__(self, look_ahead_s: float) -> None:
+        """`look_ahead_s`: 0 to go straight from sample to sample."""
+        self._look_ahead_s = look_ahead_s
+        self._time_ns: list[int] = []
+        self._position_rad: list[float] = []
+        self._curve: AxisCurve | None = None
+        self._error_rad = math.nan
+        self._serves_until_ns = self._fitted_ns = self._chosen_ns = -(2**62)
+        self._per_knot: float | None = None
+
+    @property
+    def last_ns(self) -> int:
+        """Time of the newest sample; long ago if there is none."""
+        return self._time_ns[-1] if self._time_ns else -(2**62)
+
+    def add(self, sample: JointSample) -> None:
+        """A sample that is later than all before it."""
+        self._time_ns.append(sample.time_ns)
+        self._position_rad.append(sample.position_rad)
+
+    def forget(self, before_ns: int) -> None:
+        """Drop what is older, but for the one sample from which the axis goes on to that time."""
+        first = max(bisect_right(self._time_ns, before_ns) - 1, len(self._time_ns) - _MOST_SAMPLES)
+        if first > 0:
+            del self._time_ns[:first], self._position_rad[:first]
+
+    def curve(self, first_ns: int, last_ns: int) -> tuple[AxisCurve, float]:
+        """The angle from one time to another, and its rms error [rad], NaN where it goes straight between samples.
+
+        It is NaN where no sample was, and good to the error that is stated where samples of the look-ahead follow.
+        """
+        if not self._time_ns:
+            return _NO_CURVE, math.nan
+        if self._look_ahead_s and last_ns > self._serves_until_ns and self.last_ns > self._fitted_ns:
+            self._fit()
+        if self._curve is not None:
+            return self._curve, self._error_rad
+        near = slice(max(bisect_left(self._time_ns, first_ns) - 1, 0), bisect_right(self._time_ns, last_ns) + 1)
+        if not self._time_ns[near]:
+            return _NO_CURVE, math.nan
+        return straight(JointLog(np.array(self._time_ns[near]), np.array(self._position_rad[near]))), math.nan
+
+    def _fit(self) -> None:
+        behind_s = _AT_LEAST * self._look_ahead_s
+        log = JointLog(np.array(self._time_ns), np.array(self._position_rad))
+        if self.last_ns - self._chosen_ns > _CHOOSE_NS:
+            self._per_knot = None
+        found = smooth(log, longest_knot_s=behind_s, per_knot=self._per_knot)
+        if self._per_knot is None:
+            self._chosen_ns = self.last_ns
+        self._fitted_ns = self.last_ns
+        self._serves_until_ns = self.last_ns - round(behind_s * 1e9)
+        if isinstance(found, str):
+            self._curve, self._error_rad, self._per_knot = None, math.nan, None
+        else:
+            self._curve, self._error_rad, self._per_knot = found.curve, found.error_rad, found.per_knot

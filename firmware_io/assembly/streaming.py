@@ -1,0 +1,214 @@
+"""Points while the scanner turns: scans, angles and poses go in as they come, placed scans come out.
+
+    assembler = Assembler(load_angles(Path("angles.json")))
+    for message in robot:
+        for line in assembler.push(message):
+            show(line.points_m)
+
+The kernel is that of `assemble`. A scan waits until the servo has been heard `latency_s` after its last beam, and where
+the platform moves until its pose is known. Where the servo is not smoothed (`smooth=False`, as for an axis that stands
+during each scan) the points are those of `assemble` to the last bit; where it is, the angles differ from those of the
+whole recording by no more than the errors that both state.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections import Counter, deque
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64, UInt8
+from numpy import ndarray
+
+from design.angles import AngleSet
+from design.errors import RecordingError
+from firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow
+from firmware_io.assembly.deskew_kernel import place_block
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.assembly.trajectory import Trajectory, trajectory_of
+from firmware_io.samples import JointSample, PoseSample, Scan, blocks
+
+LOOK_AHEAD_S = 0.35
+MOST_WAITING = 400  # scans; ten seconds of the fastest sensors
+_MOST_POSES = 20_000
+_LONGEST_S = 10.0
+_MOST_RAD = 1e9
+_NORM_ERROR = 1e-2
+_NO_POSES = Trajectory(np.array([-(2**62), -(2**62) + 1]), np.zeros((2, 3)), np.array([[0.0, 0.0, 0.0, 1.0]] * 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanPoints:
+    """One scan in the world, or on the map of the poses; row i is beam i.
+
+    Attributes:
+        scan: what was measured.
+        points_m: shape (n, 3), NaN where the verdict is not POINT.
+        joint_rad: servo angle of each beam, shape (n,), NaN where nobody knows it.
+        verdict: a `Verdict` for each beam, shape (n,).
+        axis_error_rad: rms error of the angles; NaN where the axis goes straight between its samples.
+    """
+
+    scan: Scan
+    points_m: Float32[ndarray, "n 3"]
+    joint_rad: Float64[ndarray, " n"]
+    verdict: UInt8[ndarray, " n"]
+    axis_error_rad: float
+
+
+class Assembler:
+    """Places scans one by one, in constant memory.
+
+    Samples and poses must come in the order of their times; scans come out in the order in which they came in, each
+    once. One that waits for longer than `MOST_WAITING` others is given out with what is known: NaN where nothing is.
+
+    Attributes:
+        latency_s: how long after the last beam of a scan the servo must have been heard.
+        left_out: samples and poses that were not taken, reason -> count.
+    """
+
+    def __init__(
+        self,
+        angles: AngleSet,
+        *,
+        lag_s: float = 0.0,
+        own_body: OwnBody | None = None,
+        smooth: bool = True,
+        look_ahead_s: float = LOOK_AHEAD_S,
+        with_poses: bool = False,
+    ) -> None:
+        """Set out to place scans.
+
+        Args:
+            angles: angle set of the scanner.
+            lag_s: how late the servo's stamps are: the beam of time t has the angle of t + lag_s.
+            own_body: beams that end on the scanner, to be left out.
+            smooth: smooth the steps of the encoder where that helps; else go straight from sample to sample. Not for a
+                servo that stands still during each scan.
+            look_ahead_s: how long after a beam the smoothing looks; longer is more exact, and later.
+            with_poses: the platform moves, and its poses are pushed too.
+
+        Raises:
+            RecordingError: a time is longer than ten seconds.
+        """
+        for name, value, least in (("lag_s", lag_s, -_LONGEST_S), ("look_ahead_s", look_ahead_s, 0.0)):
+            if not least <= value <= _LONGEST_S:
+                raise RecordingError(f"{name} = {value}: {least:g} to {_LONGEST_S:g}")
+        self.latency_s = look_ahead_s if smooth else 0.0
+        self.left_out: Counter[str] = Counter()
+        self._angles, self._own_body = angles, own_body
+        self._lag_s, self._lag_ns = lag_s, round(lag_s * 1e9)
+        self._behind_ns = self._lag_ns + round(self.latency_s * 1e9)
+        self._axis = AxisWindow(self.latency_s)
+        self._poses = _PoseWindow() if with_poses else None
+        self._waiting: deque[Scan] = deque()
+
+    def push(self, what: Scan | JointSample | PoseSample) -> list[ScanPoints]:
+        """Take one thing in, and give out the scans that can be placed now."""
+        if isinstance(what, Scan):
+            self._waiting.append(what)
+        elif isinstance(what, JointSample):
+            self._add_angle(what)
+        else:
+            self._add_pose(what)
+        ready = [self._waiting.popleft() for _ in range(self._ready())]
+        placed = self._placed(ready)
+        self._forget()
+        return placed
+
+    def finish(self) -> list[ScanPoints]:
+        """The scans that still wait, with what is known of their angles."""
+        ready = list(self._waiting)
+        self._waiting.clear()
+        return self._placed(ready)
+
+    def _add_angle(self, sample: JointSample) -> None:
+        if not abs(sample.position_rad) <= _MOST_RAD:
+            self.left_out["angles that are no number of an axis"] += 1
+        elif sample.time_ns <= self._axis.last_ns:
+            self.left_out["angles not later than the one before"] += 1
+        else:
+            self._axis.add(sample)
+
+    def _add_pose(self, sample: PoseSample) -> None:
+        if self._poses is None:
+            raise RecordingError("a pose for an assembler that was made without with_poses")
+        numbers = (*sample.position_m, *sample.quaternion)
+        if not all(map(math.isfinite, numbers)) or abs(math.hypot(*sample.quaternion) - 1) > _NORM_ERROR:
+            self.left_out["poses that are none"] += 1
+        elif sample.time_ns <= self._poses.last_ns:
+            self.left_out["poses not later than the one before"] += 1
+        else:
+            self._poses.add(sample.time_ns, numbers)
+
+    def _ready(self) -> int:
+        """How many of those that wait need not wait any more."""
+        late = max(len(self._waiting) - MOST_WAITING, 0)
+        for count, scan in enumerate(self._waiting):
+            end_ns = _end_ns(scan)
+            known = end_ns + self._behind_ns <= self._axis.last_ns
+            if not (known and (self._poses is None or end_ns <= self._poses.last_ns)):
+                return max(count, late)
+        return len(self._waiting)
+
+    def _placed(self, ready: list[Scan]) -> list[ScanPoints]:
+        out: list[ScanPoints] = []
+        remaining = iter(ready)
+        for block in blocks(ready):
+            first_ns = int(block.stamp_ns.min())
+            last_ns = int(block.stamp_ns.max()) + _end_ns(block.first) - block.first.stamp_ns
+            curve, error_rad = self._axis.curve(first_ns + self._lag_ns, last_ns + self._lag_ns)
+            placed = place_block(
+                block,
+                curve,
+                self._angles,
+                self._lag_s,
+                poses=None if self._poses is None else self._poses.trajectory(first_ns, last_ns),
+                own_body=self._own_body,
+            )
+            rows = zip(placed.points_m, placed.joint_rad, placed.verdict, strict=True)
+            out += [ScanPoints(next(remaining), *row, error_rad) for row in rows]
+        return out
+
+    def _forget(self) -> None:
+        """What no scan will ask for: what is older than those that wait, and than any that is to come."""
+        oldest_ns = min((scan.stamp_ns for scan in self._waiting), default=2**62)
+        behind_ns = min(self._axis.last_ns - HISTORY_NS, oldest_ns)
+        self._axis.forget(behind_ns + min(self._lag_ns, 0))
+        if self._poses is not None:
+            self._poses.forget(min(self._poses.last_ns - HISTORY_NS, oldest_ns))
+
+
+def _end_ns(scan: Scan) -> int:
+    """Time of the last beam, as `Scan.time_ns` has it."""
+    return scan.stamp_ns + round(max(scan.range_m.size - 1, 0) * (scan.time_increment_s * 1e9))
+
+
+class _PoseWindow:
+    """The newest poses of the platform."""
+
+    def __init__(self) -> None:
+        self._time_ns: list[int] = []
+        self._numbers: list[tuple[float, ...]] = []
+
+    @property
+    def last_ns(self) -> int:
+        return self._time_ns[-1] if self._time_ns else -(2**62)
+
+    def add(self, time_ns: int, numbers: tuple[float, ...]) -> None:
+        self._time_ns.append(time_ns)
+        self._numbers.append(numbers)
+
+    def forget(self, before_ns: int) -> None:
+        first = max(bisect_right(self._time_ns, before_ns) - 1, len(self._time_ns) - _MOST_POSES)
+        if first > 0:
+            del self._time_ns[:first], self._numbers[:first]
+
+    def trajectory(self, first_ns: int, last_ns: int) -> Trajectory:
+        """The poses about these times; long ago where there are fewer than two."""
+        near = slice(max(bisect_left(self._time_ns, first_ns) - 1, 0), bisect_right(self._time_ns, last_ns) + 1)
+        if len(self._time_ns[near]) < 2:
+            return _NO_POSES
+        return trajectory_of(self._time_ns[near], self._numbers[near])
