@@ -14,8 +14,9 @@ calibration can see. Rotation about the axis and translation along it are gauges
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -40,6 +41,10 @@ def standard_settings() -> dict[str, Setting]:
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Millimetres = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+CALIBRATED: Final = "angles.calibrated.json"
+"""The calibrated angle set of a build folder, beside its `angles.json`."""
 
 
 class Angles(Record):
@@ -120,6 +125,38 @@ def load_angles(path: Path) -> AngleSet:
     if "schema_id" not in found.model_fields_set:
         raise TaskError(f'{path}: schema: this key is required: "scanwright/angles/1"')
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class AnglesInUse:
+    """The angle set that the scanner of a build folder runs with.
+
+    Attributes:
+        path: its file.
+        angles: what is in it.
+        said: which one it is and why, in words.
+    """
+
+    path: Path
+    angles: AngleSet
+    said: str
+
+
+def angles_in_use(folder: Path) -> AnglesInUse:
+    """`angles.calibrated.json` of a build folder where it is of the folder's own mount, else `angles.json`.
+
+    Raises:
+        TaskError: there is no angle set, or one of the two is none.
+    """
+    path, calibrated = folder / "angles.json", folder / CALIBRATED
+    designed = load_angles(path)
+    if not calibrated.is_file():
+        return AnglesInUse(path, designed, f"frames as designed, {path}")
+    found = load_angles(calibrated)
+    mounts = [(one.angles_deg, one.t_world_rot_mm, one.sensor) for one in (designed, found)]
+    if mounts[0] != mounts[1]:
+        return AnglesInUse(path, designed, f"frames as designed: {calibrated} is of another mount than {path.name}")
+    return AnglesInUse(calibrated, found, f"frames as calibrated, {calibrated}")
 
 
 def _reason(error: OSError | UnicodeDecodeError) -> str:

@@ -8,6 +8,8 @@ scan plane).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
@@ -63,6 +65,15 @@ def rigid(R_a_b: Float[ndarray, "... 3 3"], t_a_b: ArrayLike) -> Float[ndarray, 
 def apply(T_a_b: Pose, points_b: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """Points of frame b, shape (n, 3), in frame a."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+
+
+def roll_pitch_yaw(R: Rotation) -> tuple[float, float, float]:
+    """URDF's fixed-axis angles [rad]: R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 where the pitch is +-90 deg."""
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], level)
+    if level < 1e-9:
+        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
 def _axis_rotation(angle_rad: ArrayLike, axis: int) -> Array:

@@ -22,6 +22,7 @@ from design.task.task import load_task as load_task
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.clouds.cloud import Cloud
 from firmware_io.clouds.formats import read_clouds, write_clouds
+from firmware_io.ros import robot_frames
 from scanwright.pipeline.build import Build, build_task
 
 if TYPE_CHECKING:
@@ -296,7 +297,7 @@ def scan(
         stamp_at=stamp_at,
     )
     recorded = acquire(plan, say)
-    return Scanned(recorded, assemble(plan.recording, Path(folder) / "angles.json", plan.recording.with_suffix(".ply")))
+    return Scanned(recorded, assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")))
 
 
 def import_bag(
@@ -439,6 +440,7 @@ def calibrate(
     """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
 
     Where an own_body.npz stands beside the file of the angle set, beams that end on the scanner itself are left out.
+    Where its scanner.urdf stands there, it is written again with the true frames beside `out`.
 
     Args:
         recordings: of scenes that stand still.
@@ -452,9 +454,22 @@ def calibrate(
     """
     from firmware_io.calibration.calibrate import calibrate_recordings
 
+    before, target = _angles(angles), Path(out)
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
+    beside = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
+    urdf = robot_frames.calibrated_urdf_place(target)
+    designed = beside if beside and beside.is_file() and beside.resolve() != urdf.resolve() else None
+    if designed:
+        robot_frames.with_frames(robot_frames.read_urdf(designed), before, str(designed))  # refused before the work
     paths = [Path(recording) for recording in recordings]
-    return calibrate_recordings(paths, _angles(angles), Path(out), one_place=one_place, own_body=own_body, say=say)
+    found = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, say=say)
+    if designed:
+        robot_frames.write_calibrated_urdf(designed, urdf, found.angles)
+    fixed = robot_frames.fixed_frames(found.angles)
+    said = [*robot_frames.what_changed(before, found.angles), *([f"wrote {urdf}"] if designed else [])]
+    said += [f"  {frame.command()}" for frame in fixed]
+    said += ["as parameters of a launch file:", *(f"  {frame.launch_parameters()}" for frame in fixed)]
+    return replace(found, frames=tuple(said))
 
 
 def register(

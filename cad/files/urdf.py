@@ -17,6 +17,7 @@ import numpy as np
 from cad.geometry.inertia import Inertial
 from cad.layout.drive import Cuboid, DriveLayout, Rod
 from design.arrays import Array
+from design.frames import roll_pitch_yaw
 from design.scanner import Scanner
 
 
@@ -46,15 +47,6 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         "</robot>",
     ]
     return "\n".join(lines) + "\n"
-
-
-def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """URDF's fixed-axis angles: R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 where the pitch is +-90 deg."""
-    level = math.hypot(R[0, 0], R[1, 0])
-    pitch = math.atan2(-R[2, 0], level)
-    if level < 1e-9:
-        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
-    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
 def _joint(name: str, kind: str, parent: str, child: str, T: Array) -> list[str]:

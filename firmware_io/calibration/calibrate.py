@@ -33,15 +33,17 @@ class Calibration:
         angles: the calibrated angle set.
         record: errors with their sigmas, residuals before and after, as in the report beside the angle set.
         out: file of the angle set.
+        frames: what it means to a robot's frames, one sentence each.
     """
 
     angles: AngleSet
     record: dict[str, Any]
     out: Path
+    frames: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """The same in words."""
-        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}"]
+        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}", *self.frames]
 
 
 def calibrate_recordings(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from design.angles import AngleSet, load_angles
+from design.angles import CALIBRATED, AngleSet, angles_in_use
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
@@ -22,7 +22,9 @@ class ScanPlan:
     """What one scan is going to do.
 
     Attributes:
-        angles: angle set of the scanner.
+        angles: angle set of the scanner, calibrated if it has been.
+        angles_path: its file.
+        frames: in words, which one that is.
         motion: of its servo.
         turns: full scans.
         intensity: whether the sensor is asked for intensities.
@@ -36,6 +38,8 @@ class ScanPlan:
     """
 
     angles: AngleSet
+    angles_path: Path
+    frames: str
     motion: Motion
     turns: int
     intensity: bool
@@ -59,6 +63,7 @@ class ScanPlan:
             f"lidar {self.angles.sensor} at {self.ports.lidar}{emulated}",
             f"servo {self.angles.servo} at {self.ports.servo}{emulated}",
             f"{self.turns} x {self.motion.mode} of {self.motion.duration_s:g} s: {self.duration_s:g} s of recording",
+            self.frames,
             f"recording {self.recording}",
         ]
 
@@ -93,7 +98,8 @@ def plan_scan(
     Raises:
         ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an unusable file name.
     """
-    angles = load_angles(out / "angles.json")
+    in_use = angles_in_use(out)
+    angles = in_use.angles
     if turns < 1:
         raise DeviceError(f"--turns = {turns}: at least 1")
     if angles.motion is None:
@@ -109,9 +115,11 @@ def plan_scan(
         )
     if recording is not None:
         _check_name(recording)
-    kept = [path for name in ("angles.json", "task.toml") if (path := out / name).is_file()]
+    kept = [path for name in ("angles.json", CALIBRATED, "task.toml") if (path := out / name).is_file()]
     return ScanPlan(
         angles=angles,
+        angles_path=in_use.path,
+        frames=in_use.said,
         motion=angles.motion,
         turns=turns,
         intensity=intensity,

@@ -127,7 +127,8 @@ def calibrate(
 ) -> None:
     """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
 
-    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out; where a
+    scanner.urdf stands there, scanner.calibrated.urdf is written beside the calibrated one.
     """
     from scanwright import api
 

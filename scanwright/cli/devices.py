@@ -118,7 +118,7 @@ def scan(
             raise typer.Exit(130) from None
         say_in_place(f"recorded {recorded.duration_s:.1f} s, assembling")
         show(recorded.lines())
-        show(api.assemble(plan.recording, out / "angles.json", plan.recording.with_suffix(".ply")).lines())
+        show(api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")).lines())
 
 
 @app.command()

@@ -9,7 +9,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from design.angles import load_angles
+from design.angles import angles_in_use
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Watch, growing
 
@@ -41,7 +41,8 @@ def _show(receiving: Connection, folder: Path) -> None:
     from scanwright.serving.page_server import guarded_server, wait_until_alone
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
-    placing = Placing(load_angles(folder / "angles.json"), own_body_beside(folder / "angles.json"))
+    in_use = angles_in_use(folder)
+    placing = Placing(in_use.angles, own_body_beside(in_use.path))
     with guarded_server() as (server, gate):
         view = CloudView(server, f"scan of {folder.name}")
         print(f"open {gate.address}", flush=True)

@@ -7,12 +7,12 @@ import pytest
 import yourdfpy
 
 from cad.files.part_files import build_parts
-from cad.files.urdf import roll_pitch_yaw
 from cad.layout.layout import mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing
 from design.errors import BuildError
+from design.frames import roll_pitch_yaw
 from design.scanner import scanner_of
 
 CASES = {

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -48,6 +49,10 @@ def room(tmp_path_factory):
     """A recording of a faulty scanner, and its designed angle set."""
     folder = tmp_path_factory.mktemp("room")
     (folder / "angles.json").write_text(designed(QUICK).to_json())
+    (folder / "scanner.urdf").write_text(
+        '<robot name="r"><joint name="servo_mount"><origin xyz="0 0 0"/></joint>'
+        '<joint name="laser_mount"><origin xyz="0 0 0"/></joint></robot>'
+    )
     return write(folder / "room.mcap", simulate(FURNISHED, QUICK, TRUTH)), folder / "angles.json"
 
 
@@ -61,6 +66,9 @@ def test_the_command_writes_an_angle_set_that_assembles_straight_walls(room, tmp
     found = load_angles(out)
     assert found.source == "calibration"
     assert found.angles_deg == load_angles(angles).angles_deg
+    x, y, _ = ElementTree.parse(tmp_path / "scanner.calibrated.urdf").find("joint[2]/origin").get("xyz").split()
+    assert [float(x) * 1e3, float(y) * 1e3] == pytest.approx(found.t_rot_laser_mm[:2])
+    assert "--frame-id rot --child-frame-id laser\nas parameters of a launch file:\n  servo_mount_xyz:='" in printed
     covariance = np.array(found.covariance)
     off = np.radians(found.delta_rotvec_rot_deg) - [TRUTH.tilt_x_rad, TRUTH.tilt_y_rad]
     off = np.append(off, np.array(found.t_rot_laser_mm[:2]) / 1e3 - [TRUTH.offset_x_m, TRUTH.offset_y_m])

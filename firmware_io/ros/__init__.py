@@ -1,0 +1,1 @@
+"""For robots: the frames of a calibrated scanner, and the node of ROS 2."""

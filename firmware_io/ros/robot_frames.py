@@ -1,0 +1,157 @@
+"""What a calibration means to a robot: its URDF with the true frames, static transforms, and what changed in words.
+
+A calibration moves one frame, `laser` in `rot`; where `servo` stands in `world` is told beside it, so that a robot
+without our URDF has the whole chain:
+
+    world --servo_mount, fixed--> servo --spin_joint, about z--> rot --laser_mount, fixed--> laser
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from design import frames
+from design.angles import AngleSet
+from design.arrays import Array, Pose
+from design.atomic_file import whole_file
+from design.errors import RecordingError
+
+URDF = "scanner.urdf"
+_RANGE_M = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FixedFrame:
+    """A frame that stands still in its parent.
+
+    Attributes:
+        joint: its name in the URDF.
+        parent: frame.
+        child: frame.
+        T_parent_child: shape (4, 4), m.
+    """
+
+    joint: str
+    parent: str
+    child: str
+    T_parent_child: Pose
+
+    @property
+    def xyz(self) -> str:
+        """Position [m], as URDF and launch files write it."""
+        return _row(self.T_parent_child[:3, 3])
+
+    @property
+    def rpy(self) -> str:
+        """Roll, pitch and yaw [rad], as URDF and launch files write it."""
+        return _row(frames.roll_pitch_yaw(self.T_parent_child[:3, :3]))
+
+    def command(self) -> str:
+        """The command of ROS 2 that publishes it."""
+        names = ("x", "y", "z", "roll", "pitch", "yaw")
+        values = " ".join(f"--{name} {x}" for name, x in zip(names, f"{self.xyz} {self.rpy}".split(), strict=True))
+        ends = f"--frame-id {self.parent} --child-frame-id {self.child}"
+        return f"ros2 run tf2_ros static_transform_publisher {values} {ends}"
+
+    def launch_parameters(self) -> str:
+        """The same as parameters of a launch file."""
+        return f"{self.joint}_xyz:='{self.xyz}' {self.joint}_rpy:='{self.rpy}'"
+
+
+def fixed_frames(angles: AngleSet) -> tuple[FixedFrame, FixedFrame]:
+    """Servo and laser of a scanner."""
+    return (
+        FixedFrame("servo_mount", "world", "servo", angles.T_world_rot(0.0)),
+        FixedFrame("laser_mount", "rot", "laser", angles.T_rot_laser()),
+    )
+
+
+def what_changed(before: AngleSet, after: AngleSet) -> list[str]:
+    """What a calibration did to the frames, in words."""
+    T_before, T_after = before.T_rot_laser(), after.T_rot_laser()
+    leans_rad = _rotation_vector(T_after[:3, :3] @ T_before[:3, :3].T)
+    shift_m = T_after[:3, 3] - T_before[:3, 3]
+    angle_rad, moved_m = float(np.linalg.norm(leans_rad)), float(np.linalg.norm(shift_m))
+    sd = None if after.covariance is None else np.sqrt(np.diag(after.covariance))
+    lean_sd = "" if sd is None else f" (sigma {math.degrees(math.hypot(*sd[:2])):.2g})"
+    shift_sd = "" if sd is None else f" (sigma {1e3 * math.hypot(*sd[2:]):.2g})"
+    lean_deg, shift_mm = np.degrees(leans_rad[:2]), 1e3 * shift_m[:2]
+    most_mm = 1e3 * (2 * _RANGE_M * math.sin(angle_rad / 2) + moved_m)
+    return [
+        f"the lidar leans {math.degrees(angle_rad):.3f} deg{lean_sd} from where it was ({before.source}): "
+        f"{lean_deg[0]:+.3f} about x, {lean_deg[1]:+.3f} about y of the rotation frame",
+        f"its optical centre lies {1e3 * moved_m:.2f} mm{shift_sd} from where it was: "
+        f"{shift_mm[0]:+.2f} along x, {shift_mm[1]:+.2f} along y of the rotation frame",
+        f"a point {_RANGE_M:g} m away lies up to {most_mm:.1f} mm elsewhere",
+    ]
+
+
+def with_frames(urdf: str, angles: AngleSet, what: str) -> ElementTree.Element:
+    """A URDF of ours, read, with the frames of an angle set in the place of its own.
+
+    Raises:
+        RecordingError: it is no URDF, or has none of our joints; `what` names it.
+    """
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    try:
+        robot = ElementTree.fromstring(urdf, ElementTree.XMLParser(target=builder))
+    except ElementTree.ParseError as error:
+        raise RecordingError(f"{what}: no URDF: {error}") from error
+    for frame in fixed_frames(angles):
+        origin = robot.find(f"joint[@name='{frame.joint}']/origin")
+        if origin is None:
+            raise RecordingError(f"{what}: no joint '{frame.joint}' with an origin: is this the URDF of a build?")
+        origin.set("xyz", frame.xyz)
+        origin.set("rpy", frame.rpy)
+    return robot
+
+
+def write_calibrated_urdf(designed: Path, out: Path, angles: AngleSet) -> None:
+    """Write the URDF of a build again with calibrated frames; meshes are found from where it stands.
+
+    Raises:
+        RecordingError: `designed` cannot be read, or is no URDF of ours.
+    """
+    robot = with_frames(read_urdf(designed), angles, str(designed))
+    for mesh in robot.iter("mesh"):
+        name = mesh.get("filename", "")
+        if "://" not in name and not Path(name).is_absolute():
+            mesh.set("filename", Path(os.path.relpath(designed.parent / name, out.parent)).as_posix())
+    text = ElementTree.tostring(robot, encoding="unicode", xml_declaration=False)
+    with whole_file(out, RecordingError) as part:
+        part.write_text(f'<?xml version="1.0"?>\n{text}\n', encoding="utf-8")
+
+
+def read_urdf(path: Path) -> str:
+    """The text of a URDF.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise RecordingError(f"{path}: cannot read: {reason}") from error
+
+
+def calibrated_urdf_place(out: Path) -> Path:
+    """Where the URDF of a calibrated angle set lies: angles.calibrated.json, scanner.calibrated.urdf."""
+    return out.with_name(out.stem.replace("angles", "scanner", 1) + ".urdf")
+
+
+def _rotation_vector(R: Array) -> Array:
+    """Axis times angle [rad] of a rotation by less than half a turn, shape (3,)."""
+    vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    sine = float(np.linalg.norm(vector))
+    return vector * (math.atan2(sine, (float(np.trace(R)) - 1) / 2) / sine if sine else 1.0)
+
+
+def _row(values: Array | tuple[float, ...]) -> str:
+    return " ".join(f"{round(float(value), 12) + 0.0:.12g}" for value in values)
