@@ -38,14 +38,14 @@ class Camera(Record):
     `rotvec_deg` turns that frame's axes into the camera's (axis times angle); 0 looks along z with x to the right.
     """
 
-    model: Literal["pinhole", "fisheye"] = "pinhole"
+    model: Literal["pinhole", "fisheye"] = Field(default="pinhole", description="of its lens")
     size_px: tuple[Pixels, Pixels] = Field(description="width, height")
     focal_px: tuple[Focal, Focal] = Field(description="fx, fy")
     centre_px: tuple[float, float] = Field(description="cx, cy")
     distortion: tuple[float, ...] = Field(default=(), description="pinhole: k1 k2 p1 p2 [k3]; fisheye: k1 k2 k3 k4")
-    frame: Literal["world", "rot", "laser"]
-    position_mm: tuple[float, float, float]
-    rotvec_deg: tuple[float, float, float]
+    frame: Literal["world", "rot", "laser"] = Field(description="what it is fixed to: robot, linkage or lidar")
+    position_mm: tuple[float, float, float] = Field(description="of its optical centre in that frame")
+    rotvec_deg: tuple[float, float, float] = Field(description="turns that frame's axes into the camera's")
     images: str = Field(description="an image, or a CSV of them: file, and time_ns or joint_deg; beside the task file")
 
     @model_validator(mode="after")

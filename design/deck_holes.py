@@ -19,9 +19,9 @@ DeckScrew = Literal["M3", "M4", "M5", "M6"]
 class Rectangle(Record):
     """Four holes in the corners of a rectangle; `size_mm` is between their centres, along x and y."""
 
-    shape: Literal["rectangle"]
-    size_mm: tuple[Length, Length] = (80.0, 80.0)
-    screw: DeckScrew = "M4"
+    shape: Literal["rectangle"] = Field(description="four holes in its corners")
+    size_mm: tuple[Length, Length] = Field(default=(80.0, 80.0), description="between the holes, along x and y")
+    screw: DeckScrew = Field(default="M4", description="that goes through the holes")
 
     def holes(self) -> tuple[tuple[float, float], ...]:
         """Centres."""
@@ -32,11 +32,11 @@ class Rectangle(Record):
 class Circle(Record):
     """Holes spread evenly on a circle, the first at `first_deg` from x."""
 
-    shape: Literal["circle"]
-    diameter_mm: Length
-    count: int = Field(default=4, ge=3, le=16)
-    first_deg: float = Field(default=45.0, ge=-360, le=360)
-    screw: DeckScrew = "M4"
+    shape: Literal["circle"] = Field(description="holes spread evenly on it")
+    diameter_mm: Length = Field(description="of the circle of holes")
+    count: int = Field(default=4, ge=3, le=16, description="of holes")
+    first_deg: float = Field(default=45.0, ge=-360, le=360, description="of one hole, from x towards y")
+    screw: DeckScrew = Field(default="M4", description="that goes through the holes")
 
     def holes(self) -> tuple[tuple[float, float], ...]:
         """Centres."""

@@ -1,6 +1,6 @@
 """Every error that Scanwright raises on purpose.
 
-    ScanwrightError            wrong input: one line, exit 2
+    ScanwrightError            wrong input: a line for each fault, exit 2
      +-- TaskError             a task file or a catalogue file is missing, malformed or inconsistent
      +-- BuildError            a part, a drawing or a build folder cannot be made as asked
      +-- RecordingError        a recording is unreadable, or lacks what the command needs
@@ -11,8 +11,8 @@
           +-- ProtocolError    ... because what came is no valid packet
           +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
 
-A command prints one of these as one line and exits with 2; anything else is a bug and gets its traceback.
-Each line names file, field, value, bound and a suggestion, as far as they apply.
+A command prints the message and exits with 2; anything else is a bug and gets its traceback. The message is one line,
+or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as far as they apply.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ LONGEST_S = 600.0
 class Spin(Record):
     """Continuous rotation at constant speed."""
 
-    mode: Literal["spin"] = "spin"
+    mode: Literal["spin"] = Field(default="spin", description="turn on and on")
     period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of one full turn of the servo")
 
     @property
@@ -33,7 +33,7 @@ class Spin(Record):
 class Shortest(Record):
     """Spin as fast as the limits of the task allow, `period_s = "shortest"` in its file: the search finds how fast."""
 
-    mode: Literal["shortest"] = "shortest"
+    mode: Literal["shortest"] = Field(default="shortest", description="spin, as fast as the limits allow")
     longest_s: float = Field(default=60.0, strict=True, gt=0, le=LONGEST_S, description="beyond which it gives up")
 
     @property
@@ -45,10 +45,12 @@ class Shortest(Record):
 class Sweep(Record):
     """From one limit to the other and back: accelerate, cruise, brake; both ways alike."""
 
-    mode: Literal["sweep"] = "sweep"
-    limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]]
+    mode: Literal["sweep"] = Field(default="sweep", description="to and fro between two angles")
+    limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]] = Field(
+        description="the two ends, from where the index marks meet"
+    )
     period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time out and back")
-    profile: Literal["trapezoid"] = "trapezoid"
+    profile: Literal["trapezoid"] = Field(default="trapezoid", description="speed up, cruise, brake")
     accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="while it speeds up and brakes")
 
     @model_validator(mode="after")
@@ -109,7 +111,7 @@ class Sweep(Record):
 class StopAndGo(Record):
     """Stop at evenly spread angles of a full turn, measure for a while, go on: no de-skew needed."""
 
-    mode: Literal["stop_and_go"] = "stop_and_go"
+    mode: Literal["stop_and_go"] = Field(default="stop_and_go", description="stand still while the lidar measures")
     stops: int = Field(strict=True, ge=1, le=100_000, description="in one full turn")
     dwell_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of measuring at each stop")
     move_s: float = Field(default=0.2, strict=True, gt=0, le=LONGEST_S, description="from one stop to the next")

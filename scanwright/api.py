@@ -1,7 +1,7 @@
 """What a person wants of a scanner, a typed function each; `import scanwright as sw` gives all of them.
 
 Angles of the arguments are degrees, lengths metres, as in task files; arrays that come back are SI units. Everything
-that can go wrong by wrong input raises a `ScanwrightError` whose message is one line.
+that can go wrong by wrong input raises a `ScanwrightError` whose message is one line for each fault.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from design.catalogue.products import (
     SlipRing,
 )
 from design.errors import TaskError, suggest
-from design.record import explain, read_toml
+from design.record import Fault, faults_of, read_toml, tell
 
 SHIPPED = Path(__file__).parent
 
@@ -85,15 +85,6 @@ class Catalogue:
             raise TaskError(f"'{name}' is not in the catalogue{suggest(name, self.products)}")
         return self.products[name]
 
-    def lines(self) -> list[str]:
-        """One for each product, in words."""
-        lines = []
-        for product in self:
-            doubt = product.unverified()
-            note = f"   not verified: {', '.join(doubt)}" if doubt else ""
-            lines.append(f"{product.kind:10} {product.name:20} {product.maker}{note}")
-        return lines
-
     def __iter__(self) -> Iterator[Product]:
         """Products in the order of their kinds, then names."""
         order = list(KINDS.values())
@@ -107,9 +98,16 @@ def load_catalogue(*extra: Path) -> Catalogue:
         TaskError: a file is missing, malformed, or a product lacks a value.
     """
     products = dict(_shipped())
+    complaints = []
     for path in extra:
-        product = load_product(path)
-        products[product.name] = product
+        try:
+            product = load_product(path)
+        except TaskError as error:
+            complaints.append(str(error))
+        else:
+            products[product.name] = product
+    if complaints:
+        raise TaskError("\n".join(complaints))
     return Catalogue(products)
 
 
@@ -125,20 +123,25 @@ def load_product(path: Path) -> Product:
         raise TaskError(f"{path}: kind = {kind!r}: not a kind of product{suggest(str(kind), KINDS)}")
     values: dict[str, Any] = {}
     provenance: dict[str, Provenance] = {}
+    faults: list[Fault] = []
     for key, entry in table.items():
         if key in ("kind", "name", "maker"):
             values[key] = entry
         elif isinstance(entry, dict) and entry.keys() == {"value", "source", "verified"}:
             values[key] = entry["value"]
-            if not isinstance(entry["source"], str) or not isinstance(entry["verified"], bool):
-                raise TaskError(f"{path}: {key}: source is a text, verified is true or false")
-            provenance[key] = Provenance(source=entry["source"], verified=entry["verified"])
+            if isinstance(entry["source"], str) and isinstance(entry["verified"], bool):
+                provenance[key] = Provenance(source=entry["source"], verified=entry["verified"])
+            else:
+                faults.append(Fault((key,), ": source is a text, verified is true or false"))
         else:
-            raise TaskError(f'{path}: {key}: write it as {{ value = ..., source = "...", verified = true }}')
+            faults.append(Fault((key,), ': write it as { value = ..., source = "...", verified = true }'))
+    badly_written = {fault.path for fault in faults}
     try:
         product = KINDS[kind].model_validate(values)
     except ValidationError as error:
-        raise TaskError(explain(error, path, KINDS[kind])) from error
+        faults += [fault for fault in faults_of(error, KINDS[kind]) if fault.path not in badly_written]
+    if faults:
+        raise TaskError(tell(faults, path))
     product._provenance.update(provenance)
     return product
 

@@ -6,7 +6,7 @@ Lengths are millimetres, masses grams.
 from __future__ import annotations
 
 import json
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -42,6 +42,11 @@ class Product(Record):
     def unverified(self) -> list[str]:
         """Names of the values that nobody has verified."""
         return [field for field, origin in self._provenance.items() if not origin.verified]
+
+    def facts(self) -> dict[str, Any]:
+        """Every value, and under `provenance` where it comes from, for a program to read."""
+        sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
+        return {**self.model_dump(mode="json"), "provenance": sources}
 
     def lines(self) -> list[str]:
         """Every value with its source, in words."""

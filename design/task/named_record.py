@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,20 +25,21 @@ def named_record(path: Path, kind: type[R], shipped: Path, what: str) -> tuple[R
     Raises:
         TaskError: there is none, or it is malformed.
     """
-    source = _found(path, shipped, what)
-    return valid_record(read_toml(source, f"the {what} file"), kind, source), source
-
-
-def valid_record(table: Mapping[str, Any], kind: type[R], source: Path) -> R:
-    """A record from a table; `source` says in messages where that comes from.
-
-    Raises:
-        TaskError: it is malformed.
-    """
+    table, source = named_table(path, shipped, what)
     try:
-        return kind.model_validate(dict(table))
+        return kind.model_validate(table), source
     except ValidationError as error:
         raise TaskError(explain(error, source, kind)) from error
+
+
+def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:
+    """The table that such a record is made of, and the file it came from.
+
+    Raises:
+        TaskError: there is none, or it is not TOML.
+    """
+    source = _found(path, shipped, what)
+    return read_toml(source, f"the {what} file"), source
 
 
 def names_in(shipped: Path) -> list[str]:

@@ -16,7 +16,7 @@ Number = Annotated[float, Strict()]
 
 Span = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
-Value = Annotated[Number, Field(ge=0, le=1e300)]
+Value = Annotated[Number, Field(ge=0, le=1e300, description="how much it matters; 0 is nothing")]
 
 
 def _divides_the_half_circle(step: float) -> float:
@@ -32,7 +32,7 @@ Required = Annotated[Number | None, Field(gt=0, description="beams per ball, for
 class AllRegion(Record):
     """Every direction."""
 
-    shape: Literal["all"]
+    shape: Literal["all"] = Field(description="every direction")
     value: Value = 1.0
     required: Required = None
 
@@ -40,9 +40,9 @@ class AllRegion(Record):
 class BandRegion(Record):
     """theta from the world's z axis, phi from its x axis; edges inclusive, phi wraps."""
 
-    shape: Literal["band"]
-    theta_deg: Span = (0.0, 180.0)
-    phi_deg: Span = (-180.0, 180.0)
+    shape: Literal["band"] = Field(description="between two heights and two headings")
+    theta_deg: Span = Field(default=(0.0, 180.0), description="from straight up: 0 is up, 90 level, 180 down")
+    phi_deg: Span = Field(default=(-180.0, 180.0), description="from ahead towards the left: 0 is ahead, 90 left")
     value: Value = 1.0
     required: Required = None
 
@@ -58,9 +58,9 @@ class BandRegion(Record):
 class ConeRegion(Record):
     """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
 
-    shape: Literal["cone"]
-    axis: tuple[Number, Number, Number]
-    half_angle_deg: Number = Field(ge=1e-3, le=180)
+    shape: Literal["cone"] = Field(description="around one direction")
+    axis: tuple[Number, Number, Number] = Field(description="its middle: x ahead, y left, z up; of any length")
+    half_angle_deg: Number = Field(ge=1e-3, le=180, description="from its middle to its edge")
     value: Value = 1.0
     required: Required = None
 
@@ -81,8 +81,8 @@ class MapRegion(Record):
     A .npy or .csv table is taken as it is. `value` scales it.
     """
 
-    shape: Literal["map"]
-    file: str
+    shape: Literal["map"] = Field(description="weights in a picture or a table")
+    file: str = Field(description=".png, .csv or .npy, beside the task: rows theta 0 .. 180, columns phi 0 .. 360")
     value: Value = 1.0
     required: Required = None
 
@@ -90,26 +90,26 @@ class MapRegion(Record):
 class Placed(Record):
     """A mesh, and where the scanner's optical centre and the world's axes are in it (roll, pitch, yaw; z last)."""
 
-    file: str
+    file: str = Field(description=".stl, .ply, .obj, .dae or .glb, beside the task")
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
-    sensor_m: Triple = (0.0, 0.0, 0.0)
-    rpy_deg: Triple = (0.0, 0.0, 0.0)
+    sensor_m: Triple = Field(default=(0.0, 0.0, 0.0), description="the optical centre in the mesh: x, y, z")
+    rpy_deg: Triple = Field(default=(0.0, 0.0, 0.0), description="axes of the world in the mesh: roll, pitch, yaw")
     step_deg: GridStep = Field(default=2.0, description="between the rays that are cast at it")
 
 
 class MeshRegion(Placed):
     """What a mesh hides, such as the robot: every direction in which it is hit."""
 
-    shape: Literal["mesh"]
+    shape: Literal["mesh"] = Field(description="where a mesh is, such as the robot itself")
     value: Value = 1.0
 
 
 class BoxRegion(Record):
     """Surfaces of the scene within a box of its frame. Every square metre of them counts the same."""
 
-    shape: Literal["box"]
-    min_m: Triple
-    max_m: Triple
+    shape: Literal["box"] = Field(description="surfaces of the [scene] inside a box")
+    min_m: Triple = Field(description="its lowest corner, in the frame of the scene's mesh")
+    max_m: Triple = Field(description="its highest corner, in the frame of the scene's mesh")
     value: Value = 1.0
     required: Required = None
 

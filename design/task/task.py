@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from design.angles import Angles, AngleSet
 from design.arrays import Array
@@ -21,13 +22,13 @@ from design.camera import Camera
 from design.catalogue.catalogue import Catalogue, load_catalogue
 from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.deck_holes import DeckHoles
-from design.errors import TaskError
+from design.errors import ScanwrightError, TaskError
 from design.motion import Motion, Shortest, Spin, Sweep
-from design.record import Record
+from design.record import Fault, Record, faults_of, tell
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
 from design.task.map_file import read_map
-from design.task.named_record import named_record, names_in, valid_record
+from design.task.named_record import named_table, names_in
 from design.task.shapes import (
     BoxRegion,
     GridStep,
@@ -47,17 +48,35 @@ SHIPPED = Path(__file__).parent / "shipped"
 Angle = Number | Span
 """One value fixes the angle; two are the range to search, in degrees."""
 
+T = TypeVar("T")
+
+STAND_INS: dict[str, Any] = {
+    "name": "unnamed",
+    "sensor": "UTM-30LX",
+    "servo": "MX-64R",
+    "motion": {"mode": "sweep", "limits_deg": (-1.0, 1.0), "period_s": 600.0},
+}
+"""For keys without a default that are wrong in a file, while the others are looked at: nothing is wrong with these."""
+
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
 
 
 class AngleRanges(Record):
     """Mounting angles to search over, or fixed."""
 
-    alpha_rot_deg: Angle = (-180.0, 180.0)
-    beta_rot_deg: Angle = (-90.0, 90.0)
-    alpha_laser_deg: Angle = (-90.0, 90.0)
-    beta_laser_deg: Angle = (-90.0, 90.0)
-    step_deg: Number = Field(default=5.0, ge=0.5, le=45)
+    alpha_rot_deg: Angle = Field(
+        default=(-180.0, 180.0), description="the servo's axis, at first upright, is tilted about the line ahead"
+    )
+    beta_rot_deg: Angle = Field(
+        default=(-90.0, 90.0), description="... and before that about the line to the left: 90 points it ahead"
+    )
+    alpha_laser_deg: Angle = Field(
+        default=(-90.0, 90.0), description="the lidar, at first lying across the axis, is rolled about its front"
+    )
+    beta_laser_deg: Angle = Field(
+        default=(-90.0, 90.0), description="... and after that pitched: -90 lets its front look along the axis"
+    )
+    step_deg: Number = Field(default=5.0, ge=0.5, le=45, description="of the grid that is searched, refined to 0.01")
     tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
     holes: Literal["avoid", "allow"] = Field(
         default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
@@ -87,12 +106,18 @@ class AngleRanges(Record):
 class DensityRules(Record):
     """How density is counted and judged; see `docs/definitions.md`, Density and Objective."""
 
-    ball_radius_deg: Number = Field(default=2.0, ge=0.01, le=90)
-    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = "log"
+    ball_radius_deg: Number = Field(
+        default=2.0, ge=0.01, le=90, description="beams this near to a direction count for it"
+    )
+    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = Field(
+        default="log", description="what J is; see Definitions"
+    )
     required: Required = None
-    background: Value = 0.0
-    quadrature: Literal["solid_angle", "equal_angle"] = "solid_angle"
-    grid_step_deg: GridStep = 1.0
+    background: Value = Field(default=0.0, description="how much directions matter that no weight names")
+    quadrature: Literal["solid_angle", "equal_angle"] = Field(
+        default="solid_angle", description="how directions are summed; 'equal_angle' is the paper's sum"
+    )
+    grid_step_deg: GridStep = Field(default=1.0, description="of the paper's sum")
     tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
     budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
 
@@ -110,21 +135,21 @@ class Limits(Record):
 class Task(Record):
     """One task file with every default written out."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")
-    sensor: str
-    servo: str
-    slip_ring: str | None = None
-    printer: str = "fdm-0.4"
-    catalogue: tuple[str, ...] = ()
-    deck: DeckHoles | None = None
-    motion: Annotated[Motion | Shortest, Field(discriminator="mode")]
-    angles: AngleRanges = AngleRanges()
-    density: DensityRules = DensityRules()
-    limits: Limits = Limits()
-    weight: tuple[Region, ...] = ()
-    mask: tuple[MaskRegion, ...] = ()
-    scene: Placed | None = None
-    camera: Camera | None = None
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="of the task and its build folder")
+    sensor: str = Field(description="the 2D lidar: `scanwright catalogue --kind lidar` lists them")
+    servo: str = Field(description="what turns it: `scanwright catalogue --kind servo` lists them")
+    slip_ring: str | None = Field(default=None, description="what lets its cable turn for ever; a sweep needs none")
+    printer: str = Field(default="fdm-0.4", description="how the parts are made: `scanwright catalogue --kind printer`")
+    catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
+    deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
+    motion: Annotated[Motion | Shortest, Field(discriminator="mode", description="how the servo moves in one scan")]
+    angles: AngleRanges = Field(default=AngleRanges(), description="mounting angles: ranges to search, or values")
+    density: DensityRules = Field(default=DensityRules(), description="how beams are counted and judged")
+    limits: Limits = Field(default=Limits(), description="what every answer must keep")
+    weight: tuple[Region, ...] = Field(default=(), description="what matters, painted in order: the last one wins")
+    mask: tuple[MaskRegion, ...] = Field(default=(), description="what the robot hides: it never counts")
+    scene: Placed | None = Field(default=None, description="a mesh of the surroundings")
+    camera: Camera | None = Field(default=None, description="a camera that colours the cloud")
 
     @model_validator(mode="after")
     def _boxes_stand_in_a_scene(self) -> Task:
@@ -232,24 +257,58 @@ def load_task(source: Path | str | Mapping[str, Any]) -> LoadedTask:
             cannot do the motion.
     """
     if isinstance(source, Mapping):
-        return _load(valid_record(source, Task, Path("task")), Path("task"))
-    return _load(*named_record(Path(source), Task, SHIPPED, "task"))
+        return _load(dict(source), Path("task"))
+    return _load(*named_table(Path(source), SHIPPED, "task"))
 
 
-def _load(task: Task, source: Path) -> LoadedTask:
-    """With its products and maps."""
-    products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
-    check_products(task, products, source)
+def _load(table: dict[str, Any], source: Path) -> LoadedTask:
+    """The task of a table, with its products and maps; all that is wrong is told at once."""
+    task, faults = _sound_part(table)
+    if task is None:
+        raise TaskError(tell(faults, source))
+    try:
+        products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
+        own_products = ""
+        faults += product_faults(task, products)
+    except TaskError as error:  # it names lines of files of its own
+        own_products = str(error)
     limits = task.limits
     if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
-        raise TaskError(
-            f"{source}: motion.period_s = 'shortest': shortest for what? Set limits.min_density or "
-            "limits.max_line_gap_deg"
-        )
-    regions = [*task.weight, *task.mask]
-    maps = tuple(_table(region, source.parent) for region in regions if isinstance(region, MapRegion | MeshRegion))
-    surface = None if task.scene is None else _surface(task.scene, source.parent)
-    return LoadedTask(task=task, source=source, products=products, maps=maps, surface=surface)
+        aims = "limits.min_density or limits.max_line_gap_deg"
+        faults.append(Fault(("motion", "period_s"), f" = 'shortest': shortest for what? Set {aims}"))
+
+    def tried(key: str, read: Callable[[], T]) -> T | None:
+        try:
+            return read()
+        except ScanwrightError as error:
+            faults.append(Fault((*key.split("."), "file"), f": {error}"))
+            return None
+
+    maps = [
+        tried(f"{key}.{i}", partial(_table, region, source.parent))
+        for key, regions in (("weight", task.weight), ("mask", task.mask))
+        for i, region in enumerate(regions)
+        if isinstance(region, MapRegion | MeshRegion)
+    ]
+    surface = None if task.scene is None else tried("scene", partial(_surface, task.scene, source.parent))
+    if faults or own_products:
+        raise TaskError("\n".join(each for each in (own_products, tell(faults, source)) if each))
+    return LoadedTask(task, source, products, tuple(each for each in maps if each is not None), surface)
+
+
+def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
+    """The task without what is wrong in its file, so that the rest can be looked at; None where too little is left."""
+    try:
+        return Task.model_validate(table), []
+    except ValidationError as error:
+        faults = faults_of(error, Task)
+    wrong = {fault.path[0] for fault in faults if fault.path}
+    wrong |= {"motion"} if wrong & {"servo", "slip_ring"} else set()  # what these cannot do is asked for by the motion
+    sound = {key: value for key, value in table.items() if key not in wrong}
+    try:
+        return Task.model_validate({key: STAND_INS[key] for key in STAND_INS if key not in sound} | sound), faults
+    except ValidationError:
+        return None, faults
 
 
 def shipped_tasks() -> list[str]:
@@ -257,35 +316,27 @@ def shipped_tasks() -> list[str]:
     return names_in(SHIPPED)
 
 
-def check_products(task: Task, products: Catalogue, source: Path) -> None:
-    """Whether the products of a task exist and can do its motion.
-
-    Raises:
-        TaskError: they cannot.
-    """
-    field = "sensor"
-    try:
-        products.get(task.sensor, Lidar)
-        field = "servo"
-        products.get(task.servo, Servo)
-        field = "printer"
-        products.get(task.printer, Printer)
-        field = "slip_ring"
-        ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
-    except TaskError as error:
-        raise TaskError(f"{source}: {field}: {error}") from error
-    _check_speed(task, products, source)
-    if isinstance(task.motion, Sweep):
-        reach = products.get(task.servo, Servo).angular_range_deg / 2
-        if max(-task.motion.limits_deg[0], task.motion.limits_deg[1]) > reach:
-            raise TaskError(
-                f"{source}: motion.limits_deg = {list(task.motion.limits_deg)}: the {task.servo} reaches "
-                f"-{reach:g} .. {reach:g}"
-            )
-        return
-    if ring is None:
-        word = "turns without end" if isinstance(task.motion, Spin | Shortest) else "goes all around"
-        raise TaskError(f"{source}: slip_ring: motion.mode = '{task.motion.mode}' {word} and needs a slip ring")
+def product_faults(task: Task, products: Catalogue) -> list[Fault]:
+    """Which products of a task do not exist, or cannot do its motion."""
+    faults: list[Fault] = []
+    kinds: tuple[tuple[str, type[Any]], ...] = (
+        ("sensor", Lidar),
+        ("servo", Servo),
+        ("printer", Printer),
+        ("slip_ring", SlipRing),
+    )
+    for key, kind in kinds:
+        name = getattr(task, key)
+        try:
+            _ = name is None or products.get(name, kind)
+        except TaskError as error:
+            faults.append(Fault((key,), f": {error}"))
+    if task.slip_ring is None and not isinstance(task.motion, Sweep):
+        mode = "spin" if isinstance(task.motion, Shortest) else task.motion.mode
+        word = "turns without end" if mode == "spin" else "goes all around"
+        faults.append(Fault(("motion",), f".mode = '{mode}' {word} and needs a slip ring: name it as slip_ring"))
+    unknown = {fault.path[0] for fault in faults}
+    return faults if unknown & {"servo", "slip_ring"} else faults + _motion_faults(task, products)
 
 
 def fastest_rpm(task: Task, products: Catalogue) -> tuple[float, str]:
@@ -298,10 +349,15 @@ def fastest_rpm(task: Task, products: Catalogue) -> tuple[float, str]:
     return min(bounds)
 
 
-def _check_speed(task: Task, products: Catalogue, source: Path) -> None:
-    motion = task.motion
+def _motion_faults(task: Task, products: Catalogue) -> list[Fault]:
+    motion, faults = task.motion, []
+    if isinstance(motion, Sweep):
+        reach = products.get(task.servo, Servo).angular_range_deg / 2
+        if max(-motion.limits_deg[0], motion.limits_deg[1]) > reach:
+            says = f" = {list(motion.limits_deg)}: the {task.servo} reaches -{reach:g} .. {reach:g}"
+            faults.append(Fault(("motion", "limits_deg"), says))
     if not isinstance(motion, Spin | Sweep):
-        return
+        return faults
     most, field = fastest_rpm(task, products)
     if isinstance(motion, Spin):
         rpm, least_s = 60 / motion.period_s, 60 / most
@@ -309,10 +365,12 @@ def _check_speed(task: Task, products: Catalogue, source: Path) -> None:
         span_deg, cruise_deg_s = motion.limits_deg[1] - motion.limits_deg[0], 6 * most
         rpm, least_s = motion.cruise_deg_s / 6, 2 * (span_deg / cruise_deg_s + cruise_deg_s / motion.accel_deg_s2)
     if rpm > most:
-        raise TaskError(
-            f"{source}: motion.period_s = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} "
-            f"rpm at most, without a load: take {np.ceil(1000 * least_s) / 1000:g} or more"
+        says = (
+            f" = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} rpm at most, without a "
+            f"load: take {np.ceil(1000 * least_s) / 1000:g} or more"
         )
+        faults.append(Fault(("motion", "period_s"), says))
+    return faults
 
 
 def _surface(placed: Placed, folder: Path) -> Surface:

@@ -42,7 +42,7 @@ def run() -> None:
     try:
         app(prog_name="scanwright")
     except ScanwrightError as error:
-        for line in (str(error), *notes_of(error)):
+        for line in (*str(error).splitlines(), *notes_of(error)):
             complain(line)
         sys.exit(2)
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -126,15 +127,47 @@ def compare(
         show(found.lines())
 
 
+class Kind(Enum):
+    """What a product is."""
+
+    lidar = "lidar"
+    servo = "servo"
+    slip_ring = "slip_ring"
+    bearing = "bearing"
+    belt = "belt"
+    printer = "printer"
+    multibeam = "multibeam"
+
+
 @app.command()
 def catalogue(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
+    kind: Annotated[Kind | None, typer.Option(help="Only products of this kind.")] = None,
+    min_range_m: Annotated[float | None, typer.Option(metavar="M", help="Only lidars that see as far.")] = None,
+    max_mass_g: Annotated[float | None, typer.Option(metavar="G", help="Only what is as light.")] = None,
+    max_price_usd: Annotated[float | None, typer.Option(metavar="USD", help="Only what is as cheap.")] = None,
+    as_json: AsJson = False,
 ) -> None:
-    """List the products that a task can name, or one of them with the source of every value."""
+    """List the products that a task can name, in tables, or one of them with the source of every value."""
     from design.catalogue.catalogue import load_catalogue
+    from design.catalogue.table import chosen, table_lines
 
     products = load_catalogue()
-    show(products.lines() if name is None else products.named(name).lines())
+    listed = (
+        [products.named(name)]
+        if name
+        else chosen(
+            products,
+            kind=kind and kind.value,
+            min_range_m=min_range_m,
+            max_mass_g=max_mass_g,
+            max_price_usd=max_price_usd,
+        )
+    )
+    if as_json:
+        show_json({"products": [product.facts() for product in listed]})
+    else:
+        show(listed[0].lines() if name else table_lines(listed))
 
 
 @app.command()

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from design.catalogue.catalogue import Catalogue
 from design.errors import TaskError
 from design.record import explain
-from design.task.task import LoadedTask, Task, check_products
+from design.task.task import LoadedTask, Task, product_faults
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting
 
 LONGEST_NAME = 64  # of a task
@@ -83,13 +83,13 @@ class Crossing:
         try:
             task = _merged(base.task, chosen, name, self._own_files())
             products = Catalogue(base.products.products | self._own_products())
-            check_products(task, products, base.source)
-            doubts = replace(base, task=task, products=products).warnings()
+            doubts = [str(fault) for fault in product_faults(task, products)]
+            doubts = doubts or replace(base, task=task, products=products).warnings()
             refused = doubts[0] if doubts else ""
         except ValidationError as error:
-            refused = explain(error, name, Task)
+            refused = explain(error, name, Task).splitlines()[0]
         except TaskError as error:
-            refused = str(error).removeprefix(f"{base.source}: ")
+            refused = str(error)
         loaded = None if refused or task is None else _trimmed(replace(base, task=task, products=products))
         return Combination(number, name, int(places[0]), words, loaded, refused)
 

@@ -5,8 +5,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import SHIPPED, load_catalogue, load_product
+from design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
 from design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
+from design.catalogue.table import FIGURES, chosen, table_lines
 from design.errors import TaskError
 
 FILES = sorted(SHIPPED.glob("*.toml"))
@@ -198,3 +199,21 @@ def test_a_missing_file_and_a_folder_are_one_line(tmp_path):
             load_catalogue(path)
         assert str(path) in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+def test_the_table_has_a_row_for_every_product_and_a_mark_for_every_doubt(shipped):
+    lines = table_lines(shipped)
+    assert set(FIGURES) == set(KINDS.values())
+    rows = {line.split("  ")[0]: line for line in lines}
+    assert {product.name for product in shipped} <= set(rows)
+    assert rows["UTM-30LX"].split()[:9] == ["UTM-30LX", "15", "0.1", "270", "0.25", "40", "10", "370", "5,000"]
+    assert "price_usd" in shipped.named("VLP-16").unverified() and "8,000?" in rows["VLP-16"]
+    assert table_lines([]) == ["no product of the catalogue is like that"]
+
+
+def test_a_filter_keeps_what_is_known_to_keep_it(shipped):
+    assert {p.name for p in chosen(shipped, kind="servo", max_price_usd=60)} == {"AX-12A"}
+    cheap = chosen(shipped, max_price_usd=1e9)
+    assert all(p.price_usd is not None for p in cheap) and "MX-28" not in {p.name for p in cheap}
+    assert {p.kind for p in chosen(shipped, min_range_m=15)} == {"lidar"}
+    assert len(chosen(shipped)) == len(shipped.products)

@@ -133,7 +133,6 @@ WRONG = {
     ),
     "section missing": (BASE.split("[motion]")[0], ["task.toml", "motion", "required"]),
     "key missing": (swap('sensor = "UTM-30LX"', ""), ["task.toml", "sensor", "required"]),
-    "empty file": ("", ["task.toml", "required"]),
     "section for a list": (BASE + '[weight]\nshape = "all"\n', ["task.toml", "weight"]),
     "unknown shape": (weight('shape = "cube"'), ["weight.0", "cube", "'band'"]),
     "shape missing": (weight("value = 1.0"), ["weight.0", "shape"]),

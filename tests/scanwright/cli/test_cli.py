@@ -151,6 +151,10 @@ def test_schema_and_catalogue(command):
         assert name in out
     _, out, _ = command("catalogue", "SNU11-P0210")
     assert "? bore_mm = 12.7" in out
+    _, out, _ = command("catalogue", "--kind", "lidar", "--min-range-m", "8", "--max-mass-g", "200", "--json")
+    listed = {product["name"]: product for product in json.loads(out)["products"]}
+    assert set(listed) == {"UST-10LX", "UST-20LX"}
+    assert listed["UST-10LX"]["provenance"]["mass_g"]["verified"] is True
 
 
 def test_import_and_assemble_a_real_recording(command, data, tmp_path):

@@ -1,0 +1,164 @@
+"""The catalogue as tables: of each kind of product the figures that one chooses by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from design.catalogue.catalogue import KINDS
+from design.catalogue.products import Bearing, Belt, Lidar, Multibeam, Printer, Product, Servo, SlipRing
+
+DOUBT = "?"
+FOOTNOTE = f"{DOUBT} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One column.
+
+    Attributes:
+        title: with its unit.
+        fields: of the record, that it comes from: a doubt about one of them is a doubt about it.
+        value: of a product; None where the product has none.
+    """
+
+    title: str
+    fields: tuple[str, ...]
+    value: Callable[[Any], float | str | None]
+
+
+def _of(title: str, field: str, scale: float = 1.0) -> Figure:
+    def value(product: Product) -> float | str | None:
+        held: float | str | None = getattr(product, field)
+        return held * scale if isinstance(held, float | int) else held
+
+    return Figure(title, (field,), value)
+
+
+MASS, PRICE = _of("mass g", "mass_g"), _of("price USD", "price_usd")
+_STEPS = ("steps_per_turn", "first_step", "last_step")
+FIGURES: dict[type[Product], tuple[Figure, ...]] = {
+    Lidar: (
+        Figure("range m", ("range_practical_mm", "range_max_mm"), lambda p: range_m(p)),
+        Figure("from m", ("range_min_mm",), lambda p: p.range_min_mm / 1000),
+        Figure("field deg", _STEPS, lambda p: (p.last_step - p.first_step) * 360 / p.steps_per_turn),
+        Figure("step deg", _STEPS[:1], lambda p: 360 / p.steps_per_turn),
+        _of("rate Hz", "scan_rate_hz"),
+        _of("noise mm", "range_sigma_mm"),
+        MASS,
+        PRICE,
+    ),
+    Servo: (
+        _of("torque Nm", "stall_torque_nm"),
+        _of("speed rpm", "no_load_rpm"),
+        _of("step deg", "position_step_deg"),
+        _of("backlash deg", "backlash_deg"),
+        _of("reads deg", "position_feedback_deg"),
+        MASS,
+        PRICE,
+    ),
+    SlipRing: (
+        _of("bore mm", "bore_mm"),
+        _of("outer mm", "outer_diameter_mm"),
+        _of("length mm", "length_mm"),
+        _of("speed rpm", "max_rpm"),
+        MASS,
+        PRICE,
+        _of("circuits", "circuits"),
+    ),
+    Bearing: (
+        _of("bore mm", "bore_mm"),
+        _of("outer mm", "outer_mm"),
+        _of("width mm", "width_mm"),
+        _of("load N", "static_load_n"),
+        MASS,
+        PRICE,
+    ),
+    Belt: (
+        _of("pitch mm", "pitch_mm"),
+        _of("width mm", "width_mm"),
+        _of("tension N", "working_tension_n"),
+        MASS,
+        PRICE,
+    ),
+    Printer: (
+        _of("thread", "thread"),
+        _of("fit mm", "fit_clearance_mm"),
+        _of("wall mm", "min_wall_mm"),
+        Figure("bed mm", ("bed_mm",), lambda p: " x ".join(f"{side:g}" for side in p.bed_mm)),
+    ),
+    Multibeam: (
+        Figure("layers", ("elevations_deg",), lambda p: len(p.elevations_deg)),
+        Figure("up deg", ("elevations_deg",), lambda p: p.elevations_deg[-1]),
+        Figure("down deg", ("elevations_deg",), lambda p: p.elevations_deg[0]),
+        Figure("around deg", ("azimuth_deg",), lambda p: p.azimuth_deg[1] - p.azimuth_deg[0]),
+        _of("rate Hz", "turn_rate_hz"),
+        Figure("k points/s", ("points_per_second",), lambda p: p.points_per_second / 1000),
+        PRICE,
+    ),
+}
+
+
+def range_m(lidar: Lidar) -> float:
+    """How far a lidar really sees: what its users get where that is known, else what its maker says."""
+    return (lidar.range_practical_mm or lidar.range_max_mm) / 1000
+
+
+def chosen(
+    products: Iterable[Product],
+    *,
+    kind: str | None = None,
+    min_range_m: float | None = None,
+    max_mass_g: float | None = None,
+    max_price_usd: float | None = None,
+) -> list[Product]:
+    """The products that keep every bound that is given; a product whose figure nobody knows keeps none on it."""
+
+    def at_most(product: Product, field: str, most: float | None) -> bool:
+        held = getattr(product, field, None)
+        return most is None or (held is not None and held <= most)
+
+    return [
+        product
+        for product in products
+        if (kind is None or product.kind == kind)
+        and (min_range_m is None or (isinstance(product, Lidar) and range_m(product) >= min_range_m))
+        and at_most(product, "mass_g", max_mass_g)
+        and at_most(product, "price_usd", max_price_usd)
+    ]
+
+
+def table_lines(products: Iterable[Product]) -> list[str]:
+    """A table for each kind, in words; `DOUBT` behind what nobody has verified."""
+    listed = list(products)
+    lines: list[str] = []
+    for word, kind in KINDS.items():
+        held = [product for product in listed if type(product) is kind]
+        if held:
+            figures = FIGURES[kind]
+            heads = [word.replace("_", " "), *(figure.title for figure in figures), "maker"]
+            rows = [[p.name, *(_cell(p, figure) for figure in figures), p.maker] for p in held]
+            lines += ["", *_aligned([heads, *rows])]
+    return [*lines[1:], "", FOOTNOTE] if lines else ["no product of the catalogue is like that"]
+
+
+def _cell(product: Product, figure: Figure) -> str:
+    value = figure.value(product)
+    if value is None:
+        return "-"
+    word = value if isinstance(value, str) else f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
+    known = [field for field in figure.fields if getattr(product, field) is not None]
+    return word + (DOUBT if known[0] in product.unverified() else " ")
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """First and last column to the left, the others to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    first, *others = widths[:-1]
+    return [
+        "  ".join(
+            [row[0].ljust(first), *(c.rjust(w) for c, w in zip(row[1:-1], others, strict=True)), row[-1]]
+        ).rstrip()
+        for row in rows
+    ]
