@@ -34,7 +34,7 @@ from design.record import Fault, faults_of, read_toml, tell
 
 SHIPPED = Path(__file__).parent
 
-P = TypeVar("P", Lidar, Servo, SlipRing, Bearing, Belt, Printer, Multibeam)
+P = TypeVar("P", bound=Product)
 KINDS: dict[str, type[Product]] = {
     "lidar": Lidar,
     "servo": Servo,

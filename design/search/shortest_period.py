@@ -18,7 +18,8 @@ from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.limits import line_gaps_deg
 from design.search.search import SearchResult, search
-from design.task.task import LoadedTask, fastest_rpm
+from design.task.named_products import fastest_rpm
+from design.task.task import LoadedTask
 
 MOST_LINES = 200_000
 ROUNDS = 6  # the best settings of a slow turn are seldom those of a fast one: search again at the period found
@@ -102,7 +103,10 @@ def _at(loaded: LoadedTask, period_s: float) -> LoadedTask:
 def _shortest(loaded: LoadedTask, problem: Problem, family: Family) -> float:
     """Shortest period of one family: the longest of what servo, density and gaps ask for."""
     limits, rate = loaded.task.limits, loaded.lidar.scan_rate_hz
-    periods = [np.ceil(60 / fastest_rpm(loaded.task, loaded.products)[0] * rate - 1e-9) / rate]
+    periods = [
+        np.ceil(60 / fastest_rpm(loaded.task.product_names(), loaded.task.motion, loaded.products)[0] * rate - 1e-9)
+        / rate
+    ]
     if limits.max_line_gap_deg is not None:
         gap = float(line_gaps_deg(problem, family.angles_rad[None, 2:])[0]) / np.degrees(problem.lines.step_rad)
         periods.append(np.ceil(360 * gap / limits.max_line_gap_deg - 1e-9) / rate)

@@ -20,14 +20,15 @@ from design.angles import Angles, AngleSet
 from design.arrays import Array
 from design.camera import Camera
 from design.catalogue.catalogue import Catalogue, load_catalogue
-from design.catalogue.products import Lidar, Printer, Servo, SlipRing
+from design.catalogue.products import Lidar, Servo
 from design.deck_holes import DeckHoles
 from design.errors import ScanwrightError, TaskError
-from design.motion import Motion, Shortest, Spin, Sweep
+from design.motion import Motion, Shortest, Sweep
 from design.record import Fault, Record, faults_of, tell
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
 from design.task.map_file import read_map
+from design.task.named_products import NAMED, motion_faults
 from design.task.named_record import named_table, names_in
 from design.task.shapes import (
     BoxRegion,
@@ -173,6 +174,10 @@ class Task(Record):
             raise ValueError("a task name becomes a folder name and cannot hold a path: use letters, digits, _ and -")
         return name
 
+    def product_names(self) -> dict[str, str | None]:
+        """What it is made of: the product under each key that names one."""
+        return {key: getattr(self, key) for key in NAMED}
+
 
 @dataclass(frozen=True, slots=True)
 class LoadedTask:
@@ -269,7 +274,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     try:
         products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
         own_products = ""
-        faults += product_faults(task, products)
+        faults += motion_faults(task.product_names(), task.motion, products)
     except TaskError as error:  # it names lines of files of its own
         own_products = str(error)
     limits = task.limits
@@ -314,63 +319,6 @@ def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
 def shipped_tasks() -> list[str]:
     """Names of the tasks that come with the package."""
     return names_in(SHIPPED)
-
-
-def product_faults(task: Task, products: Catalogue) -> list[Fault]:
-    """Which products of a task do not exist, or cannot do its motion."""
-    faults: list[Fault] = []
-    kinds: tuple[tuple[str, type[Any]], ...] = (
-        ("sensor", Lidar),
-        ("servo", Servo),
-        ("printer", Printer),
-        ("slip_ring", SlipRing),
-    )
-    for key, kind in kinds:
-        name = getattr(task, key)
-        try:
-            _ = name is None or products.get(name, kind)
-        except TaskError as error:
-            faults.append(Fault((key,), f": {error}"))
-    if task.slip_ring is None and not isinstance(task.motion, Sweep):
-        mode = "spin" if isinstance(task.motion, Shortest) else task.motion.mode
-        word = "turns without end" if mode == "spin" else "goes all around"
-        faults.append(Fault(("motion",), f".mode = '{mode}' {word} and needs a slip ring: name it as slip_ring"))
-    unknown = {fault.path[0] for fault in faults}
-    return faults if unknown & {"servo", "slip_ring"} else faults + _motion_faults(task, products)
-
-
-def fastest_rpm(task: Task, products: Catalogue) -> tuple[float, str]:
-    """How fast servo and slip ring of a task turn, and what says so: its field."""
-    servo = products.get(task.servo, Servo)
-    ring = None if task.slip_ring is None else products.get(task.slip_ring, SlipRing)
-    bounds = [(servo.no_load_rpm, f"servo = '{servo.name}'")]
-    if ring is not None and ring.max_rpm is not None and not isinstance(task.motion, Sweep):
-        bounds.append((ring.max_rpm, f"slip_ring = '{ring.name}'"))
-    return min(bounds)
-
-
-def _motion_faults(task: Task, products: Catalogue) -> list[Fault]:
-    motion, faults = task.motion, []
-    if isinstance(motion, Sweep):
-        reach = products.get(task.servo, Servo).angular_range_deg / 2
-        if max(-motion.limits_deg[0], motion.limits_deg[1]) > reach:
-            says = f" = {list(motion.limits_deg)}: the {task.servo} reaches -{reach:g} .. {reach:g}"
-            faults.append(Fault(("motion", "limits_deg"), says))
-    if not isinstance(motion, Spin | Sweep):
-        return faults
-    most, field = fastest_rpm(task, products)
-    if isinstance(motion, Spin):
-        rpm, least_s = 60 / motion.period_s, 60 / most
-    else:
-        span_deg, cruise_deg_s = motion.limits_deg[1] - motion.limits_deg[0], 6 * most
-        rpm, least_s = motion.cruise_deg_s / 6, 2 * (span_deg / cruise_deg_s + cruise_deg_s / motion.accel_deg_s2)
-    if rpm > most:
-        says = (
-            f" = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} rpm at most, without a "
-            f"load: take {np.ceil(1000 * least_s) / 1000:g} or more"
-        )
-        faults.append(Fault(("motion", "period_s"), says))
-    return faults
 
 
 def _surface(placed: Placed, folder: Path) -> Surface:

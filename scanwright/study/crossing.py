@@ -15,7 +15,8 @@ from pydantic import ValidationError
 from design.catalogue.catalogue import Catalogue
 from design.errors import TaskError
 from design.record import explain
-from design.task.task import LoadedTask, Task, product_faults
+from design.task.named_products import motion_faults
+from design.task.task import LoadedTask, Task
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting
 
 LONGEST_NAME = 64  # of a task
@@ -83,7 +84,7 @@ class Crossing:
         try:
             task = _merged(base.task, chosen, name, self._own_files())
             products = Catalogue(base.products.products | self._own_products())
-            doubts = [str(fault) for fault in product_faults(task, products)]
+            doubts = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
             doubts = doubts or replace(base, task=task, products=products).warnings()
             refused = doubts[0] if doubts else ""
         except ValidationError as error:

@@ -108,7 +108,7 @@ def load_study(path: Path) -> LoadedStudy:
             if (field, name) == ("slip_rings", NO_RING):
                 continue
             try:
-                products.get(name, kind)  # type: ignore[type-var]
+                products.get(name, kind)
             except TaskError as error:
                 raise TaskError(f"{source}: {field}: {error}") from error
     tasks = tuple(_task(source, name) for name in study.tasks)
