@@ -129,6 +129,7 @@ def unverified(product: Product, assembly: Assembly) -> list[PartFinding]:
             product.name,
             f"{product.name}: {field} = {_shown(getattr(product, field))} is not verified "
             f"({provenance[field].source}): measure yours, it shapes {shaping[f'{product.kind}.{field}']}",
+            f"{field} = {_shown(getattr(product, field))}",
         )
         for field in product.unverified()
         if f"{product.kind}.{field}" in shaping

@@ -6,13 +6,19 @@ A command imports its room only when it is called, so that `--help` answers at o
 from __future__ import annotations
 
 import errno
+import os
 import sys
+from typing import Annotated, Any
 
 import typer
 
 from design.errors import ScanwrightError
 from scanwright.cli import clouds, design, devices, pages, parts
-from scanwright.cli.console import complain, notes_of
+from scanwright.cli.console import complain, notes_of, own_voice
+from scanwright.cli.help import Commands, GroupedHelp
+
+USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
+"""What typer raises when a command is called wrongly; it names only this kind of it."""
 
 _OF_THE_SYSTEM = {
     errno.EACCES,
@@ -26,25 +32,50 @@ _OF_THE_SYSTEM = {
 }
 """What a disk refuses, wherever it does: never a bug of ours."""
 
-app = typer.Typer(
-    help="One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-for group in (parts, design, devices, clouds, pages):
+app = Commands()
+for group in (design, parts, devices, clouds, pages):
     app.add_typer(group.app)
 
 
+@app.callback(
+    cls=GroupedHelp,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Begin with `scanwright new`. `scanwright COMMAND --help` says what a command takes.",
+)
+def scanwright(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    """One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar."""
+    if version:
+        from importlib.metadata import version as version_of
+
+        print(f"scanwright {version_of('scanwright')}")
+    elif context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+def _named(error: Any) -> str:
+    """The command that could not be called like that."""
+    return "scanwright" if error.ctx is None else str(error.ctx.command_path)
+
+
 def run() -> None:
-    """Entry point: one line and exit 2 for what a person can mend, a traceback for a bug."""
+    """Entry point: a line for each fault and exit 2 for what a person can mend, a traceback for a bug."""
     try:
-        app(prog_name="scanwright")
+        with own_voice():
+            sys.exit(app(prog_name="scanwright", standalone_mode=False))
+    except USAGE_ERROR as error:
+        complain(f"{error.format_message()} (see `{_named(error)} --help`)")
+        sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):
             complain(line)
         sys.exit(2)
+    except BrokenPipeError:  # whoever read the results has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
     except OSError as error:
         if error.errno not in _OF_THE_SYSTEM:
             raise

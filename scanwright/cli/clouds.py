@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import AsJson, group, say, show, show_json
+from scanwright.cli.console import AsJson, Progress, show, show_json
+from scanwright.cli.help import Commands
 
-app = group()
+app = Commands("Clouds")
 
 Organised = Annotated[
     bool, typer.Option("--organised", help="Keep a row for every beam of every scan, NaN where there is no point.")
@@ -132,7 +133,7 @@ def calibrate(
     """
     from scanwright import api
 
-    found = api.calibrate(recordings, angles, out, one_place=one_place, say=say)
+    found = api.calibrate(recordings, angles, out, one_place=one_place, say=Progress())
     if as_json:
         show_json(found.record)
     else:
@@ -166,7 +167,7 @@ def register(
         angles=angles,
         spacing_m=spacing_m,
         map_spacing_m=map_spacing_m,
-        say=say,
+        say=Progress(),
     )
     show(found.lines())
     raise typer.Exit(0 if found.complete else 1)

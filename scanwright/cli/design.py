@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from cad.kernel import require_kernel
-from scanwright.cli.console import AsJson, TaskFile, group, say, show, show_json
+from scanwright.cli.console import AsJson, Progress, TaskFile, show, show_json
+from scanwright.cli.help import Commands
 
-app = group()
+app = Commands("Design")
 
 
 @app.command()
@@ -26,7 +27,7 @@ def optimise(
     """Search all mounting angles of a task and print the best ten families of settings."""
     from scanwright import api
 
-    optimum = api.optimise(task, say=say)
+    optimum = api.optimise(task, say=Progress())
     if picture is not None:
         from design.evaluation.landscape_picture import landscape_picture
 
@@ -59,7 +60,7 @@ def evaluate(
     from scanwright import api
 
     loaded, angles_deg = api.load_task(task), angles_in(angles)
-    found = api.evaluate(loaded, angles_deg, pole=pole, lever=lever, say=say)
+    found = api.evaluate(loaded, angles_deg, pole=pole, lever=lever, say=Progress())
     if cloud is not None:
         from firmware_io.clouds.ply import write_points
 
@@ -96,15 +97,15 @@ def accuracy(
     if choices:
         from scanwright.trials.report import report_choices
 
-        show(report_choices(loaded, folder, say))
+        show(report_choices(loaded, folder, Progress()))
         return
     from design.accuracy.report import report_precision, report_stress
 
     if stress:
-        told = report_stress(loaded, folder, say)
+        told = report_stress(loaded, folder, Progress())
         show(told.lines)
         raise typer.Exit(0 if told.passed else 1)
-    show(report_precision(loaded, folder, say))
+    show(report_precision(loaded, folder, Progress()))
 
 
 @app.command()
@@ -120,7 +121,7 @@ def compare(
     from scanwright.pipeline.comparison import write_comparison
 
     loaded = api.load_task(task)
-    found = write_comparison(loaded, out / loaded.task.name, say)
+    found = write_comparison(loaded, out / loaded.task.name, Progress())
     if as_json:
         show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows]})
     else:

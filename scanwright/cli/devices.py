@@ -10,9 +10,10 @@ from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import BuildFolder, complain, group, notes_of, on_duty, require_pages, say_in_place, show
+from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
+from scanwright.cli.help import Commands
 
-app = group()
+app = Commands("Devices")
 
 _UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
 
@@ -103,20 +104,21 @@ def scan(
         every=every,
         stamp_at=stamp_at.value,
     )
+    say = Progress()
     show(plan.lines())
     if dry_run:
         return
     with live_page(out, wanted=live) as watch:
         try:
             with on_duty(), closing(watch):
-                recorded = acquire(plan, say_in_place, watch)
+                recorded = acquire(plan, say, watch)
         except KeyboardInterrupt as stop:
             for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
                 complain(line)
             if plan.recording.exists():
                 complain(f"what was recorded is in {plan.recording}")
             raise typer.Exit(130) from None
-        say_in_place(f"recorded {recorded.duration_s:.1f} s, assembling")
+        say(f"recorded {recorded.duration_s:.1f} s, assembling")
         show(recorded.lines())
         show(api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")).lines())
 

@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from cad.kernel import require_kernel
-from scanwright.cli.console import group, require_pages, say
+from scanwright.cli.console import Progress, require_pages
+from scanwright.cli.help import Commands
 
-app = group()
+app = Commands("Pages")
 
 
 @app.command()
@@ -30,4 +31,4 @@ def studio(
     from design.task.task import load_task
     from scanwright.studio.session import run_studio
 
-    run_studio(load_task(task), port=port, out=out, say=say)
+    run_studio(load_task(task), port=port, out=out, say=Progress())

@@ -9,9 +9,21 @@ from typing import Annotated
 import typer
 
 from design.errors import require
-from scanwright.cli.console import AsJson, BuildFolder, TaskFile, complain, group, say, say_in_place, show, show_json
+from scanwright.cli.console import (
+    AsJson,
+    BuildFolder,
+    Progress,
+    TaskFile,
+    Voice,
+    complain,
+    hint,
+    show,
+    show_json,
+    voice,
+)
+from scanwright.cli.help import Commands
 
-app = group()
+app = Commands("Parts")
 
 
 @app.command()
@@ -29,12 +41,14 @@ def build(
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
 
-        difference = difference_when_rebuilt(task, say)
+        difference = difference_when_rebuilt(task, Progress())
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
 
-    show(api.build(task, out, say=say).lines())
+    built = api.build(task, out, say=Progress())
+    show(built.lines(in_full=voice() is Voice.VERBOSE))
+    hint(f"next: open {built.folder / 'report.html'}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
 
 
 @app.command()
@@ -51,7 +65,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build folder: room, beams, loads, print. Exit 1 where one fails."""
     from scanwright import api
 
-    checks = api.check(out, say=say)
+    checks = api.check(out, say=Progress())
     failed = [entry for entry in checks if entry.severity == "error"]
     if as_json:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
@@ -80,12 +94,12 @@ def study(
     if plan:
         from scanwright.study.plan import plan_study
 
-        show(plan_study(study, out, results, say_in_place))
+        show(plan_study(study, out, results, Progress()))
         return
     from scanwright.study.run import run_study
 
     try:
-        show(run_study(study, out, results, scheduler, processes, say_in_place))
+        show(run_study(study, out, results, scheduler, processes, Progress()))
     except KeyboardInterrupt:
         complain("stopped; the same command goes on where it was")
         raise typer.Exit(130) from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from design.search.with_parts import Chosen, Workshop
 
 Say = Callable[[str], None]
+
+BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.48, "files": 0.72, "pictures": 0.9, "report": 0.93}
+"""Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,17 +58,34 @@ class Build:
     warnings: tuple[str, ...]
     made: Made | None
 
-    def lines(self) -> list[str]:
-        """The same in words."""
+    def lines(self, in_full: bool = False) -> list[str]:
+        """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
         if self.made is None:
             return [f"{self.folder}: nothing has changed, no work to do ({len(self.files)} files)"]
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
             *(f"warning: {warning}" for warning in self.warnings),
-            *(f"{finding.severity}: {finding.message}" for finding in self.made.findings),
+            *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
+
+
+def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
+    return [f"{finding.severity}: {finding.message}" for finding in findings]
+
+
+def _gathered(findings: Sequence[PartFinding]) -> list[str]:
+    """Each finding, but those about a value of a product as one list of what to measure."""
+    to_measure: dict[str, list[str]] = {}
+    for finding in findings:
+        if finding.value:
+            to_measure.setdefault(finding.subject, []).append(finding.value)
+    lines = _one_by_one([finding for finding in findings if not finding.value])
+    if to_measure:
+        lines.append("warning: measure these on your own before you print, nobody has verified them (-v says more):")
+        lines += [f"  {product}: {', '.join(values)}" for product, values in to_measure.items()]
+    return lines
 
 
 def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
@@ -122,6 +142,12 @@ def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
     return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
 
 
+def _at(say: Say, stage: str) -> Say:
+    """Progress that tells how much of the whole build is behind it."""
+    share = BEHIND[stage]
+    return lambda line: say(f"{line} ({share:.0%})")
+
+
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import build_parts, write_files
@@ -132,7 +158,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
 
     with fresh_folder(target) as work, second_process() as begin:
         begin(import_module, "cadquery")  # it loads while the search runs
-        optimum = find_optimum(asked, say)
+        optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from cad.assembly.shadow import PartsWorkshop
@@ -140,15 +166,15 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         from cad.files.workshop_files import export_scanner
 
         workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-        chosen = _chosen(optimum, workshop, say)
+        chosen = _chosen(optimum, workshop, _at(say, "shadow"))
         best = chosen.family
         angles = angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
         angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(loaded.scanner(angles))})
         scanner = loaded.scanner(angles)
         checked = begin(check_files, scanner, workshop.assembly(scanner), say)
-        parts = build_parts(scanner, work, say, workshop.assembly)
-        exported = export_scanner(scanner, parts, work, say, begin)
-        say("drawing density.png")
+        parts = build_parts(scanner, work, _at(say, "parts"), workshop.assembly)
+        exported = export_scanner(scanner, parts, work, _at(say, "files"), begin)
+        _at(say, "pictures")("drawing density.png")
         standard = standard_settings()
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
@@ -159,6 +185,6 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         records.write_search(work, result)
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *exported.left_out])
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
-        say("writing report.html")
+        _at(say, "report")("writing report.html")
         records.write_report(work)
     return Made(optimum, chosen, (*parts.findings, *exported.findings))

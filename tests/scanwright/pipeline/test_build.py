@@ -5,14 +5,17 @@ import json
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from cad.findings import PartFinding
 from design.angles import load_angles
 from design.errors import BuildError
 from design.search.optimum import rounded_to_error
 from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
+from scanwright.pipeline.build import Build, Made
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current
 
@@ -295,3 +298,20 @@ def _shipped(name):
     from design.task.task import SHIPPED
 
     return SHIPPED / f"{name}.toml"
+
+
+def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
+    found = [PartFinding("turn_from_metal", "note", "shaft", "shaft: have it turned")]
+    found += [PartFinding("unverified", "warning", "UTM", f"UTM: {v} is not verified", v) for v in ("a = 1", "b = 2")]
+    told = SimpleNamespace(table=list, lines=list)
+    made = Made(told, told, tuple(found))
+    gathered = Build(tmp_path, ("one",), ("slow",), made).lines()
+    assert gathered[0] == "warning: slow"
+    assert gathered[1] == "note: shaft: have it turned"
+    assert gathered[2].startswith("warning: measure these on your own before you print")
+    assert gathered[3] == "  UTM: a = 1, b = 2"
+    assert Build(tmp_path, ("one",), (), made).lines(in_full=True)[:3] == [
+        "note: shaft: have it turned",
+        "warning: UTM: a = 1 is not verified",
+        "warning: UTM: b = 2 is not verified",
+    ]

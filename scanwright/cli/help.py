@@ -1,0 +1,77 @@
+"""What all commands have in common before they do anything: their groups in the help, `-q`, `-v`, `--version`."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, Any, ClassVar, TypeVar
+
+import typer
+from typer.core import TyperGroup
+
+from scanwright.cli.console import Voice, set_voice, styled
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Results only: no progress, no hints.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Every step on its own line, every warning in full.")]
+
+
+class Commands(typer.Typer):
+    """A group of commands with a title; each of them gets `-q` and `-v`."""
+
+    def __init__(self, title: str = "") -> None:
+        super().__init__(rich_markup_mode=None, pretty_exceptions_enable=False)
+        self.title = title
+
+    def command(self, name: str | None = None, **options: Any) -> Callable[[F], F]:
+        """As typer's own."""
+        register = super().command(name, rich_help_panel=self.title, **options)
+
+        def registered(function: F) -> F:
+            register(_with_voice(function))
+            return function
+
+        return registered
+
+
+class GroupedHelp(TyperGroup):
+    """The help with a section for each group of commands, and what each command does in whole words."""
+
+    titles: ClassVar[tuple[str, ...]] = ("Design", "Parts", "Devices", "Clouds", "Pages")
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the sections in the order of the work."""
+        commands: list[tuple[str, Any]] = [(name, self.commands[name]) for name in self.list_commands(ctx)]
+        width = max(len(name) for name, _ in commands)
+        for title in self.titles:
+            rows = [(name.ljust(width), first_sentence(c)) for name, c in commands if c.rich_help_panel == title]
+            if rows:
+                with formatter.section(styled(title, "heading")):
+                    formatter.write_dl(rows)
+
+
+def first_sentence(command: Any) -> str:
+    """What a command does, from its docstring."""
+    paragraph = str(command.help or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
+    return re.split(r"\.(?: (?=[A-Z])|$)", paragraph, maxsplit=1)[0]
+
+
+def _with_voice(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function with `quiet` and `verbose`, which it does not see."""
+
+    @wraps(function)
+    def spoken(*args: Any, quiet: bool = False, verbose: bool = False, **kwargs: Any) -> Any:
+        if quiet or verbose:
+            set_voice(Voice.QUIET if quiet else Voice.VERBOSE)
+        return function(*args, **kwargs)
+
+    signature = inspect.signature(function, eval_str=True)
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in (("quiet", Quiet), ("verbose", Verbose))
+    ]
+    spoken.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *added])  # type: ignore[attr-defined]
+    return spoken

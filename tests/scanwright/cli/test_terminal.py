@@ -1,0 +1,150 @@
+"""The terminal: what a person sees there, what a file gets instead, and how little either can be."""
+
+import io
+import pickle
+import re
+
+import pytest
+
+from scanwright.cli import console
+from scanwright.cli.console import Progress, Voice, hint, own_voice, set_voice, show
+from scanwright.cli.help import GroupedHelp, first_sentence
+
+
+class Terminal(io.StringIO):
+    """A screen of one line: what is written after a carriage return and a clear takes the place of the line."""
+
+    def isatty(self):
+        return True
+
+    def lines(self):
+        return [line.rpartition("\r\033[K")[2] for line in self.getvalue().split("\n")]
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def opened():  # in the test: what captures its output takes the streams after the fixtures
+        screen = Terminal()
+        monkeypatch.setattr("sys.stderr", screen)
+        monkeypatch.setattr("sys.stdout", screen)
+        return screen
+
+    return opened
+
+
+class Clock:
+    """Seconds that pass when they are told to."""
+
+    def __init__(self):
+        self.now_s = 100.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def test_percentages_become_one_bar_with_the_time_that_is_left(screen):
+    screen, clock = screen(), Clock()
+    say = Progress(clock)
+    say("reading the task")
+    say("searching (0%)")
+    clock.now_s += 30
+    say("making the parts (25%)")
+    bar = screen.lines()[-1]
+    assert bar == f"  [{'=' * 6}{' ' * 18}]  25% making the parts, about 90 s left"
+    clock.now_s += 170
+    say("drawing (40%)")
+    assert "about 5 min left" in screen.lines()[-1]
+    show(["done"])
+    assert screen.lines() == ["  .. reading the task", "done", ""]
+
+
+def test_a_bar_fits_on_its_line(screen, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    screen = screen()
+    Progress(Clock())("counting what cannot be counted in any reasonable time at all (50%)")
+    assert len(screen.lines()[-1]) == 39
+
+
+def test_in_a_file_a_percentage_is_printed_every_ten_seconds_and_nothing_moves(capsys):
+    clock = Clock()
+    say = Progress(clock)
+    for second in range(25):
+        clock.now_s = float(second)
+        say(f"scanning ({4 * second}%)")
+    say("assembling")
+    said = capsys.readouterr().err
+    assert said.splitlines() == [f"  .. scanning ({p}%)" for p in (0, 40, 80)] + ["  .. assembling"]
+    assert not re.search(r"[\r\033]", said)
+
+
+def test_quiet_says_results_only_and_verbose_all(capsys):
+    with own_voice():
+        set_voice(Voice.QUIET)
+        Progress()("working")
+        hint("next: look")
+        show(["result"])
+    assert capsys.readouterr() == ("result\n", "")
+    with own_voice():
+        set_voice(Voice.VERBOSE)
+        say = Progress(Clock())
+        for percent in range(3):
+            say(f"scanning ({percent}%)")
+    assert len(capsys.readouterr().err.splitlines()) == 3
+    assert console.voice() is Voice.USUAL
+
+
+def test_a_second_process_can_be_given_the_progress():
+    assert isinstance(pickle.loads(pickle.dumps(Progress())), Progress)
+
+
+def test_colours_are_for_terminals_that_want_them(screen, monkeypatch):
+    screen = screen()
+    assert console.styled("x", "error", screen) == "x"
+    monkeypatch.delenv("NO_COLOR")
+    assert console.styled("x", "error", screen) == "\033[31m\033[1mx\033[0m"
+    assert console.styled("x", "error", io.StringIO()) == "x"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["assemble", "r.mcap"], "Missing option '--angles'. (see `scanwright assemble --help`)"),
+        (["build"], "Missing argument 'TASK'. (see `scanwright build --help`)"),
+        (["biuld", "x"], "'biuld'. Did you mean 'build'? (see `scanwright --help`)"),
+        (["study", "x", "--processes", "0"], "--processes"),
+        (["check", "x", "--loud"], "--loud"),
+    ],
+)
+def test_a_command_that_is_called_wrongly_is_one_line(command, words, told):
+    code, out, complaints = command(*words)
+    assert (code, out, len(complaints)) == (2, "", 1)
+    assert told in complaints[0]
+
+
+def test_every_command_stands_in_a_group_of_the_help_and_takes_q_and_v(command):
+    code, out, _ = command("-h")
+    assert code == 0
+    sections = re.split(r"^(\w+):$", out, flags=re.MULTILINE)
+    named = dict(zip(sections[1::2], sections[2::2], strict=True))
+    assert set(GroupedHelp.titles) <= set(named)
+    assert "  build " in named["Parts"] and "  catalogue " in named["Design"] and "  scan " in named["Devices"]
+    assert "..." not in out.replace("[ARGS]...", ""), "no description is cut off"
+    assert command()[1] == out, "no command at all is a question too"
+    for name in re.findall(r"^  (\w+)  ", "".join(named[title] for title in GroupedHelp.titles), re.MULTILINE):
+        _, said, _ = command(name, "--help")
+        assert "-q, --quiet" in said and "-v, --verbose" in said
+
+
+def test_the_first_sentence_of_a_docstring():
+    class Command:
+        help = "Do this, e.g. that\nand more. Not this.\n\nNor this."
+
+    assert first_sentence(Command) == "Do this, e.g. that and more"
+
+
+def test_version(command):
+    assert re.fullmatch(r"scanwright \d+\.\d+\.\d+\S*\n", command("--version")[1])
