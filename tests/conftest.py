@@ -9,6 +9,12 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import settings
 
+if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and every command compiles all it imports
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "pycache")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 import checked_arrays
 

@@ -15,13 +15,12 @@ from design.density.sweep import SweepLines
 from design.errors import TaskError
 from design.motion import Motion, Shortest, StopAndGo, Sweep
 from design.objective.named_objectives import Objective, objective_of
-from design.sphere.directions import EMPTY, equal_angle_grid, weighted_samples
+from design.sphere.directions import EMPTY, equal_angle_grid, require_weight
 from design.sphere.regions import Field, field_of
 from design.task.task import LoadedTask
 
 FRONT = Path(__file__).parent / "front.csv"
 NODES = 6561  # per setting, spread over the segments
-A_FEW = 100  # directions that show that a region is not empty
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +89,7 @@ def problem_of(loaded: LoadedTask) -> Problem:
     try:
         nodes = nodes_for(density.tolerance, density.budget_s)
         if step_deg is None:
-            weighted_samples(field, A_FEW)
+            require_weight(field)
         elif not field.weight_at(equal_angle_grid(step_deg)).any():
             raise TaskError(EMPTY)
     except TaskError as error:

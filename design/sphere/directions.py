@@ -14,7 +14,9 @@ from design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
 MOST_LOOKS = 1_000_000  # directions looked at in one patch
+A_FEW = 100  # directions that show that a region is not empty
 EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
+NO_WEIGHT = f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +63,22 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: fl
     patches = len(field.patches)
     found = [_in_patch(field, k, wanted // patches + 1, turn_rad, shift) for k in range(patches)]
     if not any(len(samples.weights) for samples in found):
-        raise TaskError(
-            f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
-        )
+        raise TaskError(NO_WEIGHT)
     return Samples(
         np.concatenate([samples.directions for samples in found]),
         np.concatenate([samples.weights for samples in found]),
     )
+
+
+def require_weight(field: Field) -> None:
+    """Nothing, where some direction has a weight: the first painted region that holds one ends the look.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    patches = len(field.patches)
+    if not any(len(_in_patch(field, k, A_FEW // patches + 1, 0.0, 0.5).weights) for k in range(patches)):
+        raise TaskError(NO_WEIGHT)
 
 
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:

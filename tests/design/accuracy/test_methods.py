@@ -1,4 +1,4 @@
-"""The stress table row by row, and what the accuracy report measures."""
+"""The stress table, and what the accuracy report measures."""
 
 import csv
 import sys
@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import simpson
 
 from design.accuracy.methods import METHODS, Point, best_points, by_ball_count, by_ball_search, reference
-from design.accuracy.stress import stress_rows
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import zones
 from design.errors import TaskError
@@ -25,16 +24,6 @@ ANGLES = np.radians([0.0, 0.0, -50.0, 35.0])
 @pytest.fixture(scope="module")
 def ground():
     return problem_of(load_task(Path("ground_ahead")))
-
-
-def stress_table():
-    loaded = load_task(Path("uniform"))
-    return stress_rows(loaded, problem_of(loaded))
-
-
-@pytest.mark.parametrize("row", stress_table(), ids=lambda row: f"{row.case}: {row.quantity}")
-def test_stress(row):
-    assert row.error <= row.allowed, f"expected {row.expected}, got {row.got}"
 
 
 def test_the_reference_is_right_without_any_of_our_quadrature(ground):
@@ -86,10 +75,10 @@ def test_the_stress_command_writes_its_table(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["scanwright", "accuracy", "uniform", "--stress", "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as stop:
         scanwright_command()
-    assert not stop.value.code
     rows = list(csv.DictReader((tmp_path / "uniform/stress.csv").read_text().splitlines()))
     assert len(rows) > 40
-    assert {row["passed"] for row in rows} == {"True"}
+    assert [row for row in rows if row["passed"] != "True"] == []
+    assert not stop.value.code
     assert f"{len(rows)} of {len(rows)}" in capsys.readouterr().out
 
 

