@@ -251,11 +251,15 @@ def print_evolution(tasks: int, seed: int) -> None:
             refused += 1
             print(f"task {i} refused: {error}", flush=True)
             continue
+        beaten += result.beaten_by > 0
+        word = f"BEATEN by {result.beaten_by:.1e}" if result.beaten_by > 0 else "unbeaten"
+        best, task = result.best.score, loaded.task
+        print(
+            f"task {i}, {task.motion.mode}, {task.density.objective}: {best.J:.5f} +- {best.J_error:.0e} {word}",
+            flush=True,
+        )
         if result.beaten_by > 0:
-            beaten += 1
-            print(f"BEATEN task {i} by {result.beaten_by:.1e}: {result} {loaded.task.model_dump(mode='json')}")
-        if (i + 1) % 10 == 0:
-            print(f"{i + 1} tasks: {beaten} beaten, {refused} refused", flush=True)
+            print(f"  {result} {task.model_dump(mode='json')}", flush=True)
     print(f"evolution of {EVALUATIONS} settings beats the optimum of {beaten} of {tasks - refused} random tasks")
 
 
