@@ -15,7 +15,7 @@ def sides():
     """Random g, weights and fans, and which classes the grid holds either way round."""
     rng = np.random.default_rng(5)
     g, weights = rng.random((PLANES, NODES)), rng.random((AXES, NODES))
-    weights[PART:] *= 0.9  # so that some of the lowest are in the last tile
+    weights[PART:] *= 0.6  # so that some of the lowest are in the last tile
     has_plane, has_axis = (rng.random((2, count)) < 0.8 for count in (PLANES, AXES))
     fan, region = (np.sort(rng.uniform(0, np.pi, (count, 2)), axis=1) for count in (PLANES, AXES))
     region = region.mean(axis=1, keepdims=True) + 0.1 * (region - region.mean(axis=1, keepdims=True))
