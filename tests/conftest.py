@@ -17,6 +17,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
 
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 import checked_arrays
+import quick_tests
 
 checked_arrays.install()
 
@@ -24,6 +25,19 @@ checked_arrays.install()
 settings.register_profile("ci", derandomize=True, deadline=None)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--measure-slow", action="store_true", help="list anew which tests are slow: all of them must run")
+
+
+def pytest_configure(config):
+    if config.getoption("--measure-slow"):
+        config.pluginmanager.register(quick_tests.Stopwatch(hasattr(config, "workerinput")))
+
+
+def pytest_collection_modifyitems(items):
+    quick_tests.mark(items)
 
 
 @pytest.fixture(autouse=True)
@@ -182,9 +196,25 @@ def browser(chromium):
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory):
-    """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
+def built_once(tmp_path_factory):
+    """Of a scanner on fdm-0.4, the folder of its parts and what `build_parts` gave: made once, for reading only."""
     from cad.files.part_files import build_parts
+
+    kept = {}
+
+    def build(scanner):
+        key = scanner.angles.to_json()
+        if key not in kept:
+            folder = tmp_path_factory.mktemp("parts")
+            kept[key] = folder, build_parts(scanner, folder, lambda _: None)
+        return kept[key]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory, built_once):
+    """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
     from cad.files.workshop_files import export_scanner
     from cad.layout.layout import mount_offset_mm
     from design.angles import Angles, AngleSet
@@ -201,7 +231,7 @@ def made(tmp_path_factory):
     )
     offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", load_catalogue()))
     scanner = scanner_of(angles.model_copy(update={"t_world_rot_mm": offset}), "fdm-0.4", load_catalogue())
-    folder = tmp_path_factory.mktemp("made")
-    result = build_parts(scanner, folder, lambda _: None)
+    parts, result = built_once(scanner)
+    folder = shutil.copytree(parts, tmp_path_factory.mktemp("made"), dirs_exist_ok=True)
     exports = export_scanner(scanner, result, folder, lambda _: None)
     return SimpleNamespace(folder=folder, result=result, exports=exports, scanner=scanner)

@@ -4,7 +4,9 @@ import cadquery as cq
 import numpy as np
 import pytest
 
-from cad.files.part_files import build_parts
+from cad.assembly.assembly import as_tree
+from cad.assembly.make import make_parts
+from cad.files.step import step_text
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -22,13 +24,13 @@ def read_back(request, tmp_path_factory):
         servo="MX-64R",
         slip_ring="SNU11-P0210",
     )
-    folder = tmp_path_factory.mktemp("assembly")
-    build_parts(scanner_of(angles, "sla", load_catalogue()), folder, lambda _: None)
+    path = tmp_path_factory.mktemp("assembly") / "assembly.step"
+    tree = as_tree(make_parts(scanner_of(angles, "sla", load_catalogue())))
+    path.write_text(step_text(tree, "assembly"), encoding="ascii")
     a, b = np.radians([alpha, beta])
     Ry = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
     Rx = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
-    tree = cq.Assembly.importStep(str(folder / "assembly.step"))
-    return Ry @ Rx, {child.name: child for child in tree.children}
+    return Ry @ Rx, {child.name: child for child in cq.Assembly.importStep(str(path)).children}
 
 
 def centre(child):

@@ -7,7 +7,9 @@ import pytest
 import yourdfpy
 
 from cad.files.part_files import build_parts
-from cad.layout.layout import mount_offset_mm
+from cad.files.urdf import urdf_text
+from cad.geometry.inertia import Inertial
+from cad.layout.layout import drive_of, mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing
@@ -16,10 +18,10 @@ from design.frames import roll_pitch_yaw
 from design.scanner import scanner_of
 
 CASES = {
-    "rolling": {"angles": (0, 90, 0, 0, -90, 0)},
-    "pitching": {"angles": (-90, 0, 0, 90, 0, 0)},
+    "rolling": {"angles_deg": (0, 90, 0, 0, -90, 0)},
+    "pitching": {"angles_deg": (-90, 0, 0, 90, 0, 0)},
     "calibrated": {
-        "angles": (20, -35, 15, 40, -60, 0),
+        "angles_deg": (20, -35, 15, 40, -60, 0),
         "delta_rotvec_rot_deg": (0.3, -0.2),
         "t_rot_laser_mm": (1.2, -0.7, 0.1),
         "source": "calibration",
@@ -27,29 +29,26 @@ CASES = {
 }
 
 
-@pytest.fixture(scope="module", params=CASES)
-def built(request, tmp_path_factory):
-    case = dict(CASES[request.param])
-    names = ("alpha_rot", "beta_rot", "gamma_rot", "alpha_laser", "beta_laser", "gamma_laser")
+NAMES = ("alpha_rot", "beta_rot", "gamma_rot", "alpha_laser", "beta_laser", "gamma_laser")
+ANY_BODY = Inertial(1.0, np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_chain_is_that_of_the_angle_set(name, tmp_path):
+    case = CASES[name]
     angles = AngleSet(
-        task=request.param,
-        angles_deg=Angles(**dict(zip(names, case.pop("angles"), strict=True))),
+        task=name,
         sensor="UTM-30LX",
         servo="MX-64R",
         slip_ring="UH1256-02-0610-06S",
-        **case,
+        **case | {"angles_deg": Angles(**dict(zip(NAMES, case["angles_deg"], strict=True)))},
     )
-    catalogue = load_catalogue()
-    offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", catalogue))
+    offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", load_catalogue()))
     angles = angles.model_copy(update={"t_world_rot_mm": offset})
-    folder = tmp_path_factory.mktemp(request.param)
-    result = build_parts(scanner_of(angles, "fdm-0.4", catalogue), folder, lambda _: None)
-    return angles, folder, result
-
-
-def test_the_chain_is_that_of_the_angle_set(built):
-    angles, folder, _ = built
-    robot = yourdfpy.URDF.load(str(folder / "scanner.urdf"))
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    bodies = dict.fromkeys(("servo", "rot", "laser"), ANY_BODY)
+    (tmp_path / "scanner.urdf").write_text(urdf_text(scanner, drive_of(scanner), bodies, {"servo": [], "rot": []}))
+    robot = yourdfpy.URDF.load(str(tmp_path / "scanner.urdf"))
     assert robot.actuated_joint_names == ["spin_joint"]
     assert {"world", "servo", "rot", "laser"} == set(robot.link_map)
     for joint in (0.0, 0.7, np.pi / 2, -2.5, 40.0):
@@ -58,8 +57,8 @@ def test_the_chain_is_that_of_the_angle_set(built):
         np.testing.assert_allclose(robot.get_transform("rot", "world"), angles.T_world_rot(joint), atol=1e-6)
 
 
-def test_meshes_are_found_beside_the_file_and_are_metres(built):
-    _, folder, result = built
+def test_meshes_are_found_beside_the_file_and_are_metres(made):
+    folder, result = made.folder, made.result
     robot = yourdfpy.URDF.load(str(folder / "scanner.urdf"))
     for visual in (v for link in robot.link_map.values() for v in link.visuals if v.geometry.mesh is not None):
         assert (folder / visual.geometry.mesh.filename).is_file()
@@ -70,8 +69,8 @@ def test_meshes_are_found_beside_the_file_and_are_metres(built):
     assert 0.2 < extent < 0.6
 
 
-def test_masses_add_up_and_inertias_are_those_of_bodies(built):
-    _, folder, result = built
+def test_masses_add_up_and_inertias_are_those_of_bodies(made):
+    folder, result = made.folder, made.result
     mass = {}
     for link in ElementTree.parse(folder / "scanner.urdf").getroot().iter("link"):
         if link.get("name") == "world":
@@ -104,9 +103,8 @@ def test_fixed_axis_angles_survive_the_gimbal(pitch):
     np.testing.assert_allclose(back @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]), Rx @ Ry, atol=1e-9)
 
 
-def test_an_angle_set_that_names_another_place_is_refused(built, tmp_path):
-    angles, _, _ = built
-    wrong = angles.model_copy(update={"t_world_rot_mm": (1.0, 2.0, 3.0)})
+def test_an_angle_set_that_names_another_place_is_refused(made, tmp_path):
+    wrong = made.scanner.angles.model_copy(update={"t_world_rot_mm": (1.0, 2.0, 3.0)})
     with pytest.raises(BuildError, match=r"t_world_rot_mm = \[1.0, 2.0, 3.0\]"):
         build_parts(scanner_of(wrong, "fdm-0.4", load_catalogue()), tmp_path, lambda _: None)
     assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from cad.files.part_files import build_parts
 from cad.layout.layout import mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -43,14 +42,15 @@ def rot(axis, degrees):
     )
 
 
-def scanner_for(setting):
-    alpha_rot, beta_rot, alpha, beta, lidar, servo = setting
+def scanner_for(name):
+    alpha_rot, beta_rot, alpha, beta, lidar, servo = SETTINGS[name]
     angles = AngleSet(
-        task="test",
+        task=name,
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
         sensor=lidar,
         servo=servo,
         slip_ring="UH1256-02-0610-06S",
+        motion={"mode": "spin", "period_s": 18.0},
     )
     scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
     angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(scanner)})
@@ -66,11 +66,10 @@ def merged(vertices, faces):
 
 
 @pytest.fixture(scope="module", params=SETTINGS)
-def built(request, tmp_path_factory):
+def built(request, built_once):
     setting = SETTINGS[request.param]
-    folder = tmp_path_factory.mktemp(request.param)
-    scanner = scanner_for(setting)
-    result = build_parts(scanner, folder, lambda _: None)
+    scanner = scanner_for(request.param)
+    folder, result = built_once(scanner)
     solids = {}
     for child in cq.Assembly.importStep(str(folder / "assembly.step")).children:
         solids[child.name] = cq.Compound.makeCompound(child.toCompound().Solids())

@@ -69,7 +69,7 @@ def test_a_stated_error_holds(kind):
 
 
 def test_neither_chance_nor_evolution_beats_the_search():
-    """One shipped task with few draws; tests/design/search/test_search.py has chance alone on all of them."""
+    """One shipped task with few draws; the command draws hundred thousand for each of them."""
     loaded = load_task(Path("ceiling"))
     result = contest(problem_of(loaded), loaded.task.angles, draws=150, generations=8, seed=3)
     assert len(result.rivals) == 2

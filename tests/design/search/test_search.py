@@ -1,4 +1,4 @@
-"""The folded search against an unfolded loop over every setting, and against settings drawn at random."""
+"""The folded search against an unfolded loop over every setting; `benchmarks/design/claims.py` draws settings too."""
 
 from itertools import product
 from pathlib import Path
@@ -13,7 +13,7 @@ from design.objective.problem import problem_of
 from design.objective.score import quick_J, score
 from design.search import coarse, families
 from design.search.search import search
-from design.task.task import NAMES, LoadedTask, Task, load_task, shipped_tasks
+from design.task.task import NAMES, LoadedTask, Task, load_task
 
 AHEAD = {
     "weight": [{"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}],
@@ -48,18 +48,26 @@ CASES = {
     "one angle fixed, one range short": case(
         AHEAD, {"step_deg": 30, "alpha_rot_deg": 100, "beta_laser_deg": [-17, 50]}, period_s=2.0
     ),
-    "the paper's sum": case(AHEAD, {"step_deg": 45, "alpha_rot_deg": [0, 90]}, quadrature="equal_angle"),
+    "the paper's sum": case(
+        AHEAD, {"step_deg": 45, "alpha_rot_deg": [0, 90]}, quadrature="equal_angle", grid_step_deg=3
+    ),
 }
+
+
+@pytest.fixture
+def unrefined(monkeypatch):
+    """The answer of the grid."""
+    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
 
 
 def every_setting(ranges):
     return np.array(list(product(*(ranges.grid_deg(name) for name in NAMES))))
 
 
+@pytest.mark.usefixtures("unrefined")
 @pytest.mark.parametrize("name", CASES)
-def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name, monkeypatch):
+def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name):
     """Brute force: J of every setting, no folding, no bound. Without refinement both must find the same best J."""
-    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     problem, ranges = CASES[name]
     settings = every_setting(ranges)
     found = search(problem, ranges)
@@ -84,10 +92,10 @@ def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name, monk
     assert pytest.approx(by_plane[winner], abs=coarse.MARGIN) == score(problem, named).J
 
 
+@pytest.mark.usefixtures("unrefined")
 @pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX"])
-def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor, monkeypatch):
+def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor):
     """Every direction has a weight here and none like its mirror image, so nothing but symmetry makes J equal."""
-    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
     uneven = {"weight": [{"shape": "all", "value": 0.2}, LEFT["weight"][0]]}
     problem, ranges = case(uneven, {"step_deg": 45}, sensor=sensor, period_s=4.0)
     best = search(problem, ranges).best
@@ -96,6 +104,7 @@ def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor, mo
         assert family.members == (np.abs(J - quick_J(problem, family.angles_rad, 486)) < 1e-7).sum()
 
 
+@pytest.mark.usefixtures("unrefined")
 @pytest.mark.parametrize("ball_radius_deg", [0.25, 0.5, 1.0])
 @pytest.mark.parametrize("period_s", [2.0, 18.0])
 def test_the_coarse_J_of_the_search_is_no_further_off_than_its_margin(ball_radius_deg, period_s):
@@ -141,6 +150,7 @@ def test_refinement_never_makes_it_worse(monkeypatch):
     assert refined.J < plain.J - 1e-3, "at 30 deg there is something to gain"
 
 
+@pytest.mark.usefixtures("unrefined")
 def test_all_is_covered_with_fewer_evaluations():
     problem, ranges = case(AHEAD, {"step_deg": 15})
     found = search(problem, ranges)
@@ -150,36 +160,23 @@ def test_all_is_covered_with_fewer_evaluations():
     assert saved["equivalent settings"] == found.covered - found.evaluated
 
 
-@pytest.mark.parametrize("cores", [1, 3, 7])
-def test_the_number_of_threads_changes_no_digit(cores, monkeypatch):
+def test_the_number_of_threads_changes_no_digit(monkeypatch):
     problem, ranges = CASES["all four free, two seconds"]
-    before = search(problem, ranges)
+    one, *others = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3, 7))
+    for other in others:
+        assert other.best == one.best
+        np.testing.assert_array_equal(other.planes, one.planes)
+        assert (other.covered, other.evaluated, other.left_out) == (one.covered, one.evaluated, one.left_out)
+
+
+def found_with(cores, problem, ranges, monkeypatch):
     monkeypatch.setattr(parallel.os, "cpu_count", lambda: cores)
-    after = search(problem, ranges)
-    assert after.best == before.best
-    np.testing.assert_array_equal(after.planes, before.planes)
-    assert (after.covered, after.evaluated, after.left_out) == (before.covered, before.evaluated, before.left_out)
+    return search(problem, ranges)
 
 
-@pytest.mark.parametrize("name", shipped_tasks())
-def test_no_random_setting_beats_the_search_of_a_shipped_task(name):
-    """With 1200 draws, 300 where each sums over a sweep: all roughly, the best 20 with all nodes."""
-    loaded = load_task(Path(name))
-    problem, ranges = problem_of(loaded), loaded.task.angles
-    found = search(problem, ranges)
-    if name == "ground_ahead":
-        assert found.covered == 3_697_669 == 73 * 37 * 37 * 37
-    best = found.best[0].score
-    low, high = np.array([ranges.limits(angle) for angle in NAMES]).T
-    drawn = np.radians(np.random.default_rng(11).uniform(low, high, (1200 if problem.sweep is None else 300, 4)))
-    drawn = np.unique(drawn, axis=0)
-    rough = [quick_J(problem, setting, 243) for setting in drawn]
-    least = found.least_blind
-    for i in np.argsort(rough)[:20]:
-        other = score(problem, drawn[i])
-        if other.blind_weight > 0 and least is None:  # it has a hole, and others have none
-            continue
-        assert other.J + other.J_error >= best.J - best.J_error, np.degrees(drawn[i])
+def test_the_shipped_grid_is_as_large_as_told():
+    ranges = load_task(Path("ground_ahead")).task.angles
+    assert np.prod([len(ranges.grid_deg(name)) for name in NAMES]) == 3_697_669 == 73 * 37 * 37 * 37
 
 
 def test_the_families_shown_are_different_answers():
