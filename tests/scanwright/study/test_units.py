@@ -72,8 +72,11 @@ def test_a_killed_client_leaves_no_process_behind(tmp_path):
 
 def test_ctrl_c_ends_a_study_with_its_line(tmp_path, cheapest_task):
     (tmp_path / "ahead.toml").write_text(cheapest_task)
-    (tmp_path / "one.toml").write_text('name = "one"\ntasks = ["ahead.toml"]\nfront = ["J"]\nwinners = 0\n')
-    command = [sys.executable, "-m", "scanwright", "study", "one.toml", "--processes", "2"]
+    periods = list(range(10, 40))  # so many that it is not over before Ctrl-C comes, however busy the computer is
+    (tmp_path / "many.toml").write_text(
+        f'name = "many"\ntasks = ["ahead.toml"]\nperiods_s = {periods}\nfront = ["J"]\nwinners = 0\n'
+    )
+    command = [sys.executable, "-m", "scanwright", "study", "many.toml", "--processes", "2"]
     with (tmp_path / "said").open("wb") as said:
         client = subprocess.Popen(command, cwd=tmp_path, stdout=said, stderr=said, start_new_session=True)
     children = Path(f"/proc/{client.pid}/task/{client.pid}/children")
