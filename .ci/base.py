@@ -15,7 +15,7 @@ from pathlib import Path
 
 EXTRAS = {
     "design": set(),
-    "firmware_io": {"laspy", "pye57", "pypcd4", "launch"},  # launch: the robot's own ROS 2
+    "firmware_io": {"laspy", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},  # from launch on: of ROS 2
     "scanwright": {"cadquery", "jinja2", "manifold3d", "msgspec", "viser"},
 }
 ANGLES = {

@@ -35,6 +35,15 @@ myst_enable_extensions = ["deflist"]
 
 add_module_names = False
 autodoc_member_order = "bysource"
+autodoc_mock_imports = [  # the robot's own ROS 2
+    "builtin_interfaces",
+    "geometry_msgs",
+    "rcl_interfaces",
+    "rclpy",
+    "rosgraph_msgs",
+    "sensor_msgs",
+    "std_msgs",
+]
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_typehints_format = "short"

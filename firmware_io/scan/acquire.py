@@ -32,7 +32,7 @@ from firmware_io.samples import Scan
 from firmware_io.scan.axis_thread import AxisThread, turning_servo
 from firmware_io.scan.live_feed import NOBODY, Watch
 from firmware_io.scan.plan import ScanPlan
-from firmware_io.scan.recorder import Recorder
+from firmware_io.scan.recorder import recorder_of
 from firmware_io.servo.dynamixel.driver import ServoState, open_servo
 
 Say = Callable[[str], None]
@@ -43,6 +43,7 @@ _CLOCK_LEAST_S = 3.0
 _CLOCK_PATIENCE_S = 10.0
 _STEADY_PATIENCE_S = 15.0
 _AWAY_S = 10.0
+_MOST_SPEEDS = 3600  # an hour of them, from which the mean is told
 _UNHEARD = "the servo has not answered that it stands: look, and cut its power if it turns"
 
 
@@ -190,6 +191,13 @@ class _Scans:
                     raise
 
 
+def _progress(taken: float, plan: ScanPlan) -> str:
+    """How much is done, or where nobody knows how much that will be, how many full scans."""
+    if plan.endless:
+        return f"{taken % 1:4.0%} of full scan {math.floor(taken) + 1:,}"
+    return f"{min(taken / plan.turns, 1):4.0%}"
+
+
 def _settle_clock(scans: _Scans, say: Say) -> None:
     """Read scans until the sensor's clock is known."""
     say("learning the sensor's clock")
@@ -244,19 +252,18 @@ def _wait_until_steady(
 
 def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Watch) -> ScanSummary:
     """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
-    say(f"recording {plan.duration_s:g} s")
+    say("scanning until it is ended" if plan.endless else f"recording {plan.duration_s:g} s")
+    wanted = math.inf if plan.endless else plan.turns
     lidar, dropped, bad = scans.lidar, scans.lidar.dropped, scans.lidar.bad_packets
     axis.left_out.clear()
     recorded_s = said_s = time.monotonic()
     whole, taken, away = 0, 0.0, scans.away  # full scans: before the lidar was lost last, until now; its losses
     begin_s, from_rad = recorded_s, axis.window[-1].position_rad
-    turned = [axis.turning()]
-    stamps_ns: list[int] = []
+    turned = deque([axis.turning()], maxlen=_MOST_SPEEDS)
     waiting: deque[Scan] = deque()
-    angles, last_ns = 0, 0
-    plan.recording.parent.mkdir(exist_ok=True)
+    recorded, angles, first_ns, last_ns = 0, 0, 0, 0
     note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
-    with Recorder(plan.recording, note, plan.attached) as recorder:
+    with recorder_of(None if plan.endless else plan.recording, note, plan.attached) as recorder:
 
         def keep(state: ServoState) -> None:
             nonlocal angles
@@ -266,7 +273,7 @@ def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Wa
 
         for state in axis.window:
             keep(state)
-        while taken < plan.turns or waiting:
+        while taken < wanted or waiting:
             scan = scans.next()
             if scans.away > away:
                 resting = 1 + _wait_until_steady(scans, axis, plan.motion, say, keep)
@@ -274,7 +281,7 @@ def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Wa
                 whole, away = math.floor(taken), scans.away
                 begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
                 continue
-            if taken < plan.turns:
+            if taken < wanted:
                 waiting.append(scan)
             for state in axis.hear():
                 keep(state)
@@ -285,7 +292,8 @@ def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Wa
                     continue
                 recorder.scan(ready)
                 watch.scan(ready)
-                stamps_ns.append(ready.stamp_ns)
+                first_ns = first_ns or ready.stamp_ns
+                recorded += 1
                 last_ns = int(ready.time_ns[-1])
             if isinstance(plan.motion, Spin):
                 turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
@@ -295,21 +303,21 @@ def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Wa
             if time.monotonic() - said_s > 1:
                 said_s = time.monotonic()
                 turned.append(axis.turning())
-                rate_hz = len(stamps_ns) / (said_s - recorded_s)
+                rate_hz = recorded / (said_s - recorded_s)
                 even = f", {turned[-1][0]:.1f} deg/s, ripple {turned[-1][1]:.2f} deg"
                 say(
-                    f"{min(taken / plan.turns, 1):4.0%}  {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
+                    f"{_progress(taken, plan)}  {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
                     f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else "")
                 )
-    if not stamps_ns:
+    if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
     lost = {"scans the sensor dropped": lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
     even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
     return ScanSummary(
         recording=plan.recording,
-        scans=len(stamps_ns),
+        scans=recorded,
         joint_samples=angles,
-        duration_s=(last_ns - stamps_ns[0]) / 1e9,
+        duration_s=(last_ns - first_ns) / 1e9,
         speed_deg_s=float(even_turning[:, 0].mean()),
         ripple_deg=float(even_turning[:, 1].max()),
         clock_ns=scans.clock_ns,

@@ -35,6 +35,7 @@ class ScanPlan:
         servo_id: number of the servo on its bus; None if it is alone there.
         recording: file to write.
         attached: files kept inside it, name -> text.
+        endless: record nothing, and go on until it is ended.
     """
 
     angles: AngleSet
@@ -50,6 +51,7 @@ class ScanPlan:
     servo_id: int | None
     recording: Path
     attached: dict[str, str]
+    endless: bool = False
 
     @property
     def duration_s(self) -> float:
@@ -59,12 +61,13 @@ class ScanPlan:
     def lines(self) -> list[str]:
         """The plan in words."""
         emulated = f" (emulated by process {self.ports.pid})" if self.ports.pid else ""
+        each = f"{self.motion.mode} of {self.motion.duration_s:g} s"
+        recorded = [f"{self.turns} x {each}: {self.duration_s:g} s of recording", f"recording {self.recording}"]
         return [
             f"lidar {self.angles.sensor} at {self.ports.lidar}{emulated}",
             f"servo {self.angles.servo} at {self.ports.servo}{emulated}",
-            f"{self.turns} x {self.motion.mode} of {self.motion.duration_s:g} s: {self.duration_s:g} s of recording",
             self.frames,
-            f"recording {self.recording}",
+            *([f"{each}, again and again until Ctrl-C"] if self.endless else recorded),
         ]
 
 
@@ -80,6 +83,7 @@ def plan_scan(
     cluster: int = 1,
     every: int = 1,
     stamp_at: StampAt = "step_0",
+    endless: bool = False,
 ) -> ScanPlan:
     """What a scan with the scanner of a build folder will do; touches no device and writes nothing.
 
@@ -94,6 +98,7 @@ def plan_scan(
         cluster: steps that share one range.
         every: one scan of so many is taken.
         stamp_at: which moment of a turn the sensor's stamps mean.
+        endless: record nothing, and go on until it is ended; `turns` and `recording` say nothing then.
 
     Raises:
         ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an unusable file name.
@@ -130,6 +135,7 @@ def plan_scan(
         servo_id=servo_id,
         recording=recording or out / "recordings" / f"{datetime.now():%Y%m%d-%H%M%S}.mcap",
         attached={path.name: path.read_text(encoding="utf-8") for path in kept},
+        endless=endless,
     )
 
 

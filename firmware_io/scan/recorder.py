@@ -13,6 +13,7 @@ import os
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -99,6 +100,26 @@ class Recorder:
 
     def _error(self, error: OSError, advice: str) -> RecordingError:
         return RecordingError(f"{self._path}: cannot write: {error.strerror or error}{advice}")
+
+
+class _Nowhere:
+    """The recorder of a scan that somebody else keeps."""
+
+    def scan(self, scan: Scan) -> None:
+        """Nothing."""
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Nothing."""
+
+
+def recorder_of(
+    path: Path | None, note: Mapping[str, str], attached: Mapping[str, str]
+) -> AbstractContextManager[Recorder | _Nowhere]:
+    """The recorder of a file, whose folder is made, or one that keeps nothing."""
+    if path is None:
+        return nullcontext(_Nowhere())
+    path.parent.mkdir(exist_ok=True)
+    return Recorder(path, note, attached)
 
 
 class _WholeWrites:

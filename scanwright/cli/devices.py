@@ -1,4 +1,4 @@
-"""Commands that talk to devices: emulate, scan, doctor."""
+"""Commands that talk to devices: emulate, scan, ros2, doctor."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from design.errors import require
 from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 
@@ -121,6 +122,51 @@ def scan(
         say(f"recorded {recorded.duration_s:.1f} s, assembling")
         show(recorded.lines())
         show(api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")).lines())
+
+
+@app.command()
+def ros2(
+    out: BuildFolder,
+    ros_args: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[-- --ros-args ...]", help="As nodes of ROS 2 take them: -r scan:=front/scan."),
+    ] = None,
+    recording: Annotated[
+        Path | None, typer.Option(metavar="FILE.mcap", help="Publish a recording at its own pace, with /clock.")
+    ] = None,
+    rate: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    straight: Annotated[
+        bool, typer.Option("--straight", help="Points straight between angles: later by one angle, not 0.35 s.")
+    ] = False,
+    no_tf: Annotated[bool, typer.Option("--no-tf", help="Leave the frames to robot_state_publisher.")] = False,
+    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
+    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    servo_id: ServoId = None,
+    intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+) -> None:
+    """Publish scans, angles, frames and de-skewed points as a node of ROS 2, until Ctrl-C."""
+    require(
+        "ros",
+        "ros2 needs rclpy: source the setup.bash of your ROS 2 (its Python is the one to install scanwright in), or",
+        "rclpy",
+        "sensor_msgs",
+    )
+    from firmware_io.ros.serve import serve_devices, serve_recording
+    from firmware_io.scan.plan import plan_scan
+
+    given = ros_args or []
+    try:
+        if recording is not None:
+            serve_recording(out, recording, given, Progress(), rate=rate, smooth=not straight, publish_tf=not no_tf)
+            return
+        plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
+        show(plan.lines())
+        with on_duty():
+            serve_devices(out, plan, given, Progress(), smooth=not straight, publish_tf=not no_tf)
+    except KeyboardInterrupt as stop:
+        for line in ("stopped", *notes_of(stop)):
+            complain(line)
+        raise typer.Exit(130) from None
 
 
 @app.command()

@@ -1,6 +1,7 @@
 """Calibrated frames on a robot: a URDF library and a shell see the very frames of the angle set."""
 
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,21 +33,7 @@ CALIBRATED = DESIGNED.model_copy(
         "covariance": tuple(tuple(row) for row in np.diag([1e-8, 1e-8, 1e-8, 1e-8]).tolist()),
     }
 )
-URDF = """<?xml version="1.0"?>
-<robot name="frames">
-  <!-- kept -->
-  <link name="world"/><link name="servo"><visual><origin xyz="0 0 0" rpy="0 0 0"/>
-    <geometry><mesh filename="parts/base.stl" scale="0.001 0.001 0.001"/></geometry></visual></link>
-  <link name="rot"><visual><geometry><mesh filename="package://mine/rot.stl"/></geometry></visual></link>
-  <link name="laser"/>
-  <joint name="servo_mount" type="fixed"><parent link="world"/><child link="servo"/>
-    <origin xyz="9 9 9" rpy="1 1 1"/></joint>
-  <joint name="spin_joint" type="continuous"><parent link="servo"/><child link="rot"/>
-    <origin xyz="0 0 0" rpy="0 0 0"/><axis xyz="0 0 1"/></joint>
-  <joint name="laser_mount" type="fixed"><parent link="rot"/><child link="laser"/>
-    <origin xyz="9 9 9" rpy="1 1 1"/></joint>
-</robot>
-"""
+URDF = (Path(__file__).parent / "scanner.urdf").read_text()
 
 
 def test_a_urdf_library_sees_the_chain_of_the_calibrated_angles(tmp_path):

@@ -1,0 +1,63 @@
+"""Scans until it is ended, for a node: devices that fail are tried again, parameters stop and start them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+from design.errors import DeviceError
+from design.motion import Motion, Spin
+from firmware_io.scan.acquire import acquire
+from firmware_io.scan.live_feed import Watch
+from firmware_io.scan.plan import ScanPlan
+
+AGAIN_S = 3.0
+_ASKED_S = 1.0
+
+
+class Interrupted(Exception):  # noqa: N818 - it is no error
+    """Raised by a steered watch: the devices are stopped, and what it wants next is asked."""
+
+
+class Steered(Watch, Protocol):
+    """A watch that also says what shall happen. Any of its `Watch` methods may raise `Interrupted`."""
+
+    @property
+    def running(self) -> bool:
+        """Whether the scanner shall turn."""
+
+    @property
+    def period_s(self) -> float:
+        """Time of one turn; 0 for the motion of the angle set."""
+
+    def begin(self) -> None:
+        """The devices start anew."""
+
+    def failed(self, line: str) -> None:
+        """A device failed; it is tried again."""
+
+    def wait(self, seconds: float) -> None:
+        """Until something else is wanted, at most so long."""
+
+
+def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None]) -> None:
+    """Scan until something else than a device ends it, such as Ctrl-C; the devices are stopped on every way out."""
+    while True:
+        if not steered.running:
+            steered.wait(_ASKED_S)
+            continue
+        steered.begin()
+        try:
+            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), say, steered)
+        except Interrupted:
+            say("stopped, as a parameter asks")
+        except DeviceError as error:
+            line = f"{error}; trying again in {AGAIN_S:g} s"
+            steered.failed(line)
+            say(line)
+            steered.wait(AGAIN_S)
+
+
+def _motion(motion: Motion, period_s: float) -> Motion:
+    return Spin(mode="spin", period_s=period_s) if period_s and isinstance(motion, Spin) else motion

@@ -1,0 +1,83 @@
+"""What the node says, as messages of ROS 2. Needs the robot's ROS 2, or the wheels of the extra `ros`."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TransformStamped
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState, LaserScan, PointCloud2, PointField
+
+from design.arrays import Pose
+from firmware_io.assembly.streaming import ScanPoints
+from firmware_io.recording.ros_messages import LASER_FRAME, SPIN_JOINT
+from firmware_io.ros.point_rows import POINT, POINT_FIELD_TYPES, point_rows
+from firmware_io.samples import Scan
+
+_FIELDS = [
+    PointField(name=name, offset=place[1], datatype=POINT_FIELD_TYPES[place[0].str], count=1)
+    for name, place in (POINT.fields or {}).items()
+]
+
+
+def time_of(time_ns: int) -> Any:
+    """A time since 1970."""
+    seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def laser_scan(scan: Scan, stamp_ns: int) -> Any:
+    """`sensor_msgs/LaserScan` in the laser frame; the stamp is the time of the first beam."""
+    message = LaserScan()
+    message.header.stamp, message.header.frame_id = time_of(stamp_ns), LASER_FRAME
+    message.angle_min = scan.angle_min_rad
+    message.angle_max = scan.angle_min_rad + scan.angle_increment_rad * max(scan.range_m.size - 1, 0)
+    message.angle_increment = scan.angle_increment_rad
+    message.time_increment, message.scan_time = scan.time_increment_s, scan.scan_time_s
+    message.range_min, message.range_max = scan.range_min_m, scan.range_max_m
+    # an array of the right kind is taken as it is; of anything else every number is looked at
+    message.ranges = array("f", scan.range_m.astype(np.float32).tobytes())
+    message.intensities = array("f", scan.intensity.astype(np.float32).tobytes())
+    return message
+
+
+def joint_state(position_rad: float, stamp_ns: int) -> Any:
+    """`sensor_msgs/JointState` of the spin joint."""
+    message = JointState(name=[SPIN_JOINT], position=array("d", [position_rad]))
+    message.header.stamp = time_of(stamp_ns)
+    return message
+
+
+def point_cloud(line: ScanPoints, frame: str, stamp_ns: int) -> Any:
+    """`sensor_msgs/PointCloud2` of one scan, a row for every beam."""
+    rows = point_rows(line)
+    message = PointCloud2(height=1, width=rows.size, fields=_FIELDS, is_bigendian=False, is_dense=False)
+    message.header.stamp, message.header.frame_id = time_of(stamp_ns), frame
+    message.point_step, message.row_step = POINT.itemsize, POINT.itemsize * rows.size
+    message.data = array("B", rows.tobytes())
+    return message
+
+
+def transform(parent: str, child: str, T_parent_child: Pose, stamp_ns: int) -> Any:
+    """`geometry_msgs/TransformStamped`, what `tf2_msgs/TFMessage` holds."""
+    message = TransformStamped()
+    message.header.stamp, message.header.frame_id, message.child_frame_id = time_of(stamp_ns), parent, child
+    at, turned = message.transform.translation, message.transform.rotation
+    at.x, at.y, at.z = T_parent_child[:3, 3].tolist()
+    turned.x, turned.y, turned.z, turned.w = Rotation.from_matrix(T_parent_child[:3, :3]).as_quat().tolist()
+    return message
+
+
+def diagnostics(level: int, message: str, values: Mapping[str, object], stamp_ns: int) -> Any:
+    """`diagnostic_msgs/DiagnosticArray` of the scanner; level 0 is good, 1 a warning, 2 an error, 3 stale."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    status = DiagnosticStatus(level=bytes([level]), name="scanwright: scanner", message=message, values=pairs)
+    found = DiagnosticArray(status=[status])
+    found.header.stamp = time_of(stamp_ns)
+    return found

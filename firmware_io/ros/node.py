@@ -1,0 +1,245 @@
+"""The node of ROS 2: what a scan tells, published while it happens.
+
+    scan               sensor_msgs/LaserScan      in `laser`; the stamp is the time of the first beam
+    joint_states       sensor_msgs/JointState     `spin_joint`, as the encoder said it
+    points             sensor_msgs/PointCloud2    one message a scan, in `world`, de-skewed; a row for every beam
+    robot_description  std_msgs/String            the URDF with the frames in use, if the build has one; kept
+    tf, tf_static      tf2_msgs/TFMessage         world servo rot laser, where ROS 2 has tf2_msgs
+    diagnostics        diagnostic_msgs/DiagnosticArray    once a second, where ROS 2 has diagnostic_msgs
+    clock              rosgraph_msgs/Clock        of a recording that is replayed
+
+Publishers are reliable: RViz asks for that, and who asks for best effort is served too. Parameters `running` and
+`period_s` start, stop and change the motion while the node runs. Needs the robot's ROS 2, or the wheels of the extra.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import rclpy
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, LaserScan, PointCloud2
+from std_msgs.msg import String
+
+from design import frames
+from design.angles import AngleSet
+from firmware_io.assembly.own_body import OwnBody
+from firmware_io.assembly.streaming import Assembler, ScanPoints
+from firmware_io.ros import messages
+from firmware_io.ros.drive import Interrupted
+from firmware_io.ros.robot_frames import fixed_frames
+from firmware_io.samples import JointSample, Scan
+
+_DIAGNOSED_S = 1.0
+_SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
+_FOUND_S = 1.0  # without a further subscription
+_KEPT = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PublishedScanner:
+    """Whose scans are published.
+
+    Attributes:
+        angles: angle set in use.
+        own_body: beams that end on the scanner; None where that is not known.
+        urdf: its description with the frames of `angles`; None for none.
+        smooth: smooth the steps of the encoder in `points`.
+        publish_tf: whether nobody else does.
+    """
+
+    angles: AngleSet
+    own_body: OwnBody | None
+    urdf: str | None
+    smooth: bool = True
+    publish_tf: bool = True
+
+
+class ScannerNode:
+    """A `Watch` that publishes. Its methods are called by the thread that drives; parameters come in another.
+
+    Attributes:
+        node: of rclpy.
+        running: what the parameter says.
+        period_s: what the parameter says; 0 for the motion of the angle set.
+        scans: published so far.
+    """
+
+    def __init__(self, scanner: PublishedScanner, *, replayed: bool) -> None:
+        """`replayed`: times are those of a recording; else those of this computer's monotonic clock."""
+        self._scanner, self._replayed = scanner, replayed
+        self._wall_minus_ns = 0 if replayed else time.time_ns() - time.monotonic_ns()
+        self.node = rclpy.create_node("scanwright")
+        self.running, self.period_s, self.scans = True, 0.0, 0
+        self._changed = Event()
+        self._beams, self._said, self._failed = 0, "waiting for the devices", False
+        self._scanned_s = self._diagnosed_s = time.monotonic()
+        self.begin()
+        make = self.node.create_publisher
+        self._scan = make(LaserScan, "scan", 10)
+        self._joint = make(JointState, "joint_states", 100)
+        self._points = make(PointCloud2, "points", 10)
+        self._clock = make(Clock, "/clock", 10) if replayed else None
+        self._tf = self._tf_publisher() if scanner.publish_tf and find_spec("tf2_msgs") else None
+        self._diagnostics = self._diagnostics_publisher() if find_spec("diagnostic_msgs") else None
+        if scanner.urdf is not None:
+            self._description = make(String, "robot_description", _KEPT)
+            self._description.publish(String(data=scanner.urdf))
+        self.node.declare_parameter("running", True)
+        self.node.declare_parameter("period_s", 0.0)
+        self.node.add_on_set_parameters_callback(self._set)
+
+    def begin(self) -> None:
+        """A new run of the devices: nothing of an earlier one is assembled with it."""
+        self._assembler = Assembler(self._scanner.angles, own_body=self._scanner.own_body, smooth=self._scanner.smooth)
+        self._changed.clear()
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """See `Watch`."""
+        self._check()
+        stamp_ns = time_ns + self._wall_minus_ns
+        if self._clock is not None:
+            self._clock.publish(Clock(clock=messages.time_of(stamp_ns)))
+        self._joint.publish(messages.joint_state(position_rad, stamp_ns))
+        if self._tf is not None:
+            self._tf(stamp_ns, position_rad)
+        self._push(JointSample(time_ns, position_rad))
+        if time.monotonic() - self._diagnosed_s > _DIAGNOSED_S:
+            self.diagnose()
+
+    def scan(self, scan: Scan) -> None:
+        """See `Watch`."""
+        self._check()
+        self._scan.publish(messages.laser_scan(scan, scan.stamp_ns + self._wall_minus_ns))
+        self.scans += 1
+        self._scanned_s = time.monotonic()
+        self._push(scan)
+
+    def told(self, line: str) -> None:
+        """See `Watch`."""
+        self._check()
+        self._said = line
+
+    def failed(self, line: str) -> None:
+        """The devices failed; the diagnostics say so until the next scan."""
+        self._said, self._failed = line, True
+        self.node.get_logger().error(line)
+
+    def close(self) -> None:
+        """Publish the scans that still wait for their angles."""
+        for line in self._assembler.finish():
+            self._publish_points(line)
+
+    def await_subscriber(self) -> None:
+        """Wait until somebody listens, and has found all the topics: what is published before is lost to them."""
+        found, since_s = 0, time.monotonic()
+        while not found or time.monotonic() - since_s < _FOUND_S:
+            now = sum(publisher.get_subscription_count() for publisher in (self._scan, self._joint, self._points))
+            if now != found:
+                found, since_s = now, time.monotonic()
+            time.sleep(0.02)
+
+    def flush(self, seconds: float = 5.0) -> None:
+        """Wait until those who listen have all that was published."""
+        for publisher in (self._scan, self._joint, self._points):
+            publisher.wait_for_all_acked(Duration(seconds=seconds))
+
+    def wait(self, seconds: float) -> None:
+        """Until a parameter is set, at most so long; what watches the diagnostics hears that it waits."""
+        self.diagnose()
+        self._changed.wait(seconds)
+        self._changed.clear()
+
+    def diagnose(self) -> None:
+        """Say how it goes."""
+        now_s = time.monotonic()
+        self._diagnosed_s = now_s
+        if self._diagnostics is None:
+            return
+        silent = now_s - self._scanned_s > _SILENT_S
+        self._failed &= silent
+        level = 2 if self._failed else 3 if silent and self.running else 0
+        left_out = {f"left out: {reason}": count for reason, count in self._assembler.left_out.items()}
+        values = {"scans": self.scans, "beams": self._beams, "running": self.running, **left_out}
+        stamp_ns = time.time_ns()
+        self._diagnostics.publish(messages.diagnostics(level, self._said, values, stamp_ns))
+
+    def _check(self) -> None:
+        if self._changed.is_set():
+            raise Interrupted
+
+    def _push(self, thing: Scan | JointSample) -> None:
+        for line in self._assembler.push(thing):
+            self._publish_points(line)
+
+    def _publish_points(self, line: ScanPoints) -> None:
+        self._beams += line.scan.range_m.size
+        self._points.publish(messages.point_cloud(line, "world", line.scan.stamp_ns + self._wall_minus_ns))
+
+    def _set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        for one in parameters:
+            if one.name == "period_s" and not 0 <= one.value <= 3600:
+                return SetParametersResult(successful=False, reason=f"period_s = {one.value}: 0 to 3600")
+        for one in parameters:
+            if one.name in ("running", "period_s") and not self._replayed:
+                setattr(self, one.name, one.value)
+                self._changed.set()
+        return SetParametersResult(successful=True)
+
+    def _tf_publisher(self) -> Callable[[int, float], None]:
+        """Publish the frames that stand still, and return what publishes the one that turns."""
+        from tf2_msgs.msg import TFMessage
+
+        self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _KEPT)
+        stamp_ns = time.time_ns()
+        fixed = fixed_frames(self._scanner.angles)
+        told = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
+        self._tf_static.publish(TFMessage(transforms=told))
+        turning = self.node.create_publisher(TFMessage, "/tf", 100)
+
+        def publish(stamp_ns: int, position_rad: float) -> None:
+            T_servo_rot = frames.rigid(frames.Rz(position_rad), np.zeros(3))
+            turning.publish(TFMessage(transforms=[messages.transform("servo", "rot", T_servo_rot, stamp_ns)]))
+
+        return publish
+
+    def _diagnostics_publisher(self) -> Any:
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        return self.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+
+
+@contextmanager
+def running_node(scanner: PublishedScanner, ros_args: Sequence[str], *, replayed: bool) -> Iterator[ScannerNode]:
+    """The node, with a thread that answers for its parameters, while the body runs."""
+    rclpy.init(args=["scanwright", *ros_args], signal_handler_options=SignalHandlerOptions.NO)
+    node = ScannerNode(scanner, replayed=replayed)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node.node)
+
+    def spin() -> None:
+        with suppress(ExternalShutdownException):
+            executor.spin()
+
+    thread = Thread(target=spin, name="ros", daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        executor.shutdown()
+        thread.join(timeout=5.0)
+        node.node.destroy_node()
+        rclpy.try_shutdown()
