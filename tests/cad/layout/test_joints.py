@@ -9,6 +9,7 @@ are read from the half cylinders of their ends.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -168,9 +169,15 @@ SETTINGS = {
 }
 
 
-@pytest.mark.parametrize("scanner", SETTINGS.values(), ids=SETTINGS)
-def test_the_declared_joints_are_those_that_the_solids_have(scanner):
-    assembly = make_parts(scanner)
+@functools.cache
+def parts_of(name):
+    """Scanner and assembly of a setting, made once."""
+    return SETTINGS[name], make_parts(SETTINGS[name])
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_declared_joints_are_those_that_the_solids_have(name):
+    scanner, assembly = parts_of(name)
     read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
     assert {key for key, joint in declared.items() if joint.slot_mm is None and key[0] != "deck"} == read.keys()
     for key, ((fixing, screw, trap), holes) in read.items():
@@ -202,8 +209,7 @@ def half_cylinders(solid, radius):
 
 
 def test_screws_in_slots_stand_in_the_middle_of_them():
-    scanner = SETTINGS["a belt"]
-    assembly = make_parts(scanner)
+    _, assembly = parts_of("a belt")
     slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slot_mm}
     assert slotted.keys() == {("drive_plate", "bearing_tower"), ("alignment_linkage", "counterweight")}
     for (part, onto), joint in slotted.items():
@@ -220,8 +226,7 @@ def test_screws_in_slots_stand_in_the_middle_of_them():
 
 def test_a_screw_that_moves_is_noticed():
     """The reading sees a hole that is not where the joint says: the servo's shaft of another scanner."""
-    scanner = SETTINGS["upright on the deck"]
-    assembly = make_parts(scanner)
+    scanner, assembly = parts_of("upright on the deck")
     turned = scanner.servo.model_copy(update={"horn_first_hole_deg": 10.0})
     moved = replace(assembly.layout, scanner=replace(scanner, servo=turned))
     joint = next(joint for joint in joints_of(moved) if joint.onto == "servo_horn")
