@@ -6,9 +6,12 @@ that can go wrong by wrong input raises a `ScanwrightError` whose message is one
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,7 +24,7 @@ from design.task.task import LoadedTask
 from design.task.task import load_task as load_task
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
+from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from firmware_io.ros import robot_frames
 from scanwright.pipeline.build import Build, build_task
 
@@ -380,6 +383,12 @@ def assemble(
     smooth: bool = True,
     columns: Iterable[str] = ("intensity", "time_s", "joint_rad", "ring"),
     camera: TaskLike | None = None,
+    min_range_m: float = 0.0,
+    max_range_m: float = math.inf,
+    edges_deg: float | None = None,
+    outliers: float | None = None,
+    voxel_m: float | None = None,
+    normals: bool = False,
 ) -> AssembleSummary:
     """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
 
@@ -388,7 +397,8 @@ def assemble(
     Args:
         recording: `.mcap`.
         angles: angle set of the scanner that made it.
-        out: cloud to write, `.ply`; `out_000.ply` and so on where there are several.
+        out: cloud to write, PLY, PCD, LAS, LAZ, E57, NPZ or XYZ by its suffix; `out_000.ply` and so on where there are
+            several.
         organised: keep beam i of every scan in its row i, NaN where it became no point; else only points.
         lag_s: time by which the angle log is late.
         per: one cloud for the recording, or for each (half) turn.
@@ -396,37 +406,57 @@ def assemble(
         smooth: smooth the steps of the encoder where that helps.
         columns: of each point beside x y z.
         camera: a task whose [camera] the points are coloured with.
+        min_range_m: beams that are shorter are left out.
+        max_range_m: beams that are longer are left out.
+        edges_deg: leave out beams that hang between a near and a far surface, both seen that grazing; 8 is usual.
+        outliers: leave out points that stand alone, beyond so many standard deviations; 2 is usual.
+        voxel_m: one point to a voxel of this edge.
+        normals: add columns nx ny nz, towards the scanner.
 
     Raises:
-        RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
+        RecordingError: the recording is unreadable, no beam of it becomes a point, or `out` is no format that holds
+            this. Nothing is written then.
+        InstallError: the format needs the extra `clouds`.
     """
-    from firmware_io.assembly.assemble import assemble_recording
+    from firmware_io.assembly.assemble import BeamLimits, assemble_recording
+    from firmware_io.assembly.finish import Finish, finish_clouds, seen_from
     from firmware_io.assembly.pose_files import load_trajectory
 
-    recording, angle_set = Path(recording), _angles(angles)
+    recording, angle_set, target = Path(recording), _angles(angles), Path(out)
+    check_target(target)
+    limits, finish = BeamLimits(min_range_m, max_range_m, edges_deg), Finish(outliers, voxel_m, normals)
+    if organised and finish.thins:
+        raise RecordingError(f"{target}: organised: every beam keeps its row, so none can go: leave out --organised")
     trajectory = None if poses is None else load_trajectory(poses, recording)
     paint = None
     if camera is not None:
         from firmware_io.colour.paint import painter
 
         paint = painter(_task(camera), recording, angle_set, trajectory, lag_s, organised=organised)
-    summary = assemble_recording(
-        recording,
-        angle_set,
-        Path(out),
-        organised=organised or paint is not None,  # neighbours tell how surfaces lie to the camera
-        lag_s=lag_s,
-        per=per,
-        poses=trajectory,
-        own_body=None if isinstance(angles, AngleSet) else own_body_beside(Path(angles)),
-        smooth=smooth,
-        columns=columns,
-    )
-    if paint is None:
-        return summary
-    painted = tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
-    summary = replace(summary, said=(*summary.said, *painted))
-    return summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
+    with ExitStack() as stack:
+        finished = target.suffix.lower() != ".ply" or finish != Finish()
+        folder = Path(stack.enter_context(TemporaryDirectory(dir=target.parent))) if finished else target.parent
+        summary = assemble_recording(
+            recording,
+            angle_set,
+            folder / f"{target.stem}.ply" if finished else target,
+            organised=organised or paint is not None,  # neighbours tell how surfaces lie to the camera
+            lag_s=lag_s,
+            per=per,
+            poses=trajectory,
+            own_body=None if isinstance(angles, AngleSet) else own_body_beside(Path(angles)),
+            smooth=smooth,
+            columns=columns,
+            beams=limits,
+        )
+        if paint is not None:
+            painted = tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
+            summary = replace(summary, said=(*summary.said, *painted))
+            summary = summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
+        if finished:
+            where = seen_from(angle_set, trajectory)
+            summary = finish_clouds(summary, target, finish, where, organised=organised)
+    return summary
 
 
 def calibrate(

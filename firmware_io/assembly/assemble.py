@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from design.angles import AngleSet
 from design.errors import RecordingError, suggest
 from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.beam_outcome import Verdict
+from firmware_io.assembly.beam_outcome import Verdict, between_surfaces
 from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.trajectory import Trajectory
@@ -38,6 +38,46 @@ _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
+
+
+@dataclass(frozen=True, slots=True)
+class BeamLimits:
+    """Which beams are wanted.
+
+    Attributes:
+        min_range_m: shorter ones are too near, also where the sensor means them.
+        max_range_m: longer ones are too far.
+        edges_deg: leave out what hangs between two surfaces, as `between_surfaces` finds it; None to keep it.
+
+    Raises:
+        RecordingError: a limit is none.
+    """
+
+    min_range_m: float = 0.0
+    max_range_m: float = math.inf
+    edges_deg: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.min_range_m < self.max_range_m:
+            raise RecordingError(
+                f"--min-range-m = {self.min_range_m}, --max-range-m = {self.max_range_m}: 0 <= the one < the other"
+            )
+        if self.edges_deg is not None and not 0 < self.edges_deg < 45:
+            raise RecordingError(f"--edges-deg = {self.edges_deg}: above 0, below 45; 8 is usual")
+
+    def limited(self, scan: Scan) -> Scan:
+        """The scan, as if its sensor saw no nearer and no farther."""
+        near_m, far_m = max(scan.range_min_m, self.min_range_m), min(scan.range_max_m, self.max_range_m)
+        if (near_m, far_m) == (scan.range_min_m, scan.range_max_m):
+            return scan
+        return replace(scan, range_min_m=near_m, range_max_m=far_m)
+
+    def leave_out(self, block: Block, placed: PlacedBlock) -> None:
+        """Take what hangs between two surfaces out of a placed block."""
+        if self.edges_deg is not None:
+            gone = (placed.verdict == Verdict.POINT) & between_surfaces(block, self.edges_deg)
+            placed.verdict[gone] = Verdict.BETWEEN_SURFACES
+            placed.points_m[gone] = np.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +133,15 @@ def assemble_recording(
     own_body: OwnBody | None = None,
     smooth: bool = True,
     columns: Iterable[str] = COLUMNS,
+    beams: BeamLimits = BeamLimits(),
 ) -> AssembleSummary:
     """Write the cloud of a recording, or one for each turn of the axis, in constant memory whatever its length.
 
     Args:
         recording: MCAP recording.
         angles: angle set of the scanner that made it.
-        out: the cloud, `.ply`: x y z [m] and `columns`; `out_000.ply` and so on where there are several.
+        out: the cloud, `.ply` (`finish` makes other formats of it): x y z [m] and `columns`; `out_000.ply` and so on
+            where there are several.
         organised: keep beam i of every scan in its row i, `width` rows to a scan, NaN where it became no point.
         lag_s: how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
         per: a new cloud after each whole (half) turn since the first scan, and where the axis turns back; a scan
@@ -108,6 +150,7 @@ def assemble_recording(
         own_body: beams that end on the scanner, to be left out.
         smooth: smooth the steps of the encoder where that helps; else go straight from sample to sample.
         columns: of `COLUMNS`; time_s counts from the first beam, ring is the beam's index.
+        beams: which beams are wanted at all.
 
     Raises:
         RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
@@ -132,7 +175,9 @@ def assemble_recording(
         comments = _comments(source, angles, width, int(np.sum(cloud_from_rows == which)), lag_s, poses is not None)
         before = counts[Verdict.POINT]
         with PlyWriter(path, fields, comments) as cloud:
-            for block, placed in _placed(map(itemgetter(1), tagged), curve, angles, lag_s, poses, own_body, columns):
+            scans = (beams.limited(scan) for _, scan in tagged)
+            for block, placed in _placed(scans, curve, angles, lag_s, poses, own_body, columns):
+                beams.leave_out(block, placed)
                 counts.update({verdict: int(np.sum(placed.verdict == verdict)) for verdict in Verdict})
                 rows = _rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
                 cloud.write(rows if organised else rows[placed.verdict == Verdict.POINT])
@@ -144,16 +189,16 @@ def assemble_recording(
         else:
             clouds.append(path)
             written += cloud.rows
-    beams = int(source.beams.sum())
+    beam_count = int(source.beams.sum())
     return AssembleSummary(
         out=out,
         clouds=tuple(clouds),
         points=counts[Verdict.POINT],
         rows=written,
-        beams=beams,
+        beams=beam_count,
         width=width,
         height=source.beams.size,
-        padding=width * source.beams.size - beams if width else 0,
+        padding=width * source.beams.size - beam_count if width else 0,
         left_out=_left_out(counts),
         said=(said, *_about_poses(poses), *_about_own_body(own_body, source)),
     )

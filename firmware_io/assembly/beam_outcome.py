@@ -5,11 +5,12 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float64, UInt8
+from jaxtyping import Bool, Float64, UInt8
 from numpy import ndarray
 
+from design.arrays import Floats
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.samples import Scan
+from firmware_io.samples import Block, Scan
 
 
 class Verdict(IntEnum):
@@ -22,6 +23,7 @@ class Verdict(IntEnum):
     OUTSIDE_JOINT_LOG = 4
     OWN_BODY = 5
     OUTSIDE_POSES = 6
+    BETWEEN_SURFACES = 7  # half on a near surface, half on a far one; only where it is asked for
 
 
 def beam_verdicts(
@@ -47,3 +49,24 @@ def beam_verdicts(
         hides = own_body.hides(scan.bearing_rad, joint_rad + gamma_rot_rad)
         verdict[(verdict == Verdict.POINT) & hides] = Verdict.OWN_BODY
     return verdict
+
+
+def between_surfaces(block: Block, grazing_deg: float) -> Bool[ndarray, "scans beams"]:
+    """Beams whose spot lay on the edge of a near surface and on a far one behind it: their range is of neither.
+
+    Such a beam has a nearer neighbour on one side and a farther one on the other, and the lines to both lie within
+    `grazing_deg` of the beam itself. So does a surface that is seen that grazing: it goes, too.
+    """
+    step_rad = abs(block.first.angle_increment_rad)
+    r = np.where(np.isfinite(block.range_m) & (block.range_m > 0), block.range_m, np.nan).astype(np.float64)
+    here, left, right = r[:, 1:-1], r[:, :-2], r[:, 2:]
+    grazing_rad = np.radians(grazing_deg)
+
+    def slant_rad(neighbour_m: Floats) -> Floats:  # between the beam back to the sensor and the line to a neighbour
+        return np.arctan2(neighbour_m * np.sin(step_rad), here - neighbour_m * np.cos(step_rad))
+
+    nearer = [slant_rad(side) < grazing_rad for side in (left, right)]
+    farther = [slant_rad(side) > np.pi - grazing_rad for side in (left, right)]
+    found = np.zeros(r.shape, bool)
+    found[:, 1:-1] = (nearer[0] & farther[1]) | (nearer[1] & farther[0])
+    return found

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Float64
+from jaxtyping import Bool, Float, Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
 
@@ -84,9 +84,12 @@ class Cloud:
         valid = self.valid
         if valid.all():
             return Cloud(self.points_m, self.columns, (1, len(valid)), self.T_world_cloud, self.start_ns)
-        columns = {name: column[valid] for name, column in self.columns.items()}
-        points_m = self.points_m[valid]
-        return Cloud(points_m, columns, (1, len(points_m)), self.T_world_cloud, self.start_ns)
+        return self.taken(np.flatnonzero(valid))
+
+    def taken(self, rows: Int64[ndarray, " kept"]) -> Cloud:
+        """Some of the rows, as a flat cloud."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return Cloud(self.points_m[rows], columns, (1, len(rows)), self.T_world_cloud, self.start_ns)
 
     @property
     def placed(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -70,7 +71,7 @@ def repair(
 def assemble(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
     angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.ply", help="Cloud to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
     organised: Organised = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
     per: Annotated[
@@ -92,6 +93,20 @@ def assemble(
     camera: Annotated[
         Path | None, typer.Option(metavar="TASK", help="Colour the points from the images of a task's [camera].")
     ] = None,
+    min_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out shorter beams.")] = 0.0,
+    max_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out longer beams.")] = math.inf,
+    edges_deg: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG", help="Leave out beams that hang between two surfaces seen that grazing, such as 8."
+        ),
+    ] = None,
+    outliers: Annotated[
+        float | None,
+        typer.Option(metavar="SIGMAS", help="Leave out points that stand alone, beyond so many sigmas, such as 2."),
+    ] = None,
+    voxel_m: Annotated[float | None, typer.Option(metavar="M", help="One point to a voxel of this edge.")] = None,
+    normals: Annotated[bool, typer.Option("--normals", help="Add nx ny nz, towards the scanner.")] = False,
 ) -> None:
     """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
 
@@ -110,6 +125,12 @@ def assemble(
         smooth=not straight,
         columns=[name.strip() for name in columns.split(",") if name.strip()],
         camera=camera,
+        min_range_m=min_range_m,
+        max_range_m=max_range_m,
+        edges_deg=edges_deg,
+        outliers=outliers,
+        voxel_m=voxel_m,
+        normals=normals,
     )
     show(summary.lines())
 

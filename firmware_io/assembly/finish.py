@@ -1,0 +1,123 @@
+"""What comes after assembly: strays out, one point to a voxel, normals, and the format that was asked for.
+
+Unlike assembly this holds a cloud in memory, one at a time.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
+
+from design.angles import AngleSet
+from design.arrays import Floats
+from design.errors import RecordingError
+from firmware_io.assembly.assemble import AssembleSummary
+from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.clouds import filters
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.clouds.formats import read_clouds, write_clouds
+
+SeenFrom = Callable[[Cloud], Float64[ndarray, "n 3"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """What is done to a cloud, in this order.
+
+    Attributes:
+        outlier_sigmas: leave out points that stand alone, beyond so many standard deviations; None for none.
+        voxel_m: one point to a voxel of this edge; None for all.
+        normals: add columns nx ny nz, towards where the scanner stood.
+
+    Raises:
+        RecordingError: a number is not above 0.
+    """
+
+    outlier_sigmas: float | None = None
+    voxel_m: float | None = None
+    normals: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in (("--outliers", self.outlier_sigmas), ("--voxel-m", self.voxel_m)):
+            if value is not None and not 0 < value < np.inf:
+                raise RecordingError(f"{name} = {value}: a number above 0")
+
+    @property
+    def thins(self) -> bool:
+        """Whether points may go."""
+        return self.outlier_sigmas is not None or self.voxel_m is not None
+
+
+def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
+    """Where the scanner was when it saw each point of a cloud of ours, shape (n, 3)."""
+    stands_m = angles.T_world_rot(0.0)[:3, 3]
+
+    def of(cloud: Cloud) -> Floats:
+        if poses is None:
+            return np.broadcast_to(stands_m, cloud.points_m.shape).astype(float)
+        if cloud.start_ns is None or "time_s" not in cloud.columns:
+            raise RecordingError(
+                "--normals on a map: the times of the points tell where they were seen from: "
+                "leave time_s among the --columns"
+            )
+        time_ns = cloud.start_ns + np.rint(cloud.columns["time_s"] * 1e9).astype(np.int64)
+        # a time in the file is rounded: the first and the last point may come to lie just outside
+        T = poses.T_map_world(np.clip(time_ns, poses.time_ns[0], poses.time_ns[-1]))
+        return T[:, :3, :3] @ stands_m + T[:, :3, 3]
+
+    return of
+
+
+def finish_clouds(
+    summary: AssembleSummary, out: Path, finish: Finish, where: SeenFrom, *, organised: bool
+) -> AssembleSummary:
+    """Write the clouds of a summary again, finished, in the format and under the names that `out` asks for.
+
+    Raises:
+        RecordingError: the format cannot hold them, or points are to go from an organised cloud.
+        InstallError: the format needs the extra `clouds`.
+    """
+    left_out, said, rows = Counter(summary.left_out), list(summary.said), 0
+    written: list[Path] = []
+    for path in summary.clouds:
+        (cloud, *_), _ = read_clouds(path)
+        cloud, gone = _finished(cloud, finish, where)
+        left_out.update(gone)
+        target = out.with_name(f"{path.stem}{out.suffix}")
+        wrote = write_clouds(target, [cloud], organised=organised)
+        rows += wrote.rows
+        said += [line for line in wrote.said if line not in said]
+        written += wrote.paths
+    return replace(
+        summary,
+        out=out,
+        clouds=tuple(written),
+        points=summary.beams - sum(left_out.values()),
+        rows=rows,
+        left_out=dict(left_out),
+        said=tuple(said),
+    )
+
+
+def _finished(cloud: Cloud, finish: Finish, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
+    gone: dict[str, int] = {}
+    if finish.outlier_sigmas is not None:
+        stray = filters.outliers(cloud.points_m, finish.outlier_sigmas)
+        gone["outlier"] = int(stray.sum())
+        cloud = cloud.taken(np.flatnonzero(~stray))
+    if finish.voxel_m is not None:
+        kept = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
+        gone["another_point_of_the_voxel"] = len(cloud.points_m) - len(kept)
+        cloud = cloud.taken(kept)
+    if finish.normals:
+        there = cloud.valid
+        normal = np.full(cloud.points_m.shape, np.nan, np.float32)
+        normal[there] = filters.normals(cloud.points_m[there], where(cloud)[there])
+        cloud = replace(cloud, columns={**cloud.columns, **dict(zip(("nx", "ny", "nz"), normal.T.copy(), strict=True))})
+    return cloud, {reason: count for reason, count in gone.items() if count}
