@@ -3,9 +3,9 @@
     uv run python -m benchmarks.design.claims [errors] [optima] [evolution] [--pairs 300] [--draws 100000]
         [--tasks NAME...] [--random 100] [--seed 1]
 
-Errors: random tasks at random settings (bands, cones, fine maps, masks of meshes, scenes; regions down to a thousandth
-of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against `benchmarks.design.reference`, which
-shares no code with the program.
+Errors: random tasks at random settings (bands, cones, rectangles on planes, fine maps, masks of meshes, scenes; regions
+down to a thousandth of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against
+`benchmarks.design.reference`, which shares no code with the program.
 Optima: settings drawn at random from the ranges of each shipped task, and scipy's `differential_evolution`. All are
 looked at roughly, the best of them with all nodes.
 Evolution: as many random tasks as asked for, the optimum of each against 500 evaluations of `differential_evolution`.
@@ -14,11 +14,13 @@ Evolution: as many random tasks as asked for, the optimum of each against 500 ev
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.optimize import differential_evolution
 
 from benchmarks.design.reference import Counted, counted_J
@@ -38,8 +40,15 @@ SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")
 PERIODS_S = 1.0, 60.0
 BALLS_DEG = 0.3, 15.0
 OBJECTIVES = {"log": 0.5, "required": 0.15, "kl": 0.1, "homogeneity": 0.15, "worst": 0.1}
-FIELDS = {"painted": 0.5, "tiny": 0.15, "map": 0.15, "mesh mask": 0.1, "scene": 0.1}
+FIELDS = {"metres": 0.15, "painted": 0.35, "tiny": 0.15, "map": 0.15, "mesh mask": 0.1, "scene": 0.1}
 MOTIONS = {"spin": 0.7, "sweep": 0.15, "stop_and_go": 0.15}
+EMPTY_TASK: dict[str, Any] = {
+    "name": "random",
+    "sensor": "UTM-30LX",
+    "servo": "MX-64R",
+    "slip_ring": "UH1256-02-0610-06S",
+    "motion": {"period_s": 1.0},
+}
 LOOKS = ((120, 1000), (1215, 30))  # quadrature nodes, and how many of the settings are looked at again
 GENERATIONS = 40
 POPULATION = 15  # of the evolution, times the angles that are free
@@ -116,6 +125,9 @@ def random_task(rng: np.random.Generator, largest_ball_deg: float) -> LoadedTask
     weight = [_region(rng, smallest) | {"value": rng.uniform(0.1, 1)} for _ in range(rng.integers(1, 4))]
     mask = [_region(rng, 3.0, largest=0.3)] if rng.random() < 0.5 else []
     maps, surface = [], None
+    if field == "metres":
+        weight = [_on_plane(rng) | {"value": rng.uniform(0.1, 1)} for _ in weight]
+        mask = [_on_plane(rng) for _ in mask]
     if field == "map":
         weight = [*weight[1:], {"shape": "map", "file": "drawn.npy", "value": 1.0}]
         maps = [_table(rng)]
@@ -127,11 +139,8 @@ def random_task(rng: np.random.Generator, largest_ball_deg: float) -> LoadedTask
         middle = rng.uniform(-2, 2, 3)
         size = _log_uniform(rng, 0.5, 4.0)
         weight += [{"shape": "box", "min_m": (middle - size).tolist(), "max_m": (middle + size).tolist()}]
-    table = {
-        "name": "random",
+    table = EMPTY_TASK | {
         "sensor": str(rng.choice(SENSORS)),
-        "servo": "MX-64R",
-        "slip_ring": "UH1256-02-0610-06S",
         "motion": _motion(rng, motion),
         "density": density,
         "weight": weight,
@@ -291,6 +300,24 @@ def _region(rng: np.random.Generator, smallest_deg: float, largest: float = 1.0)
     low, high = np.sort(rng.uniform(0, 180, 2))
     phi, width = rng.uniform(-180, 180), rng.uniform(5, 360 * largest)
     return {"shape": "band", "theta_deg": [low, low + largest * (high - low)], "phi_deg": [phi, phi + width]}
+
+
+def _on_plane(rng: np.random.Generator) -> dict[str, Any]:
+    """A rectangle of ground, ceiling or wall, from a hand's breadth to a field."""
+    while True:
+        size = [_log_uniform(rng, 0.02, 30) for _ in range(2)]
+        region: dict[str, Any] = {"shape": str(rng.choice(["ground", "ceiling", "wall"])), "width_m": size[0]}
+        region |= {"height_m": _log_uniform(rng, 0.1, 2), "heading_deg": rng.uniform(-180, 180)}
+        if region["shape"] == "wall":
+            bottom = rng.uniform(-1, 2)
+            region |= {"distance_m": _log_uniform(rng, 0.3, 30), "bottom_m": bottom, "top_m": bottom + size[1]}
+        else:
+            start = rng.uniform(-5, 5)
+            region |= {"from_m": start, "to_m": start + size[1]}
+            region |= {"ceiling_m": 2 + _log_uniform(rng, 0.1, 5)} if region["shape"] == "ceiling" else {}
+        with suppress(ValidationError):  # too thin to be aimed at
+            Task.model_validate(EMPTY_TASK | {"weight": [region]})
+            return region
 
 
 def _table(rng: np.random.Generator) -> Array:

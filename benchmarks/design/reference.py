@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from design.arrays import Array, Mask, Setting
 from design.motion import Spin, StopAndGo, Sweep
-from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion
+from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
 from design.task.task import LoadedTask
 
 SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
@@ -98,6 +98,8 @@ class _Layer:
             ahead = (np.degrees(np.arctan2(d[:, 1], d[:, 0])) - region.phi_deg[0]) % 360
             inside = (region.theta_deg[0] <= theta) & (theta <= region.theta_deg[1])
             return inside & (ahead <= region.phi_deg[1] - region.phi_deg[0])
+        if isinstance(region, PlaneRegion):
+            return _On(region).holds(d)
         return np.ones(len(d), dtype=bool)
 
     def value_at(self, d: Array) -> Array:
@@ -117,6 +119,8 @@ class _Layer:
             d = np.stack([np.sin(polar) * np.cos(2 * np.pi * u[:, 1]), np.sin(polar) * np.sin(2 * np.pi * u[:, 1])])
             there, _ = Rotation.align_vectors([region.axis], [[0, 0, 1]])
             return there.apply(np.column_stack([*d, np.cos(polar)])), 4 * np.pi * np.sin(half / 2) ** 2
+        if isinstance(region, PlaneRegion):
+            return _On(region).drawn(u), float("nan")
         z, phi = (-1.0, 1.0), (0.0, 2 * np.pi)
         if isinstance(region, BandRegion):
             z = tuple(np.cos(np.radians(region.theta_deg[::-1])))
@@ -135,6 +139,8 @@ class _Layer:
 
     def chance(self, d: Array, area: float) -> Array:
         """Of drawing each direction, per steradian."""
+        if isinstance(self.region, PlaneRegion):
+            return _On(self.region).chance(d)
         if self.table is None:
             return np.where(self.holds(d), 1 / area, 0.0)
         rows, columns = self.table.shape
@@ -142,6 +148,47 @@ class _Layer:
         r = np.minimum((np.arccos(np.clip(d[:, 2], -1, 1)) / np.pi * rows).astype(int), rows - 1)
         cells = np.count_nonzero(self.table) * (edges[r] - edges[r + 1]) * 2 * np.pi / columns
         return np.where(self.value_at(d) > 0, 1 / cells, 0.0)
+
+
+class _On:
+    """A rectangle on a plane, by where rays meet that plane.
+
+    A point of it is drawn by two angles, one in a plane through its first side's direction, one across.
+    """
+
+    def __init__(self, region: PlaneRegion) -> None:
+        a, b, _, d = (np.array(corner) for corner in region.corners_m())
+        self.origin, self.along, self.across = a, b - a, d - a
+        self.e1, self.e2 = self.along / np.linalg.norm(self.along), self.across / np.linalg.norm(self.across)
+        normal = np.cross(self.e1, self.e2)
+        self.normal = normal * np.sign(normal @ a)
+        self.away = float(self.normal @ a)
+        self.x = self.e1 @ a, self.e1 @ b
+        self.y = self.e2 @ a, self.e2 @ d
+
+    def holds(self, d: Array) -> Mask:
+        facing = d @ self.normal
+        met = d * (self.away / np.where(facing > 0, facing, np.nan))[:, None]
+        x, y = met @ self.e1, met @ self.e2
+        return (facing > 0) & (self.x[0] <= x) & (x <= self.x[1]) & (self.y[0] <= y) & (y <= self.y[1])
+
+    def drawn(self, u: Array) -> Array:
+        p = np.arctan2(self.x, self.away)
+        turn = p[0] + (p[1] - p[0]) * u[:, 0]
+        q = self._across(turn)
+        lift = q[0] + (q[1] - q[0]) * u[:, 1]
+        ahead = np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn)
+        return np.outer(ahead[0], self.normal) + np.outer(ahead[1], self.e1) + np.outer(np.sin(lift), self.e2)
+
+    def chance(self, d: Array) -> Array:
+        p = np.arctan2(self.x, self.away)
+        q = self._across(np.arctan2(d @ self.e1, d @ self.normal))
+        lift = np.arcsin(np.clip(d @ self.e2, -1, 1))
+        return np.where(self.holds(d), 1 / ((p[1] - p[0]) * (q[1] - q[0]) * np.cos(lift)), 0.0)
+
+    def _across(self, turn: Array) -> tuple[Array, Array]:
+        away = self.away / np.cos(turn)
+        return np.arctan2(self.y[0], away), np.arctan2(self.y[1], away)
 
 
 def _at(z: Array, phi: Array) -> Array:
@@ -156,7 +203,7 @@ def _layers(loaded: LoadedTask) -> tuple[list[_Layer], list[_Layer]]:
     every = AllRegion(shape="all")
 
     def layer(region: object, value: float, required: float) -> _Layer:
-        mapped = not isinstance(region, AllRegion | BandRegion | ConeRegion | BoxRegion)
+        mapped = not isinstance(region, AllRegion | BandRegion | ConeRegion | BoxRegion | PlaneRegion)
         return _Layer(region, maps.pop(0) if mapped else None, value, required)
 
     weights = [_Layer(every, None, task.density.background, asked)]

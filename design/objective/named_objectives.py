@@ -17,7 +17,7 @@ import numpy as np
 
 from design.arrays import Array, Counts
 from design.errors import TaskError
-from design.sphere.painting import MAP
+from design.sphere.painting import MAP, VALUE
 from design.sphere.polar_rule import circle_rule
 from design.sphere.regions import Field, field_of
 from design.task.shapes import Region
@@ -164,7 +164,7 @@ def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
     maps = rows[:, 0] == MAP
     for row in rows[maps]:
         tables[int(row[1])] = function(row[7] * tables[int(row[1])])
-    rows[:, 7] = np.where(maps, 1.0, function(rows[:, 7]))
+    rows[:, VALUE] = np.where(maps, 1.0, function(rows[:, VALUE]))
     weight = replace(field.weight, rows=rows, tables=tables)
     return replace(field, weight=weight, background=float(function(np.array([field.background]))[0]))
 
@@ -172,7 +172,7 @@ def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
 def _least(field: Field) -> float:
     """The smallest weight that any region paints."""
     rows = field.patches
-    painted = [rows[rows[:, 0] != MAP, 7]]
+    painted = [rows[rows[:, 0] != MAP, VALUE]]
     painted += [row[7] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]
     values = np.concatenate(painted)
     return float(values[values > 0].min())

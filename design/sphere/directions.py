@@ -9,7 +9,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.errors import TaskError
-from design.sphere.painting import ALL, BAND, CONE
+from design.sphere.painting import ALL, BAND, CONE, POLYGON, VALUE
+from design.sphere.rectangle import seen_rectangle
 from design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
@@ -122,6 +123,8 @@ def _spread(field: Field, index: int, count: int, turn_rad: float, shift: float)
         return spiral(count, turn_rad, row[4], shift) @ frames_about(row[None, 1:4])[0], 2 * np.pi * (1 - row[4])
     k = np.arange(count) + shift
     share = (k / GOLDEN + turn_rad / (2 * np.pi)) % 1
+    if row[0] == POLYGON:
+        return seen_rectangle(row[1:VALUE].reshape(4, 3)).spread(k / count, share)
     if row[0] == BAND:
         half = np.arccos(row[5])
         phi = np.arctan2(row[4], row[3]) + half * (2 * share - 1)

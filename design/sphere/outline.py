@@ -65,7 +65,7 @@ def _on_circle(plane: Float[ndarray, " 4"]) -> Float[ndarray, "n 3"]:
     return plane[3] * normal + np.sqrt(max(0.0, 1 - plane[3] ** 2)) * (np.cos(turn) * e1 + np.sin(turn) * e2)
 
 
-def _on_cells(table: Float[ndarray, "rows columns"], row: Float[ndarray, " 8"]) -> Float[ndarray, "n 3"]:
+def _on_cells(table: Float[ndarray, "rows columns"], row: Float[ndarray, " 14"]) -> Float[ndarray, "n 3"]:
     """Points along those edges of a map's cells at which it begins to hold something."""
     height, width = int(row[2]), int(row[3])
     holds = table[:height, :width] > 0

@@ -7,8 +7,11 @@ from numba import njit
 
 from design.arrays import Array, Ints
 
-ALL, BAND, CONE, MAP = 0.0, 1.0, 2.0, 3.0
+ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""
+
+VALUE = 13  # of a row: its kind, what it needs of twelve parameters, what it is painted with
+COLUMNS = VALUE + 1
 
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
@@ -18,7 +21,7 @@ def _value(x: float, y: float, z: float, rows: Array, tables: Array, background:
     """Value of the last painted region that contains the direction."""
     for i in range(rows.shape[0] - 1, -1, -1):
         if _holds(x, y, z, rows[i]):
-            return rows[i, 7] * _of_cell(x, y, z, rows[i], tables)
+            return rows[i, VALUE] * _of_cell(x, y, z, rows[i], tables)
     return background
 
 
@@ -31,6 +34,10 @@ def _holds(x: float, y: float, z: float, row: Array) -> bool:
         if not row[1] - EDGE <= z <= row[2] + EDGE:
             return False
         return x * row[3] + y * row[4] >= row[5] * np.sqrt(x * x + y * y) - EDGE
+    if row[0] == POLYGON:
+        for k in range(1, VALUE, 3):
+            if x * row[k] + y * row[k + 1] + z * row[k + 2] < -EDGE:
+                return False
     return True
 
 

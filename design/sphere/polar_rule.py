@@ -14,7 +14,8 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
 from design.arrays import Vector
-from design.sphere.painting import BAND, CONE, MAP
+from design.sphere.painting import BAND, CONE, MAP, POLYGON, VALUE
+from design.sphere.rectangle import seen_rectangle
 from design.sphere.regions import Field, cross, frames_about
 
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
@@ -95,6 +96,9 @@ def _reach(field: Field, patch: int, axis: Vector) -> Float[ndarray, "2 n"]:
     centres, radii = np.array([[0.0, 0.0, 1.0]]), np.array([np.pi])
     if row[0] == CONE:
         centres, radii = row[None, 1:4], np.arccos(row[4:5])
+    elif row[0] == POLYGON:
+        centre, radius = seen_rectangle(row[1:VALUE].reshape(4, 3)).cap()
+        centres, radii = centre[None], np.array([radius])
     elif row[0] in (BAND, MAP):
         centres, radii = _cells(field, patch)
     polar = _polar_about(axis, centres)

@@ -1,8 +1,8 @@
 """Weights and masks on the sphere: painted in order, the last region that contains a direction wins.
 
-Every edge of a band, a cone or a map cell lies in a plane `x . m = c`. So along a circle about any axis the weight
-is piecewise constant between the circle's crossings with those planes, and its integral over the circle is a
-finite sum: exact, region edges included.
+Every edge of a band, a cone, a rectangle on a plane or a map cell lies in a plane `x . m = c`. So along a circle about
+any axis the weight is piecewise constant between the circle's crossings with those planes, and its integral over the
+circle is a finite sum: exact, region edges included.
 """
 
 from __future__ import annotations
@@ -18,8 +18,29 @@ from numpy import ndarray
 from design.arrays import Array, Vector
 from design.concurrency.parallel import in_chunks
 from design.scene.surface import Surface
-from design.sphere.painting import ALL, BAND, CONE, MAP, circle_means, first_patch, values_at
-from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, MapRegion, MaskRegion, Region
+from design.sphere.painting import (
+    ALL,
+    BAND,
+    COLUMNS,
+    CONE,
+    MAP,
+    POLYGON,
+    VALUE,
+    circle_means,
+    first_patch,
+    values_at,
+)
+from design.sphere.rectangle import edge_normals
+from design.task.shapes import (
+    AllRegion,
+    BandRegion,
+    BoxRegion,
+    ConeRegion,
+    MapRegion,
+    MaskRegion,
+    PlaneRegion,
+    Region,
+)
 from design.task.task import LoadedTask
 
 FEW_CIRCLES = 1024  # up to here one thread is done before others have begun
@@ -30,12 +51,12 @@ _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 class Layers:
     """Painted regions as numbers.
 
-    `rows`: (kind, six parameters, value) of each region, in painting order, shape (regions, 8).
+    `rows`: (kind, twelve parameters, value) of each region, in painting order, shape (regions, 14).
     `planes`: (m, c) of each edge of a band or a cone, shape (edges, 4). `map_planes`: of the cells of maps, the same.
     `tables`: the maps, padded to one shape, (maps, rows, columns).
     """
 
-    rows: Float[ndarray, "regions 8"]
+    rows: Float[ndarray, "regions 14"]
     planes: Float[ndarray, "edges 4"]
     map_planes: Float[ndarray, "cell_edges 4"]
     tables: Float[ndarray, "maps rows columns"]
@@ -74,10 +95,10 @@ class Field:
         return len(self.planes) + len(self.map_planes)
 
     @property
-    def patches(self) -> Float[ndarray, "patches 8"]:
+    def patches(self) -> Float[ndarray, "patches 14"]:
         """Rows of the regions that hold weight, the background last: together they hold all of it."""
-        rows = self.weight.rows[self.weight.rows[:, 7] > 0]
-        return rows if self.background == 0 else np.vstack([rows, [ALL, 0, 0, 0, 0, 0, 0, self.background]])
+        rows = self.weight.rows[self.weight.rows[:, VALUE] > 0]
+        return rows if self.background == 0 else np.vstack([rows, _row(ALL, [], self.background)])
 
     def patch_at(self, directions: Float[ndarray, "n 3"]) -> Int[ndarray, " n"]:
         """The first of `patches` that holds each direction; their number where none does. Shape (n,)."""
@@ -149,35 +170,45 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
 
 def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of: Callable[[Any], float]) -> Layers:
     """Turn regions into numbers; takes as many tables off the front of `maps` as there are map regions."""
-    rows: list[list[float]] = []
+    rows: list[Array] = []
     planes, map_planes = [np.empty((0, 4))], [np.empty((0, 4))]
     tables: list[Array] = []
     for region in regions:
         value = weight_of(region)
         if isinstance(region, AllRegion):
-            rows.append([ALL, 0, 0, 0, 0, 0, 0, value])
+            rows.append(_row(ALL, [], value))
         elif isinstance(region, BandRegion):
             theta, phi = np.radians(region.theta_deg), np.radians(region.phi_deg)
             middle, half = (phi[0] + phi[1]) / 2, (phi[1] - phi[0]) / 2
             around = [np.cos(middle), np.sin(middle), np.cos(half)]
-            rows.append([BAND, np.cos(theta[1]), np.cos(theta[0]), *around, 0, value])
+            rows.append(_row(BAND, [np.cos(theta[1]), np.cos(theta[0]), *around], value))
             planes.append(_edges_of_band(theta, phi))
         elif isinstance(region, ConeRegion):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
             half_angle = np.radians(region.half_angle_deg)
-            rows.append([CONE, *axis, np.cos(half_angle), 0, 0, value])
+            rows.append(_row(CONE, [*axis, np.cos(half_angle)], value))
             planes.append(np.array([[*axis, np.cos(half_angle)]]))
+        elif isinstance(region, PlaneRegion):
+            normals = edge_normals(np.array(region.corners_m()))
+            rows.append(_row(POLYGON, normals.ravel().tolist(), value))
+            planes.append(np.column_stack([normals, np.zeros(len(normals))]))
         else:
             table = maps.pop(0)
-            rows.append([MAP, len(tables), *table.shape, 0, 0, 0, value])
+            rows.append(_row(MAP, [len(tables), *table.shape], value))
             tables.append(table)
             map_planes.append(_edges_of_map(*table.shape))
     return Layers(
-        np.array(rows, dtype=float).reshape(-1, 8),
+        np.array(rows, dtype=float).reshape(-1, COLUMNS),
         np.concatenate(planes),
         np.concatenate(map_planes),
         _stack(tables),
     )
+
+
+def _row(kind: float, parameters: Sequence[float], value: float) -> Float[ndarray, " 14"]:
+    row = np.zeros(COLUMNS)
+    row[0], row[1 : 1 + len(parameters)], row[VALUE] = kind, parameters, value
+    return row
 
 
 def _edges_of_band(theta: Array, phi: Array) -> Float[ndarray, "edges 4"]:

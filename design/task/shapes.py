@@ -1,10 +1,11 @@
-"""Regions of the sphere, and of a scene, as a task file paints them.
+"""Regions of the sphere, of planes around the scanner, and of a scene, as a task file paints them.
 
-Files speak degrees, and metres where a mesh does; every key that has a unit ends in it.
+Files speak degrees, and metres where a plane or a mesh does; every key that has a unit ends in it.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
@@ -24,6 +25,11 @@ def _divides_the_half_circle(step: float) -> float:
         raise ValueError("the grid reaches theta = 180 only with a step that divides 180")
     return step
 
+
+Length = Annotated[Number, Field(ge=1e-3, le=1e4)]
+Far = Annotated[Number, Field(ge=-1e4, le=1e4)]
+THINNEST_DEG = 1e-3
+HEADINGS = {0.0: " ahead", 90.0: " to the left", 180.0: " behind", 270.0: " to the right"}
 
 GridStep = Annotated[Number, Field(ge=0.25, le=10), AfterValidator(_divides_the_half_circle)]
 Required = Annotated[Number | None, Field(gt=0, description="beams per ball, for objective = 'required'")]
@@ -120,5 +126,126 @@ class BoxRegion(Record):
         return self
 
 
-Region = Annotated[AllRegion | BandRegion | ConeRegion | MapRegion | BoxRegion, Field(discriminator="shape")]
-MaskRegion = Annotated[AllRegion | BandRegion | ConeRegion | MapRegion | MeshRegion, Field(discriminator="shape")]
+class OnPlane(Record):
+    """A rectangle on a plane near the scanner, in metres: all directions in which its optical centre sees it.
+
+    The world's axes: x ahead, y to the left, z up. Every direction of it weighs the same, so its near part, which fills
+    more of the view, weighs more by the square metre.
+    """
+
+    heading_deg: Number = Field(default=0.0, ge=-360, le=360, description="where it lies: 0 is ahead, 90 left")
+    height_m: Length = Field(description="of the scanner's optical centre over the ground")
+    value: Value = 1.0
+    required: Required = None
+
+    def corners_m(self) -> tuple[Triple, Triple, Triple, Triple]:
+        """Its corners from the optical centre, one after the other around it."""
+        turn = math.radians(self.heading_deg)
+        a, b, c, d = (
+            (x * math.cos(turn) - y * math.sin(turn), x * math.sin(turn) + y * math.cos(turn), z)
+            for x, y, z in self._ahead_m()
+        )
+        return a, b, c, d
+
+    def words(self) -> str:
+        """What it is."""
+        return f"{self._named()}{HEADINGS.get(self.heading_deg % 360, f' at {self.heading_deg:g} deg')}"
+
+    def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
+        raise NotImplementedError
+
+    def _named(self) -> str:
+        raise NotImplementedError
+
+    def _rising(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of fields: the first of each is below the second."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _can_be_aimed_at(self) -> OnPlane:
+        for low, high in self._rising():
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(f"{high} = {getattr(self, high):g} is not above {low} = {getattr(self, low):g}")
+        a, b, c, d = self.corners_m()
+        seen_deg = min(_between_deg(_sum(a, b), _sum(c, d)), _between_deg(_sum(b, c), _sum(d, a)))
+        if seen_deg < THINNEST_DEG:
+            raise ValueError(f"from there it looks {seen_deg:.1g} deg thin: widen it to {THINNEST_DEG:g} deg at least")
+        return self
+
+
+class GroundRegion(OnPlane):
+    """A rectangle of level ground, in metres from below the scanner."""
+
+    shape: Literal["ground"] = Field(description="level ground, in metres")
+    from_m: Far = Field(description="where it begins; negative is behind")
+    to_m: Far = Field(description="where it ends")
+    width_m: Length = Field(description="across, half of it to each side")
+
+    def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
+        return _level(self.from_m, self.to_m, self.width_m, -self.height_m)
+
+    def _named(self) -> str:
+        return f"ground {self.from_m:g} to {self.to_m:g} m"
+
+    def _rising(self) -> tuple[tuple[str, str], ...]:
+        return (("from_m", "to_m"),)
+
+
+class CeilingRegion(OnPlane):
+    """A rectangle of a level ceiling, in metres from above the scanner."""
+
+    shape: Literal["ceiling"] = Field(description="a level ceiling, in metres")
+    ceiling_m: Length = Field(default=2.5, description="its height over the ground")
+    from_m: Far = Field(default=-2.0, description="where it begins; negative is behind")
+    to_m: Far = Field(default=2.0, description="where it ends")
+    width_m: Length = Field(default=4.0, description="across, half of it to each side")
+
+    def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
+        return _level(self.from_m, self.to_m, self.width_m, self.ceiling_m - self.height_m)
+
+    def _named(self) -> str:
+        return f"ceiling at {self.ceiling_m:g} m, {self.from_m:g} to {self.to_m:g} m"
+
+    def _rising(self) -> tuple[tuple[str, str], ...]:
+        return ("height_m", "ceiling_m"), ("from_m", "to_m")
+
+
+class WallRegion(OnPlane):
+    """A rectangle of an upright wall across the heading."""
+
+    shape: Literal["wall"] = Field(description="an upright wall, in metres")
+    distance_m: Length = Field(description="to it, level")
+    width_m: Length = Field(description="across, half of it to each side")
+    bottom_m: Far = Field(default=0.0, description="height of its lower edge over the ground")
+    top_m: Far = Field(default=2.5, description="height of its upper edge over the ground")
+
+    def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
+        far, side = self.distance_m, self.width_m / 2
+        low, high = self.bottom_m - self.height_m, self.top_m - self.height_m
+        return (far, -side, low), (far, side, low), (far, side, high), (far, -side, high)
+
+    def _named(self) -> str:
+        return f"wall {self.distance_m:g} m away, {self.bottom_m:g} to {self.top_m:g} m high"
+
+    def _rising(self) -> tuple[tuple[str, str], ...]:
+        return (("bottom_m", "top_m"),)
+
+
+def _level(from_m: float, to_m: float, width_m: float, z_m: float) -> tuple[Triple, Triple, Triple, Triple]:
+    side = width_m / 2
+    return (from_m, -side, z_m), (to_m, -side, z_m), (to_m, side, z_m), (from_m, side, z_m)
+
+
+def _sum(a: Triple, b: Triple) -> Triple:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _between_deg(a: Triple, b: Triple) -> float:
+    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    return math.degrees(math.atan2(math.hypot(*cross), sum(x * y for x, y in zip(a, b, strict=True))))
+
+
+PlaneRegion = GroundRegion | CeilingRegion | WallRegion
+Painted = AllRegion | BandRegion | ConeRegion | MapRegion | PlaneRegion
+Region = Annotated[Painted | BoxRegion, Field(discriminator="shape")]
+MaskRegion = Annotated[Painted | MeshRegion, Field(discriminator="shape")]

@@ -47,6 +47,7 @@ def case(changes, angles=None):
 
 KINDS = {
     "painted regions": 11,
+    "rectangles on planes": 13,
     "a map": 24,
     "a mask of cells": 10,
     "a scene": 20,
