@@ -15,6 +15,7 @@ from design.density.beams import scan_at
 from design.errors import TaskError
 from design.evaluation.coverage import Coverage, coverage, on_surfaces
 from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
+from design.evaluation.metres import OnPlane, on_planes
 from design.evaluation.poles import PoleChances, parse_pole, pole_chances
 from design.objective.ball_search import BallScore, ball_score
 from design.objective.holes import Hole, holes, percent
@@ -41,6 +42,7 @@ class Evaluation:
         rises: by how much J rises where each angle is 1 deg off.
         hit: the chance to hit a pole, where one was asked for.
         surfaces: points per square metre, where the task has a scene.
+        planes: what a full scan leaves on ground, ceiling and walls of the task.
     """
 
     problem: Problem
@@ -55,6 +57,7 @@ class Evaluation:
     rises: dict[str, float]
     hit: PoleChances | None
     surfaces: dict[str, float] | None
+    planes: tuple[OnPlane, ...]
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
         """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
@@ -94,6 +97,7 @@ class Evaluation:
             "J_rises_1_deg_off": self.rises,
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
             **(self.surfaces or {}),
+            **({"planes": [asdict(plane) for plane in self.planes]} if self.planes else {}),
         }
 
     def lines(self) -> list[str]:
@@ -132,6 +136,7 @@ class Evaluation:
             lines.append(
                 f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
             )
+        lines += [f"in metres      {plane.words()}" for plane in self.planes]
         if self.interlaced_s is not None:
             lines.append(
                 f"interlaced     {self.interlaced_s:g} s a turn: the next one's lines come halfway between those of "
@@ -175,6 +180,7 @@ def evaluate(
         rises=sensitivity(problem, angles_rad, np.radians(1.0)),
         hit=None if asked is None else pole_chances(problem, angles_rad, asked),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
+        planes=on_planes(loaded, problem, angles_rad),
     )
 
 

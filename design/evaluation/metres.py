@@ -12,16 +12,19 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from design.arrays import Setting
+from design.arrays import Setting, Vector
 from design.density.beams import scan_at
 from design.objective.problem import Problem
 from design.sphere.rectangle import edge_normals
+from design.sphere.regions import Field
 from design.task.shapes import PlaneRegion
 from design.task.task import LoadedTask
 
 AT_M = 3.0  # from the optical centre, where a gap is told
-LOOKS = 120  # along each side of a region, for the emptiest place
-RING = 400  # places at `AT_M`
+RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
+CELLS = 64  # along each side of a region, to begin with
+MOST_CELLS = 200_000
+SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and never too narrow
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,25 +82,66 @@ def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem
     ends = beams[facing] * (away_m / (beams[facing] @ normal))[:, None]
     inside = (beams[facing] @ edge_normals(corners).T >= 0).all(axis=1)
 
-    s, t = np.meshgrid(*2 * [(np.arange(LOOKS) + 0.5) / LOOKS], indexing="ij")
-    places = corners[0] + s.ravel()[:, None] * sides[0] + t.ravel()[:, None] * sides[1]
-    away = np.linalg.norm(places, axis=1)
-    open_ = ~problem.field.masked_at(places / away[:, None])
-    places, away = places[open_], away[open_]
-    if not inside.any() or not len(places):
+    plane = _Plane(corners[0], sides[0], sides[1], problem.field)
+    middles = plane.points(_grid(CELLS))
+    away = np.linalg.norm(middles, axis=1)
+    seen = ~problem.field.masked_at(middles / away[:, None])
+    if not inside.any() or not seen.any():
         return OnPlane(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
-    area_m2 = float(np.linalg.norm(np.cross(*sides)) * open_.mean())
-    at_m = float(np.clip(AT_M, away.min(), away.max()))
-    there = places[np.argsort(np.abs(away - at_m))[:RING]]
+    area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
+    at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     tree = cKDTree(ends)  # what lies just beyond an edge ends a gap too
     return OnPlane(
         region.words(),
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),
         at_m,
-        200 * float(tree.query(there)[0].max()),
-        200 * float(tree.query(places, 2)[0][:, 1].max()),
+        200 * plane.widest(tree, 1, (at_m * (1 - RING), at_m * (1 + RING))),
+        200 * plane.widest(tree, 2, (0.0, np.inf)),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Plane:
+    """A rectangle: one corner, the sides from there, and what may hide it."""
+
+    corner: Vector
+    along: Vector
+    across: Vector
+    field: Field
+
+    def points(self, shares: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
+        return self.corner + shares[:, :1] * self.along + shares[:, 1:] * self.across
+
+    def widest(self, tree: cKDTree, k: int, away_m: tuple[float, float]) -> float:
+        """Radius of the widest disc with fewer than k points inside, its middle so far away, at most `SLACK` too wide.
+
+        The distance to the k-th nearest point changes by no more than one goes: cells that can hold no wider disc than
+        the widest that is known are dropped, the others are cut in four.
+        """
+        shares, half = _grid(CELLS), 0.5 / CELLS
+        best = bound = 0.0
+        while True:
+            middles = self.points(shares)
+            reach = half * float(np.linalg.norm(np.abs(self.along) + np.abs(self.across)))
+            found = tree.query(middles, [k])[0][:, 0]
+            away = np.linalg.norm(middles, axis=1)
+            there = (away_m[0] <= away) & (away <= away_m[1]) & ~self.field.masked_at(middles / away[:, None])
+            best = max(best, float(found[there].max(initial=0.0)))
+            near = (away_m[0] - reach <= away) & (away <= away_m[1] + reach) & (found + reach > best * (1 + SLACK))
+            if not near.any():
+                return best * (1 + SLACK)
+            bound = float((found[near] + reach).max())
+            if bound <= best * (1 + SLACK) or 4 * near.sum() > MOST_CELLS or reach < 1e-4:
+                return max(best, bound)
+            half /= 2
+            shares = (shares[near][:, None] + half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])).reshape(-1, 2)
+
+
+def _grid(cells: int) -> Float[ndarray, "n 2"]:
+    """Middles of cells of a unit square, shape (cells^2, 2)."""
+    each = (np.arange(cells) + 0.5) / cells
+    return np.stack(np.meshgrid(each, each, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def _round(value: float) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cad.kernel import require_kernel
-from scanwright.cli.console import AsJson, Progress, TaskFile, show, show_json
+from scanwright.cli.console import AsJson, Progress, TaskFile, hint, show, show_json
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
@@ -32,10 +32,14 @@ def optimise(
         from design.evaluation.landscape_picture import landscape_picture
 
         landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
+    from design.evaluation.metres import on_planes
+
+    planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        show_json(optimum.facts())
+        show_json(optimum.facts() | {"planes": [asdict(plane) for plane in planes]})
     else:
-        show(optimum.lines())
+        show([*optimum.lines(), *(f"one full scan, {plane.words()}" for plane in planes)])
+        hint(f"next: `scanwright build {task}` makes it")
 
 
 @app.command()

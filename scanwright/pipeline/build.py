@@ -18,6 +18,7 @@ from scanwright.pipeline.manifest import first_difference, is_current, listed_fi
 
 if TYPE_CHECKING:
     from cad.findings import PartFinding
+    from design.evaluation.metres import OnPlane
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen, Workshop
 
@@ -35,11 +36,13 @@ class Made:
         optimum: the search.
         chosen: the setting that is best with its parts: the one that was built.
         findings: what a person should know before the parts are made.
+        planes: what one full scan leaves on ground, ceiling and walls of the task.
     """
 
     optimum: Optimum
     chosen: Chosen
     findings: tuple[PartFinding, ...]
+    planes: tuple[OnPlane, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,7 @@ class Build:
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
+            *(f"one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
             *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
             f"wrote {len(self.files)} files to {self.folder}",
@@ -153,6 +157,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     from cad.files.part_files import build_parts, write_files
     from cad.layout.layout import mount_offset_mm
     from design.evaluation.density_picture import density_picture
+    from design.evaluation.metres import on_planes
     from design.search.optimum import angle_set, find_optimum
     from scanwright.pipeline import records
 
@@ -187,4 +192,5 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
         records.write_report(work)
-    return Made(optimum, chosen, (*parts.findings, *exported.findings))
+    planes = on_planes(loaded, problem, best.angles_rad)
+    return Made(optimum, chosen, (*parts.findings, *exported.findings), planes)

@@ -1,0 +1,119 @@
+"""What a scan leaves on planes, against a slow loop over lines and beams, and against discs tried one by one."""
+
+from math import cos, hypot, pi, radians, sin
+
+import numpy as np
+import pytest
+
+from design.evaluation.metres import AT_M, RING, SLACK, on_plane, on_planes
+from design.objective.problem import problem_of
+from design.task.task import load_task
+
+GROUND = {"shape": "ground", "from_m": 1.0, "to_m": 4.0, "width_m": 2.0, "height_m": 0.5}
+WALL = {"shape": "wall", "distance_m": 2.0, "width_m": 2.0, "height_m": 0.5, "top_m": 2.0, "heading_deg": 40.0}
+SETTING_DEG = (20.0, 35.0, -30.0, 50.0)
+LINES, BEAMS = 80, 683
+
+
+def loaded(*weight, mask=()):
+    """A scan of few lines, so that a loop can follow every beam."""
+    return load_task(
+        {
+            "name": "t",
+            "sensor": "URG-04LX",
+            "servo": "MX-64R",
+            "slip_ring": "UH1256-02-0610-06S",
+            "motion": {"period_s": LINES / 10},
+            "weight": list(weight),
+            "mask": list(mask),
+        }
+    )
+
+
+def turned(v, axis, angle):
+    """A vector turned about x, y or z, written out."""
+    x, y, z = v
+    c, s = cos(angle), sin(angle)
+    return {"x": (x, c * y - s * z, s * y + c * z), "y": (c * x + s * z, y, c * z - s * x)}.get(
+        axis, (c * x - s * y, s * x + c * y, z)
+    )
+
+
+def rays(lidar):
+    """Every beam of every line, R = Rx Ry Rz(gamma) Ry Rx, one rotation after the other."""
+    alpha_rot, beta_rot, alpha_laser, beta_laser = (radians(a) for a in SETTING_DEG)
+    for k in range(LINES):
+        for bearing in lidar.bearings_rad():
+            v = (cos(bearing), sin(bearing), 0.0)
+            for axis, angle in [
+                ("x", alpha_laser),
+                ("y", beta_laser),
+                ("z", 2 * pi * k / LINES),
+                ("y", beta_rot),
+                ("x", alpha_rot),
+            ]:
+                v = turned(v, axis, angle)
+            yield v
+
+
+@pytest.fixture(scope="module")
+def beams():
+    return list(rays(loaded(GROUND).lidar))
+
+
+def on_ground(beams):
+    """Where beams meet the ground, all of it: x and y."""
+    return [(-0.5 * x / z, -0.5 * y / z) for x, y, z in beams if z < -1e-6]
+
+
+def test_points_are_the_beams_that_end_there(beams):
+    task = loaded(GROUND, WALL)
+    assert len(beams) == LINES * len(task.lidar.bearings_rad())
+    ground, wall = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 4 and abs(y) <= 1]
+    assert ground.points == len(hits) > 100
+    assert ground.points_per_m2 == pytest.approx(len(hits) / (3 * 2))
+    count = 0
+    for beam in beams:
+        ahead, left, up = turned(beam, "z", -radians(40))
+        count += ahead > 0 and abs(2 * left / ahead) <= 1 and 0 <= 0.5 + 2 * up / ahead <= 2
+    assert wall.points == count > 100
+
+
+def emptiest(points, k, places):
+    """The largest distance from any place to its k-th nearest point, all of them looked at."""
+    points = np.array(points)
+    return max(np.partition(np.hypot(*(points - place).T), k - 1)[k - 1] for place in places)
+
+
+def test_gaps_are_those_of_discs_tried_one_by_one(beams):
+    task = loaded(GROUND)
+    (found,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    points, step = on_ground(beams), 0.05
+    places = [(x, y) for x in np.arange(1, 4 + step, step) for y in np.arange(-1, 1 + step, step) if x <= 4 and y <= 1]
+    ring = [(x, y) for x, y in places if abs(hypot(x, y, 0.5) - AT_M) <= RING * AT_M]
+    assert found.at_m == AT_M
+    for told_cm, tried_m in ((found.gap_cm, emptiest(points, 1, ring)), (found.twice_cm, emptiest(points, 2, places))):
+        # between two places that are tried a wider disc may lie, by as much as they are apart
+        assert 2 * tried_m <= told_cm / 100 * (1 + 1e-9)
+        assert told_cm / 100 <= (2 * tried_m + 2 * step) * (1 + SLACK)
+
+
+def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams):
+    behind = {"shape": "band", "phi_deg": [0, 180]}
+    task = loaded(GROUND, mask=[behind])
+    (half,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 4 and -1 <= y < 0]
+    assert half.points == len(hits)
+    assert half.points_per_m2 == pytest.approx(len(hits) / 3, rel=0.02)
+    region = task.task.weight[0]
+    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)))
+    assert none.words() == "ground 1 to 4 m ahead: no beam of a full scan ends there"
+    assert on_planes(loaded({"shape": "all"}), problem_of(loaded({"shape": "all"})), np.zeros(4)) == ()
+
+
+def test_a_region_that_three_metres_do_not_reach_is_told_of_at_its_nearest():
+    task = loaded(GROUND | {"to_m": 1.5})
+    (found,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    assert found.at_m == pytest.approx(hypot(1.5, 1.0, 0.5), abs=0.02)
+    assert f"at {found.at_m:.2g} m" in found.words()
