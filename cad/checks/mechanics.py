@@ -18,7 +18,6 @@ from cad.layout.loads import FAR_MM, Weight
 from cad.layout.names import SERVO
 from design.scanner import Scanner
 
-TORQUE_SHARE = 0.2  # of the stall torque that a servo gives all day
 SPIN_UP_S = 0.2
 SLOWEST_PERIOD_S = 1.0  # where the angle set names no motion
 BALANCE_AT_MM = 50.0  # from the axis, where a counterweight is worked out
@@ -51,7 +50,7 @@ def load_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) 
 
 def _torques(scanner: Scanner, rotor: Inertial, weight: Weight) -> list[Check]:
     servo = scanner.servo
-    limit = TORQUE_SHARE * servo.stall_torque_nm
+    limit = servo.lasting_torque_nm
     static = weight.across_n * weight.off_axis_m
     spin_up = spin_up_nm(scanner, rotor, weight)
     what = f"of {servo.name}, a fifth of its stall torque"

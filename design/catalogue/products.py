@@ -139,6 +139,11 @@ class Servo(Product):
         description="vendor:product of the adapters between it and a computer; shapes no part",
     )
 
+    @property
+    def lasting_torque_nm(self) -> float:
+        """What it gives all day: a fifth of its stall torque."""
+        return self.stall_torque_nm / 5
+
 
 class Flange(Record):
     """The flange of a capsule, by which its stator is held; mm."""

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from design.errors import ScanwrightError
-from scanwright.cli import clouds, design, devices, pages, parts
+from scanwright.cli import clouds, design, devices, new, pages, parts
 from scanwright.cli.console import complain, notes_of, own_voice
 from scanwright.cli.help import Commands, GroupedHelp
 
@@ -33,7 +33,7 @@ _OF_THE_SYSTEM = {
 """What a disk refuses, wherever it does: never a bug of ours."""
 
 app = Commands()
-for group in (design, parts, devices, clouds, pages):
+for group in (new, design, parts, devices, clouds, pages):
     app.add_typer(group.app)
 
 

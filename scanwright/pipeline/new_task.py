@@ -1,0 +1,326 @@
+"""A task file from five answers in metres: which lidar, which servo, where it stands, what it must see, how fast."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cad.layout.direct.adapter import adapter_of
+from cad.layout.direct.stack import DirectStack
+from cad.layout.layout import drive_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import Catalogue
+from design.catalogue.products import Lidar, Servo, SlipRing
+from design.errors import BuildError, ScanwrightError, TaskError, suggest
+from design.scanner import scanner_of
+from design.task.task import load_task
+
+GRAVITY_M_S2 = 9.81
+UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
+
+ANGLES = r"""
+# The four angles of the mount, in degrees. L is the lidar, --- the plane of its beams with > at its front, S the servo:
+# it turns all that stands on its axis.
+#
+#     all are 0          beta_rot = 45         beta_laser = 45      alpha_rot = 45        alpha_laser = 45
+#     from the right     the axis leans        the lidar's front    from behind: the      from behind: the
+#     ahead is -->       ahead                 dips                 axis leans right      lidar's left goes up
+#
+#          | axis          \    / axis           \   | axis              / axis  /             \   | axis
+#          |                \  /                  \  |                  /    \  /               \  |
+#     -----L----->           L                     \ L                       \ L                  \ L
+#          |                / \                      |\                       / \                   |\
+#          |               /   \                     | \                     /   \                  | \
+#          S              S     >                    S  >                   S                       S
+#
+# A pair [from, to] is searched, one value fixes the angle. With these ranges nothing is left out.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What `scanwright new` asks for.
+
+    Attributes:
+        name: of the task and its build folder.
+        lidar: by its name in the catalogue.
+        servo: the same.
+        height_m: of the scanner's optical centre over the ground.
+        see: what it must see, each as `SEEN` says.
+        scan_s: time of one full scan.
+        robot: what of it the scanner must look past: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
+        ahead_m: where on the robot it stands, ahead of the middle of the box or of the origin of the mesh.
+    """
+
+    name: str
+    lidar: str
+    servo: str
+    height_m: float
+    see: tuple[str, ...]
+    scan_s: float
+    robot: str = "none"
+    ahead_m: float = 0.0
+
+
+SEEN: dict[str, tuple[str, tuple[float, ...]]] = {
+    "ground": ("ground:FROM:TO:WIDTH, in metres ahead", (0.5, 5.0, 4.0)),
+    "ceiling": ("ceiling:HEIGHT over the ground", (2.5,)),
+    "wall": ("wall:DISTANCE:WIDTH ahead", (3.0, 4.0)),
+    "around": ("around:UP:DOWN, in degrees from level", (30.0, 30.0)),
+    "all": ("all, every direction", ()),
+    "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
+}
+"""What can be asked for: how it is written, and its numbers where they are left out."""
+
+
+def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:
+    """The commented task file.
+
+    Args:
+        answers: what to write.
+        products: that can be named.
+        command: that gives the same file again.
+        path: where the file is to be; the mesh of the robot is named from there.
+
+    Raises:
+        TaskError: an answer makes no sense, or these two cannot work together.
+    """
+    lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
+    _require_strength(lidar, servo)
+    wishes = [_wish(each) for each in answers.see]
+    if not wishes:
+        raise TaskError(f"--see: nothing is to be seen: {_known()}")
+    things = [numbers for word, numbers in wishes if word == "thing"]
+    regions = [(word, numbers) for word, numbers in wishes if word != "thing"] or [("all", ())]
+    blocks = [
+        f"# {answers.name}: {lidar.name} turned by {servo.name}, {answers.height_m:g} m over the ground.",
+        "# World: x ahead, y to the left, z up. Every key: `scanwright schema`, or the pages of documentation.",
+        f"# Made by: {command}",
+        f"# Next:    scanwright build {path}",
+        "",
+        f'name = "{answers.name}"',
+        f'sensor = "{lidar.name}"',
+        f'servo = "{servo.name}"',
+        *_motion(answers, servo, slip_ring_for(lidar, servo, products)),
+        ANGLES,
+        "[angles]",
+        "alpha_rot_deg = [-180, 180]",
+        "beta_rot_deg = [-90, 90]",
+        "alpha_laser_deg = [-90, 90]",
+        "beta_laser_deg = [-90, 90]",
+        "",
+        *_density(things),
+        *(line for word, numbers in regions for line in _region(word, numbers, answers)),
+        *_mask(answers, path.parent),
+    ]
+    return "\n".join(blocks) + "\n"
+
+
+def _require_strength(lidar: Lidar, servo: Servo) -> None:
+    """Refuse a lidar whose weight alone, its middle off a level axis, asks more of the servo than it gives all day."""
+    off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
+    needed = lidar.mass_g / 1000 * GRAVITY_M_S2 * off_m
+    if needed > servo.lasting_torque_nm:
+        raise TaskError(
+            f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "
+            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.lasting_torque_nm:.2g} N m all day"
+        )
+
+
+def _wish(text: str) -> tuple[str, tuple[float, ...]]:
+    word, *given = text.split(":")
+    if word not in SEEN:
+        raise TaskError(f"--see {text}: not a thing to see{suggest(word, SEEN)}; {_known()}")
+    how, usual = SEEN[word]
+    try:
+        numbers = [float(each) for each in given]
+    except ValueError as error:
+        raise TaskError(f"--see {text}: numbers after the colons: {how}") from error
+    if len(numbers) > len(usual) or not all(math.isfinite(each) for each in numbers):
+        raise TaskError(f"--see {text}: {len(usual)} numbers at most, and finite: {how}")
+    return word, (*numbers, *usual[len(numbers) :])
+
+
+def _known() -> str:
+    return "; ".join(how for how, _ in SEEN.values())
+
+
+def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
+    """The ring that lets the cable turn on and on; None for a servo that cannot turn so.
+
+    Rings with a bore come first, since the servo turns them without a belt, and of those the ones whose speed is known.
+
+    Raises:
+        TaskError: none can be laid out with these two.
+    """
+    if servo.position_feedback_deg < 360:
+        return None
+    rings = [product for product in products if isinstance(product, SlipRing)]
+    why = "the catalogue has no slip ring"
+    for ring in sorted(rings, key=lambda ring: (ring.bore_mm == 0, ring.max_rpm is None, ring.name)):
+        angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=ring.name)
+        scanner = scanner_of(angles, "fdm-0.4", products)
+        try:
+            stack = drive_of(scanner).stack
+            if isinstance(stack, DirectStack) and stack.bearing is None:
+                adapter_of(scanner, stack)
+        except BuildError as error:
+            why = str(error)
+        else:
+            return ring
+    raise TaskError(f"{lidar.name} on {servo.name}: these cannot work together: {why}")
+
+
+def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
+    if ring is not None:
+        how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft from beside it"
+        return [
+            f'slip_ring = "{ring.name}"  # lets the cable turn on and on; {how}',
+            "",
+            "[motion]",
+            'mode = "spin"',
+            f"period_s = {answers.scan_s:g}    # one full turn is one full scan: longer is denser",
+        ]
+    return [
+        "",
+        f"[motion]  # {servo.name} does not read its angle all around: it sweeps to and fro, and needs no slip ring",
+        'mode = "sweep"',
+        "limits_deg = [-90, 90]",
+        f"period_s = {answers.scan_s:g}    # out and back is one full scan: longer is denser",
+    ]
+
+
+def _density(things: Sequence[tuple[float, ...]]) -> list[str]:
+    if not things:
+        return []
+    size_m, distance_m = min(things, key=lambda each: each[0] / each[1] if each[1] > 0 else 0.0)
+    if not (size_m > 0 and distance_m > 0):
+        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: a size and a distance above 0")
+    radius_deg = math.degrees(math.atan2(size_m / 2, distance_m))
+    return [
+        f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
+        f"ball_radius_deg = {radius_deg:.2g}",
+        "",
+        "# [limits]  # take the # away to be refused an answer by which it may be hit less than twice",
+        "# min_density = 2",
+        "",
+    ]
+
+
+def _region(word: str, numbers: tuple[float, ...], answers: Answers) -> list[str]:
+    write = REGIONS[word]
+    return ["[[weight]]", *write(numbers, answers), ""]
+
+
+def _ground(numbers: tuple[float, ...], answers: Answers) -> list[str]:
+    return [
+        'shape = "ground"      # what matters, all of it alike: value = 2 makes a region count twice',
+        f"from_m = {numbers[0]:g}",
+        f"to_m = {numbers[1]:g}",
+        f"width_m = {numbers[2]:g}",
+        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
+        "heading_deg = 0       # 0 is ahead, 90 to the left",
+    ]
+
+
+def _ceiling(numbers: tuple[float, ...], answers: Answers) -> list[str]:
+    return [
+        'shape = "ceiling"',
+        f"ceiling_m = {numbers[0]:g}       # over the ground",
+        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
+        "from_m = -2           # behind",
+        "to_m = 2              # ahead",
+        "width_m = 4",
+    ]
+
+
+def _wall(numbers: tuple[float, ...], answers: Answers) -> list[str]:
+    return [
+        'shape = "wall"',
+        f"distance_m = {numbers[0]:g}",
+        f"width_m = {numbers[1]:g}",
+        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
+        "bottom_m = 0          # of the wall, over the ground",
+        "top_m = 2.5",
+        "heading_deg = 0       # 0 is ahead, 90 to the left",
+    ]
+
+
+def _around(numbers: tuple[float, ...], _: Answers) -> list[str]:
+    up, down = numbers
+    return ['shape = "band"', f"theta_deg = [{90 - up:g}, {90 + down:g}]  # 0 is up, 90 level, 180 down"]
+
+
+def _all(_numbers: tuple[float, ...], _: Answers) -> list[str]:
+    return ['shape = "all"']
+
+
+REGIONS: dict[str, Callable[[tuple[float, ...], Answers], list[str]]] = {
+    "ground": _ground,
+    "ceiling": _ceiling,
+    "wall": _wall,
+    "around": _around,
+    "all": _all,
+}
+
+
+def _mask(answers: Answers, folder: Path) -> list[str]:
+    ahead = answers.ahead_m
+    if answers.robot == "none":
+        return [
+            "# [[mask]]  # what the robot hides never counts: a mesh of it, and where in it the scanner is",
+            '# shape = "mesh"',
+            '# file = "robot.stl"',
+            "# unit_m = 0.001",
+            f"# sensor_m = [0, 0, {answers.height_m:g}]",
+        ]
+    if not answers.robot.startswith("box"):
+        return [
+            "[[mask]]  # what the robot hides never counts",
+            'shape = "mesh"',
+            f"file = {json.dumps(os.path.relpath(answers.robot, folder))}",
+            "unit_m = 1            # of the file: 0.001 where it is in mm",
+            f"sensor_m = [{ahead:g}, 0, {answers.height_m:g}]  # the scanner in the mesh",
+        ]
+    try:
+        length, width, height = (float(each) for each in answers.robot.split(":")[1:])
+    except ValueError as error:
+        raise TaskError(f"--robot {answers.robot}: box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh") from error
+    over = answers.height_m - height
+    if not (over > 0 and abs(ahead) <= length / 2):
+        raise TaskError(
+            f"--robot {answers.robot}: the scanner, {answers.height_m:g} m over the ground, {ahead:g} m ahead of its "
+            f"middle, is not over it: --height-m above {height:g}, --ahead-m from {-length / 2:g} to {length / 2:g}"
+        )
+    return [
+        f"[[mask]]  # the robot's own top, {over:g} m below the scanner: what it hides never counts",
+        'shape = "ground"',
+        f"height_m = {over:g}",
+        f"from_m = {-length / 2 - ahead:g}",
+        f"to_m = {length / 2 - ahead:g}",
+        f"width_m = {width:g}",
+    ]
+
+
+def write_task_file(path: Path, text: str) -> list[str]:
+    """Write a task file where there is none, and read it back: its warnings.
+
+    Raises:
+        TaskError: the file exists or cannot be written, or an answer makes no task; then there is no file.
+    """
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise TaskError(f"{path}: exists already: take another name, or another file with -o") from error
+    except OSError as error:
+        raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
+    try:
+        return load_task(path).warnings()
+    except ScanwrightError:
+        path.unlink()
+        raise

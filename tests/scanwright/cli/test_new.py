@@ -1,0 +1,136 @@
+"""`scanwright new`: tasks that load, what cannot work together, and the questions of a terminal."""
+
+import os
+import pty
+import select
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar, Servo
+from design.errors import TaskError
+from design.task.shapes import CeilingRegion, GroundRegion, WallRegion
+from design.task.task import load_task
+from scanwright.pipeline.new_task import ANGLES, SEEN, Answers, task_text, write_task_file
+
+PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
+PRODUCTS = load_catalogue()
+LIDARS, SERVOS = ([p.name for p in PRODUCTS if isinstance(p, kind)] for kind in (Lidar, Servo))
+DOG = ["--lidar", "UST-10LX", "--servo", "XM430-W350", "--height-m", "0.4", "--see", "ground:0.5:5", "--see", "ceiling"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("servo", SERVOS)
+@pytest.mark.parametrize("lidar", LIDARS)
+def test_every_pair_is_a_task_without_a_warning_or_one_line_says_why_not(here, lidar, servo):
+    try:
+        text = task_text(Answers("pair", lidar, servo, 0.5, ("ground",), 10.0), PRODUCTS, "new", here / "pair.toml")
+    except TaskError as error:
+        assert f"{lidar} on {servo}: these cannot work together: " in str(error)
+        assert "\n" not in str(error)
+        assert (lidar, servo) == ("LMS 200", "AX-12A")
+    else:
+        assert write_task_file(here / "pair.toml", text) == []
+
+
+def test_what_was_asked_for_stands_in_the_file(command, here):
+    code, out, complaints = command("new", "dog", *DOG, "-o", "FILE.toml")
+    assert (code, out) == (0, "wrote FILE.toml\n")
+    assert complaints == [
+        "next: `scanwright build FILE.toml` makes it; `scanwright optimise FILE.toml` only finds its angles"
+    ]
+    text = (here / "FILE.toml").read_text()
+    assert ANGLES in text
+    task = load_task(here / "FILE.toml").task
+    ground, ceiling = task.weight
+    assert isinstance(ground, GroundRegion) and isinstance(ceiling, CeilingRegion)
+    assert (ground.from_m, ground.to_m, ground.height_m, ceiling.ceiling_m) == (0.5, 5, 0.4, 2.5)
+    assert (task.sensor, task.servo, task.slip_ring) == ("UST-10LX", "XM430-W350", "SRC022A-6")
+    again = next(line for line in text.splitlines() if line.startswith("# Made by: ")).removeprefix("# Made by: ")
+    (here / "FILE.toml").unlink()
+    assert command(*shlex.split(again)[1:])[0] == 0
+    assert (here / "FILE.toml").read_text() == text
+
+
+def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
+    words = [word for each in SEEN for word in ("--see", each)]
+    box = ["--robot", "box:0.6:0.3:0.3", "--ahead-m", "0.2"]
+    assert command("new", "all_of_it", *DOG[:6], *words, *box, "--scan-s", "20")[0] == 0
+    task = load_task(here / "all_of_it.toml").task
+    assert [type(r) for r in task.weight[:3]] == [GroundRegion, CeilingRegion, WallRegion]
+    assert task.weight[3].theta_deg == (60, 120) and task.weight[4].shape == "all"
+    assert task.density.ball_radius_deg == pytest.approx(0.95, abs=0.01)  # 0.05 m at 3 m
+    top = task.mask[0]
+    assert top.corners_m()[0] == pytest.approx((-0.5, -0.15, -0.1)) and top.corners_m()[2] == pytest.approx(
+        (0.1, 0.15, -0.1)
+    )
+    assert task.motion.period_s == 20
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (["--see", "grund"], "did you mean 'ground'?"),
+        (["--see", "ground:a"], "--see ground:a: numbers after the colons"),
+        (["--see", "ceiling:1:2"], "1 numbers at most"),
+        (["--see", "ceiling:0.2"], "ceiling_m = 0.2 is not above height_m = 0.4"),
+        (["--see", "thing:0:3"], "a size and a distance above 0"),
+        (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
+        (["--robot", "box:1"], "box:LENGTH:WIDTH:HEIGHT"),
+        (["--robot", "box:1:1:0.5"], "is not over it"),
+        (["--robot", "none.stl"], "none.stl: no such file"),
+        (["--scan-s", "0.1"], "rpm at most"),
+        (["--scan-s", "-1"], "motion.period_s = -1"),
+    ],
+)
+def test_an_answer_that_makes_no_sense_is_one_line_and_no_file(command, here, change, told):
+    code, _, complaints = command("new", "dog", *DOG, *change)
+    assert (code, len(complaints)) == (2, 1)
+    assert told in complaints[0]
+    assert not list(here.iterdir())
+
+
+def test_a_file_is_never_written_over_and_nobody_is_asked_where_nobody_is(command, here):
+    (here / "dog.toml").write_text("mine")
+    assert "dog.toml: exists already" in command("new", "dog", *DOG)[2][0]
+    assert (here / "dog.toml").read_text() == "mine"
+    assert "give --servo, --height-m, --see" in command("new", "cat", "--lidar", "UST-10LX")[2][0]
+
+
+QUESTIONS = [
+    ("Which lidar?", "ust10"),
+    ("did you mean 'UST-10LX'?", "ust-10lx"),
+    ("How high", "0.6"),
+    ("below it", ""),
+    ("must it see", "wall:2 around"),
+    ("How many seconds", ""),
+]
+
+
+def test_on_a_terminal_what_no_flag_answers_is_asked(here):
+    """A terminal of its own; a name that is wrong is asked for again, one in small letters is understood."""
+    screen, keyboard = pty.openpty()
+    words = [sys.executable, "-m", "scanwright", "new", "asked", "--servo", "MX-28"]
+    program = subprocess.Popen(words, stdin=keyboard, stdout=keyboard, stderr=keyboard, start_new_session=True)
+    os.close(keyboard)
+    try:
+        for question, answer in QUESTIONS:
+            said = ""
+            while question not in said or not said.endswith(": "):
+                assert select.select([screen], [], [], PATIENCE_S)[0], f"not asked: {question!r}, but {said!r}"
+                said += os.read(screen, 4096).decode()
+            os.write(screen, f"{answer}\n".encode())
+        assert program.wait(PATIENCE_S) == 0
+    finally:
+        program.kill()
+        os.close(screen)
+    task = load_task(here / "asked.toml").task
+    assert (task.sensor, task.weight[0].distance_m, task.weight[1].shape) == ("UST-10LX", 2, "band")
