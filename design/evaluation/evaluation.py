@@ -15,7 +15,7 @@ from design.density.beams import scan_at
 from design.errors import TaskError
 from design.evaluation.coverage import Coverage, coverage, on_surfaces
 from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
-from design.evaluation.metres import OnPlane, on_planes
+from design.evaluation.metres import PlaneFigures, on_planes
 from design.evaluation.poles import PoleChances, parse_pole, pole_chances
 from design.objective.ball_search import BallScore, ball_score
 from design.objective.holes import Hole, holes, percent
@@ -57,7 +57,7 @@ class Evaluation:
     rises: dict[str, float]
     hit: PoleChances | None
     surfaces: dict[str, float] | None
-    planes: tuple[OnPlane, ...]
+    planes: tuple[PlaneFigures, ...]
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
         """Directions of the beams of one full scan in the world frame, shape (n, 3)."""

@@ -28,7 +28,7 @@ SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and n
 
 
 @dataclass(frozen=True, slots=True)
-class OnPlane:
+class PlaneFigures:
     """What one full scan leaves on the rectangle of a region.
 
     Attributes:
@@ -57,7 +57,7 @@ class OnPlane:
         )
 
 
-def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tuple[OnPlane, ...]:
+def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tuple[PlaneFigures, ...]:
     """What a full scan of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] leaves on each plane.
 
     A region counts where it has a weight above 0. Masked directions are no part of it.
@@ -71,7 +71,7 @@ def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tupl
     return tuple(on_plane(region, beams, problem) for region in regions)
 
 
-def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem) -> OnPlane:
+def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem) -> PlaneFigures:
     """What beams, unit vectors (n, 3) of the world, leave on one region."""
     corners = np.array(region.corners_m())
     sides = corners[1] - corners[0], corners[3] - corners[0]
@@ -87,11 +87,11 @@ def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem
     away = np.linalg.norm(middles, axis=1)
     seen = ~problem.field.masked_at(middles / away[:, None])
     if not inside.any() or not seen.any():
-        return OnPlane(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
+        return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
     area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     tree = cKDTree(ends)  # what lies just beyond an edge ends a gap too
-    return OnPlane(
+    return PlaneFigures(
         region.words(),
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from design.errors import TaskError
+from design.errors import TaskError, suggest
 from scanwright.cli.console import hint, show
 from scanwright.cli.help import Commands
 
@@ -110,8 +110,6 @@ def _asked(
 
 def _until_known(question: str, usual: str, known: list[str]) -> str:
     """Ask until a product of the catalogue is named, in whatever case."""
-    from design.errors import suggest
-
     folded = {name.lower(): name for name in known}
     while True:
         answer = str(typer.prompt(question, default=usual)).strip()

@@ -18,7 +18,7 @@ from scanwright.pipeline.manifest import first_difference, is_current, listed_fi
 
 if TYPE_CHECKING:
     from cad.findings import PartFinding
-    from design.evaluation.metres import OnPlane
+    from design.evaluation.metres import PlaneFigures
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen, Workshop
 
@@ -42,7 +42,7 @@ class Made:
     optimum: Optimum
     chosen: Chosen
     findings: tuple[PartFinding, ...]
-    planes: tuple[OnPlane, ...]
+    planes: tuple[PlaneFigures, ...]
 
 
 @dataclass(frozen=True, slots=True)
