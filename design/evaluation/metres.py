@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
@@ -24,6 +24,7 @@ AT_M = 3.0  # from the optical centre, where a gap is told
 RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
 CELLS = 64  # along each side of a region, to begin with
 MOST_CELLS = 200_000
+QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
 SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and never too narrow
 
 
@@ -83,9 +84,8 @@ def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem
     inside = (beams[facing] @ edge_normals(corners).T >= 0).all(axis=1)
 
     plane = _Plane(corners[0], sides[0], sides[1], problem.field)
-    middles = plane.points(_grid(CELLS))
-    away = np.linalg.norm(middles, axis=1)
-    seen = ~problem.field.masked_at(middles / away[:, None])
+    away = np.linalg.norm(plane.points(_grid(CELLS)), axis=1)
+    seen = ~plane.hidden(_grid(CELLS))
     if not inside.any() or not seen.any():
         return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
     area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
@@ -111,6 +111,7 @@ class _Plane:
     field: Field
 
     def points(self, shares: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
+        """Points of the rectangle [m] at shares of its sides, 0 .. 1."""
         return self.corner + shares[:, :1] * self.along + shares[:, 1:] * self.across
 
     def widest(self, tree: cKDTree, k: int, away_m: tuple[float, float]) -> float:
@@ -126,16 +127,24 @@ class _Plane:
             reach = half * float(np.linalg.norm(np.abs(self.along) + np.abs(self.across)))
             found = tree.query(middles, [k])[0][:, 0]
             away = np.linalg.norm(middles, axis=1)
-            there = (away_m[0] <= away) & (away <= away_m[1]) & ~self.field.masked_at(middles / away[:, None])
+            masked = self.hidden(shares)
+            there = (away_m[0] <= away) & (away <= away_m[1]) & ~masked
             best = max(best, float(found[there].max(initial=0.0)))
             near = (away_m[0] - reach <= away) & (away <= away_m[1] + reach) & (found + reach > best * (1 + SLACK))
+            if masked.any():  # a cell in the midst of what is hidden has no place for a disc
+                near &= ~np.all([masked, *(self.hidden(shares + half * step) for step in QUARTERS)], axis=0)
             if not near.any():
                 return best * (1 + SLACK)
             bound = float((found[near] + reach).max())
             if bound <= best * (1 + SLACK) or 4 * near.sum() > MOST_CELLS or reach < 1e-4:
                 return max(best, bound)
             half /= 2
-            shares = (shares[near][:, None] + half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])).reshape(-1, 2)
+            shares = (shares[near][:, None] + half * QUARTERS).reshape(-1, 2)
+
+    def hidden(self, shares: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
+        """Whether a mask hides points, which are given as shares of the sides."""
+        points = self.points(shares)
+        return self.field.masked_at(points / np.linalg.norm(points, axis=1)[:, None])
 
 
 def _grid(cells: int) -> Float[ndarray, "n 2"]:

@@ -45,6 +45,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 _APART_S = 10.0  # between two lines of one progress, where nobody looks on
 _BAR = 24  # characters
+_NUMBER = re.compile(r"[\d.,]+")
 _PERCENTAGE = re.compile(r"\s*\(?(\d{1,3})%\)?\s*")
 
 
@@ -107,17 +108,20 @@ class Progress:
     """Says what is being done, on standard error so that results can be piped.
 
     A line that holds a percentage is one of many of the same work. On a terminal they become one bar with the time that
-    is left, which the next line takes the place of; elsewhere one is printed every `_APART_S` seconds.
+    is left, which the next line takes the place of; elsewhere those that differ by their numbers only are printed every
+    `_APART_S` seconds.
 
     Attributes:
         clock: seconds that never run backwards.
         began_s: when the work that a percentage is of began; None before the first.
         said_s: when a percentage was last printed.
+        said: what of, without numbers.
     """
 
     clock: Callable[[], float] = time.monotonic
     began_s: float | None = None
     said_s: float = -math.inf
+    said: str = ""
 
     def __call__(self, line: str) -> None:
         """Say it."""
@@ -136,8 +140,8 @@ class Progress:
             words = _PERCENTAGE.sub(" ", line, count=1).strip()
             bar = f"  {progress_bar(done)} {words}{_left(done, now_s - self.began_s)}"
             print(f"\r\033[K{bar[: shutil.get_terminal_size().columns - 1]}", end="", file=sys.stderr, flush=True)
-        elif now_s - self.said_s >= _APART_S:
-            self.said_s = now_s
+        elif now_s - self.said_s >= _APART_S or self.said != _NUMBER.sub("", line):
+            self.said_s, self.said = now_s, _NUMBER.sub("", line)
             print(f"  .. {line}", file=sys.stderr, flush=True)
 
 

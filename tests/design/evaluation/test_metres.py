@@ -106,6 +106,9 @@ def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams)
     hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 4 and -1 <= y < 0]
     assert half.points == len(hits)
     assert half.points_per_m2 == pytest.approx(len(hits) / 3, rel=0.02)
+    left = [(x, y) for x, y in on_ground(beams) if y < 0]
+    tried_m = emptiest(left, 2, [(x, y) for x in np.arange(1, 4.01, 0.05) for y in np.arange(-1, 0, 0.05)])
+    assert 2 * tried_m <= half.twice_cm / 100 * (1 + 1e-9) <= (2 * tried_m + 0.1) * (1 + SLACK) * (1 + 1e-9)
     region = task.task.weight[0]
     none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)))
     assert none.words() == "ground 1 to 4 m ahead: no beam of a full scan ends there"

@@ -75,9 +75,13 @@ def test_in_a_file_a_percentage_is_printed_every_ten_seconds_and_nothing_moves(c
     for second in range(25):
         clock.now_s = float(second)
         say(f"scanning ({4 * second}%)")
+    say("drawing (97%)")
     say("assembling")
     said = capsys.readouterr().err
-    assert said.splitlines() == [f"  .. scanning ({p}%)" for p in (0, 40, 80)] + ["  .. assembling"]
+    assert said.splitlines() == [f"  .. scanning ({p}%)" for p in (0, 40, 80)] + [
+        "  .. drawing (97%)",
+        "  .. assembling",
+    ]
     assert not re.search(r"[\r\033]", said)
 
 
