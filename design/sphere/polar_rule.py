@@ -73,6 +73,8 @@ def breaks_of(field: Field, axis: Vector, more_rad: Float[ndarray, " more"]) -> 
 def weighted_segments(field: Field, axis: Vector, more_rad: Float[ndarray, " n"]) -> list[tuple[float, float]]:
     """Ranges of the polar angle between breaks, those of weight zero left out."""
     breaks = breaks_of(field, axis, more_rad)
+    if not len(field.patches):  # as the logarithms of equal weights are
+        return []
     if field.edges > MANY_EDGES:
         # the breaks do not tell where the weight of a cell begins: what any cell reaches stays, whatever covers it
         low, high = np.concatenate([_reach(field, k, axis) for k in range(len(field.patches))], axis=1)
