@@ -368,7 +368,7 @@ def test_the_guard_stops_a_servo_whose_program_leaves_without_a_word(pair):
     until(lambda: len(heard) >= 2)  # not answered: it insists
     reply[0] = b"xackx"
     watch.dismiss(stands=False)
-    assert set(heard) == {b"off"}
+    assert b"".join(heard).replace(b"off", b"") == b""  # on a busy computer one look finds several
 
 
 def test_the_guard_of_a_servo_that_stands_does_nothing(pair):
