@@ -97,7 +97,7 @@ class Evaluation:
             "J_rises_1_deg_off": self.rises,
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
             **(self.surfaces or {}),
-            **({"planes": [asdict(plane) for plane in self.planes]} if self.planes else {}),
+            **({"planes": [plane.facts() for plane in self.planes]} if self.planes else {}),
         }
 
     def lines(self) -> list[str]:

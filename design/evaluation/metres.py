@@ -5,7 +5,8 @@ Every beam of a simulated scan is followed to the plane of a region; what is sai
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -47,6 +48,11 @@ class PlaneFigures:
     at_m: float
     gap_cm: float
     twice_cm: float
+
+    def facts(self) -> dict[str, Any]:
+        """Names with units and values, for JSON; None where no beam ends there."""
+        told = asdict(self)
+        return told if self.points else told | dict.fromkeys(("at_m", "gap_cm", "twice_cm"))
 
     def words(self) -> str:
         """The same in a line."""

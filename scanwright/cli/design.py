@@ -36,7 +36,7 @@ def optimise(
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        show_json(optimum.facts() | {"planes": [asdict(plane) for plane in planes]})
+        show_json(optimum.facts() | {"planes": [plane.facts() for plane in planes]})
     else:
         show([*optimum.lines(), *(f"one full scan, {plane.words()}" for plane in planes)])
         hint(f"next: `scanwright build {task}` makes it")

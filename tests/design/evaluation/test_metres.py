@@ -111,6 +111,9 @@ def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams)
     assert 2 * tried_m <= half.twice_cm / 100 * (1 + 1e-9) <= (2 * tried_m + 0.1) * (1 + SLACK) * (1 + 1e-9)
     region = task.task.weight[0]
     none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)))
+    assert none.facts() == {"region": "ground 1 to 4 m ahead", "points": 0, "points_per_m2": 0.0} | dict.fromkeys(
+        ("at_m", "gap_cm", "twice_cm")
+    )
     assert none.words() == "ground 1 to 4 m ahead: no beam of a full scan ends there"
     assert on_planes(loaded({"shape": "all"}), problem_of(loaded({"shape": "all"})), np.zeros(4)) == ()
 
