@@ -1,5 +1,7 @@
 """Scans and joint samples as ROS 2 messages: pure bytes -> value functions for the two types that we record.
 
+And value -> bytes for what is made of them: points, frames, the description of the scanner.
+
 The layout is CDR as ROS 2 writes it; `rosbags` holds the message definitions of the ROS 2 releases.
 """
 
@@ -7,17 +9,25 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
-from design.arrays import Float32s
+from design.arrays import Float32s, Pose
+from firmware_io.clouds.cloud import pose_numbers
 from firmware_io.samples import Scan
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 JOINT_STATE = "sensor_msgs/msg/JointState"
+POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
+TEXT = "std_msgs/msg/String"
+POINT_FIELD_TYPES = {"<f4": 7, "<u4": 6, "<u2": 4}
+"""`sensor_msgs/PointField`: FLOAT32, UINT32, UINT16."""
 LASER_FRAME = "laser"
 SPIN_JOINT = "spin_joint"
 _SPIN_JOINT_BYTES = SPIN_JOINT.encode()
@@ -101,6 +111,52 @@ def encode_joint(time_ns: int, position_rad: float) -> bytes:
         effort=np.empty(0),
     )
     return bytes(_store().serialize_cdr(message, JOINT_STATE))
+
+
+def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
+    """One `sensor_msgs/msg/PointCloud2` in CDR, a row of the cloud for each row of the structured array."""
+    types = _store().types
+    fields = [
+        types["sensor_msgs/msg/PointField"](
+            name=name, offset=place[1], datatype=POINT_FIELD_TYPES[place[0].str], count=1
+        )
+        for name, place in (rows.dtype.fields or {}).items()
+    ]
+    message = types[POINT_CLOUD](
+        header=_header(time_ns, frame),
+        height=1,
+        width=rows.size,
+        fields=fields,
+        is_bigendian=False,
+        point_step=rows.dtype.itemsize,
+        row_step=rows.dtype.itemsize * rows.size,
+        data=np.frombuffer(rows.tobytes(), np.uint8),
+        is_dense=False,
+    )
+    return bytes(_store().serialize_cdr(message, POINT_CLOUD))
+
+
+def encode_transforms(poses: Iterable[tuple[str, str, Pose]], time_ns: int) -> bytes:
+    """One `tf2_msgs/msg/TFMessage` in CDR of parent, child and `T_parent_child`, shape (4, 4)."""
+    types = _store().types
+    told = []
+    for parent, child, T in poses:
+        x, y, z, qx, qy, qz, qw = pose_numbers(T).tolist()
+        transform = types["geometry_msgs/msg/Transform"](
+            translation=types["geometry_msgs/msg/Vector3"](x=x, y=y, z=z),
+            rotation=types["geometry_msgs/msg/Quaternion"](x=qx, y=qy, z=qz, w=qw),
+        )
+        told.append(
+            types["geometry_msgs/msg/TransformStamped"](
+                header=_header(time_ns, parent), child_frame_id=child, transform=transform
+            )
+        )
+    return bytes(_store().serialize_cdr(types[TRANSFORMS](transforms=told), TRANSFORMS))
+
+
+def encode_text(text: str) -> bytes:
+    """One `std_msgs/msg/String` in CDR."""
+    return bytes(_store().serialize_cdr(_store().types[TEXT](data=text), TEXT))
 
 
 def decode_joint(data: bytes) -> tuple[int, float]:

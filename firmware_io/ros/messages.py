@@ -14,8 +14,8 @@ from sensor_msgs.msg import JointState, LaserScan, PointCloud2, PointField
 
 from design.arrays import Pose
 from firmware_io.assembly.streaming import ScanPoints
-from firmware_io.recording.ros_messages import LASER_FRAME, SPIN_JOINT
-from firmware_io.ros.point_rows import POINT, POINT_FIELD_TYPES, point_rows
+from firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
+from firmware_io.ros.point_rows import POINT, point_rows
 from firmware_io.samples import Scan
 
 _FIELDS = [

@@ -14,8 +14,6 @@ from firmware_io.assembly.streaming import ScanPoints
 POINT = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("t", "<u4"), ("ring", "<u2")],
 )
-POINT_FIELD_TYPES = {"<f4": 7, "<u4": 6, "<u2": 4}
-"""`sensor_msgs/PointField`: FLOAT32, UINT32, UINT16."""
 
 
 def point_rows(line: ScanPoints) -> NDArray[np.void]:

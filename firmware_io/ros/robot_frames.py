@@ -128,6 +128,25 @@ def write_calibrated_urdf(designed: Path, out: Path, angles: AngleSet) -> None:
         part.write_text(f'<?xml version="1.0"?>\n{text}\n', encoding="utf-8")
 
 
+def description(folder: Path, angles: AngleSet) -> str | None:
+    """The URDF of a build folder with the frames of an angle set, its meshes where every program finds them.
+
+    None where the folder has no URDF.
+
+    Raises:
+        RecordingError: it has one that is none of ours.
+    """
+    path = folder / URDF
+    if not path.is_file():
+        return None
+    robot = with_frames(read_urdf(path), angles, str(path))
+    for mesh in robot.iter("mesh"):
+        name = mesh.get("filename", "")
+        if "://" not in name:
+            mesh.set("filename", (path.parent / name).resolve().as_uri())
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
 def read_urdf(path: Path) -> str:
     """The text of a URDF.
 

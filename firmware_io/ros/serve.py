@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
-from design.angles import AngleSet, angles_in_use
+from design.angles import angles_in_use
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.recording.mcap_chunks import read_note
 from firmware_io.recording.metadata import NOTE, held_by
 from firmware_io.ros.drive import drive
 from firmware_io.ros.node import PublishedScanner, running_node
 from firmware_io.ros.replay import replay
-from firmware_io.ros.robot_frames import URDF, read_urdf, with_frames
+from firmware_io.ros.robot_frames import description
 from firmware_io.scan.plan import ScanPlan
 
 Say = Callable[[str], None]
@@ -69,18 +68,5 @@ def serve_recording(
 def _scanner(out: Path, smooth: bool, publish_tf: bool) -> PublishedScanner:
     in_use = angles_in_use(out)
     return PublishedScanner(
-        in_use.angles, own_body_beside(in_use.path), _description(out, in_use.angles), smooth, publish_tf
+        in_use.angles, own_body_beside(in_use.path), description(out, in_use.angles), smooth, publish_tf
     )
-
-
-def _description(out: Path, angles: AngleSet) -> str | None:
-    """The URDF of a build with the frames in use, its meshes where every program finds them."""
-    path = out / URDF
-    if not path.is_file():
-        return None
-    robot = with_frames(read_urdf(path), angles, str(path))
-    for mesh in robot.iter("mesh"):
-        name = mesh.get("filename", "")
-        if "://" not in name:
-            mesh.set("filename", (path.parent / name).resolve().as_uri())
-    return ElementTree.tostring(robot, encoding="unicode")

@@ -176,11 +176,16 @@ class Placing:
         )
 
 
-def growing(receiving: Connection, placing: Placing) -> Iterator[CloudGrowth]:
-    """What comes through the pipe, placed, until the other end is closed."""
+def batches(receiving: Connection) -> Iterator[Batch]:
+    """What comes through the pipe, until the other end is closed."""
     while True:
         try:
             batch = receiving.recv()
         except EOFError:
             return
-        yield placing.place(batch)
+        yield batch
+
+
+def growing(receiving: Connection, placing: Placing) -> Iterator[CloudGrowth]:
+    """What comes through the pipe, placed, until the other end is closed."""
+    return map(placing.place, batches(receiving))

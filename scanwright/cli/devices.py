@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from design.errors import require
+from design.errors import DeviceError, require
 from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 
@@ -84,10 +84,15 @@ def scan(
     live: Annotated[
         bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
     ] = False,
+    foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve scans, points and frames to Foxglove.")] = False,
 ) -> None:
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     if live:
         require_pages("scan --live")
+    if foxglove:
+        require("foxglove", "scan --foxglove needs the Foxglove SDK", "foxglove")
+    if live and foxglove:
+        raise DeviceError("--live and --foxglove: one of them")
     from firmware_io.scan.acquire import acquire
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
@@ -109,7 +114,13 @@ def scan(
     show(plan.lines())
     if dry_run:
         return
-    with live_page(out, wanted=live) as watch:
+    if foxglove:
+        from scanwright.live.foxglove_view import foxglove_feed
+
+        viewer = foxglove_feed(out)
+    else:
+        viewer = live_page(out, wanted=live)
+    with viewer as watch:
         try:
             with on_duty(), closing(watch):
                 recorded = acquire(plan, say, watch)

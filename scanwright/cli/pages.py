@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cad.kernel import require_kernel
+from design.errors import require
 from scanwright.cli.console import Progress, require_pages
 from scanwright.cli.help import Commands
 
@@ -32,3 +33,27 @@ def studio(
     from scanwright.studio.session import run_studio
 
     run_studio(load_task(task), port=port, out=out, say=Progress())
+
+
+@app.command()
+def view(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="MCAP recording of the scanner.")],
+    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this computer; 0 is any that is free.")] = 8765,
+    rate: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE.mcap", help="Write what would be shown into a file, and stop."),
+    ] = None,
+) -> None:
+    """Show a recording in Foxglove: its scans, and the points, frames and scanner that they make."""
+    require("foxglove", "view needs the Foxglove SDK", "foxglove")
+    from scanwright.live.foxglove_view import view_recording, write_for_foxglove
+
+    if out is not None:
+        print(f"wrote {write_for_foxglove(recording, angles, out):,} scans with their points to {out}")
+        return
+    try:
+        view_recording(recording, angles, Progress(), port=port, rate=rate)
+    except KeyboardInterrupt:
+        raise typer.Exit(0) from None
