@@ -163,7 +163,7 @@ def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
     rows, tables = field.weight.rows.copy(), field.weight.tables.copy()
     maps = rows[:, 0] == MAP
     for row in rows[maps]:
-        tables[int(row[1])] = function(row[7] * tables[int(row[1])])
+        tables[int(row[1])] = function(row[VALUE] * tables[int(row[1])])
     rows[:, VALUE] = np.where(maps, 1.0, function(rows[:, VALUE]))
     weight = replace(field.weight, rows=rows, tables=tables)
     return replace(field, weight=weight, background=float(function(np.array([field.background]))[0]))
@@ -173,7 +173,7 @@ def _least(field: Field) -> float:
     """The smallest weight that any region paints."""
     rows = field.patches
     painted = [rows[rows[:, 0] != MAP, VALUE]]
-    painted += [row[7] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]
+    painted += [row[VALUE] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]
     values = np.concatenate(painted)
     return float(values[values > 0].min())
 
