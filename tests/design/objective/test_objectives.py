@@ -130,8 +130,8 @@ def test_the_worst_of_a_region_in_two_parts_is_the_worse_part():
 
 def test_kl_of_equal_cells_is_that_of_the_region_that_they_fill():
     """The logarithms of equal weights are 0: as a map, whose edges are too many to be looked at, they hold nothing."""
-    cells = np.zeros((18, 36))
-    cells[6:12, 14:22] = 1.0  # theta 60 .. 120, phi 140 .. 220 deg
+    cells = np.zeros((90, 180))
+    cells[30:60, 70:110] = 1.0  # theta 60 .. 120, phi 140 .. 220 deg
     mapped = loaded("kl", [{"shape": "map", "file": "cells.npy"}])
     filled = {"shape": "band", "theta_deg": [60, 120], "phi_deg": [140, 220]}
     setting = np.radians(SETTINGS[1])
