@@ -128,13 +128,16 @@ def test_the_worst_of_a_region_in_two_parts_is_the_worse_part():
     assert score(both.with_objective(worst(both.field)), setting).least == min(alone)
 
 
-def test_kl_of_equal_cells_is_that_of_the_region_that_they_fill():
-    """The logarithms of equal weights are 0: as a map, whose edges are too many to be looked at, they hold nothing."""
+@pytest.mark.parametrize("masked", [False, True])
+def test_kl_where_all_weighs_the_same_is_that_of_the_region_that_it_fills(masked):
+    """The logarithms of equal weights are 0: nothing holds any, and among many edges of cells that is no error."""
     cells = np.zeros((90, 180))
     cells[30:60, 70:110] = 1.0  # theta 60 .. 120, phi 140 .. 220 deg
-    mapped = loaded("kl", [{"shape": "map", "file": "cells.npy"}])
-    filled = {"shape": "band", "theta_deg": [60, 120], "phi_deg": [140, 220]}
-    setting = np.radians(SETTINGS[1])
-    found = score(problem_of(replace(mapped, maps=(cells,))), setting)
-    painted = score(problem("kl", [filled]), setting)
+    drawn = {"shape": "map", "file": "cells.npy"}
+    given = loaded("kl", [{"shape": "all"} if masked else drawn])
+    if masked:
+        given = replace(given, task=Task.model_validate(given.task.model_dump() | {"mask": [drawn]}))
+    found = score(problem_of(replace(given, maps=(1 - cells if masked else cells,))), np.radians(SETTINGS[1]))
+    filled = problem("kl", [{"shape": "band", "theta_deg": [60, 120], "phi_deg": [140, 220]}])
+    painted = score(filled, np.radians(SETTINGS[1]))
     assert abs(found.J - painted.J) <= found.J_error + painted.J_error
