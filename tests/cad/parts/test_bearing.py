@@ -7,7 +7,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cad.assembly.make import make_parts
@@ -176,16 +176,14 @@ def test_the_bearing_counts_in_the_hash_of_the_parts():
 
 @settings(deadline=None, max_examples=40)
 @given(alpha_rot=st.floats(-180, 180), beta_rot=degrees, alpha=degrees, beta=degrees)
+@example(alpha_rot=0.0, beta_rot=31.0, alpha=6.0, beta=15.0)
 def test_a_bearing_changes_the_stack_below_the_shoulder_only(alpha_rot, beta_rot, alpha, beta):
     scanner = scanner_for(alpha_rot, beta_rot, alpha, beta)
     stack = direct_stack(scanner)
     alone = direct_stack(replace(scanner, bearings=()))
-    assert (stack.h, stack.shoulder, stack.clamp, stack.spigot_top) == (
-        alone.h,
-        alone.shoulder,
-        alone.clamp,
-        alone.spigot_top,
-    )
+    above = [(each.h, each.shoulder, each.clamp, each.spigot_top) for each in (stack, alone)]
+    # where its hub, as wide as the bearing, covers a screw, a plate is put between, which a narrow hub does without
+    assert above[0] == above[1] or (stack.sub_plate is not None and alone.sub_plate is None and stack.h > alone.h)
     tilt = np.degrees(np.arccos(np.clip(scanner.angles.T_world_rot(0.0)[2, 2], -1, 1)))
     if min(tilt, 180 - tilt) < 15:
         assert stack.bearing is None

@@ -19,6 +19,7 @@ from design.objective import named_objectives
 from design.objective.ball_search import ball_score
 from design.objective.problem import NODES, problem_of
 from design.objective.score import quick_J, score, score_on
+from design.sphere.painting import VALUE
 from design.task.task import LoadedTask, Task
 
 ALL = {"shape": "all"}
@@ -179,7 +180,7 @@ def test_equal_angle_on_a_ring_of_ties_is_right():
 def test_the_scale_of_the_weights_does_not_matter(seed):
     p, setting = random_pair(seed)
     rows = p.field.weight.rows.copy()
-    rows[:, 7] *= 7.5
+    rows[:, VALUE] *= 7.5
     field = replace(p.field, weight=replace(p.field.weight, rows=rows), background=7.5 * p.field.background)
     one, other = score(p, setting), score(p.with_objective(named_objectives.log(field)), setting)
     assert pytest.approx(one.J, abs=1e-12) == other.J
