@@ -5,6 +5,7 @@ import signal
 import struct
 import subprocess
 import sys
+from contextlib import suppress
 
 import foxglove
 import numpy as np
@@ -38,6 +39,7 @@ URDF = (
     "</robot>"
 )
 SUBPROTOCOL = "foxglove.sdk.v1"
+TRIES, QUIET_S = 10, 20.0
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +95,29 @@ def test_foxglove_shows_scanner_and_cloud_from_the_file_alone(folder, tmp_path):
         write_for_foxglove(folder / "r.mcap", folder / "angles.json", tmp_path / "shown.bag")
 
 
+def heard_by(client):
+    """The clouds of /points that a client hears until it hears nothing for a while."""
+    topics, clouds = {}, {}
+    while "/points" not in topics:
+        told = json.loads(client.recv(BOUND_S))
+        if told["op"] == "advertise":
+            topics |= {channel["topic"]: channel for channel in told["channels"]}
+    channel = topics["/points"]
+    assert (channel["schemaName"], channel["encoding"]) == ("sensor_msgs/msg/PointCloud2", "cdr")
+    wanted = {"op": "subscribe", "subscriptions": [{"id": 7, "channelId": channel["id"]}]}
+    client.send(json.dumps(wanted))
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with suppress(TimeoutError):
+        while len(clouds) < 40:
+            data = client.recv(QUIET_S)
+            if isinstance(data, bytes) and data[0] == 1:
+                number, at_ns = struct.unpack_from("<IQ", data, 1)
+                message = store.deserialize_cdr(data[13:], "sensor_msgs/msg/PointCloud2")
+                assert number == 7 and at_ns == stamp_of(message)
+                clouds[at_ns] = xyz(message.data, message.point_step)
+    return clouds
+
+
 def test_a_client_of_the_protocol_reads_the_recording_back(folder):
     words = ["view", folder / "r.mcap", "--angles", folder / "angles.json", "--port", "0", "--rate", "20"]
     with subprocess.Popen(
@@ -100,24 +125,12 @@ def test_a_client_of_the_protocol_reads_the_recording_back(folder):
     ) as server:
         try:
             address = next(word for word in server.stderr.readline().split() if word.startswith("ws://127.0.0.1:"))
-            clouds, topics = {}, {}
-            with connect(address, subprotocols=[SUBPROTOCOL], max_size=None) as client:
-                while "/points" not in topics:
-                    told = json.loads(client.recv(BOUND_S))
-                    if told["op"] == "advertise":
-                        topics |= {channel["topic"]: channel for channel in told["channels"]}
-                channel = topics["/points"]
-                assert (channel["schemaName"], channel["encoding"]) == ("sensor_msgs/msg/PointCloud2", "cdr")
-                wanted = {"op": "subscribe", "subscriptions": [{"id": 7, "channelId": channel["id"]}]}
-                client.send(json.dumps(wanted))
-                store = get_typestore(Stores.ROS2_JAZZY)
-                while len(clouds) < 40:
-                    data = client.recv(BOUND_S)
-                    if isinstance(data, bytes) and data[0] == 1:
-                        number, at_ns = struct.unpack_from("<IQ", data, 1)
-                        message = store.deserialize_cdr(data[13:], "sensor_msgs/msg/PointCloud2")
-                        assert number == 7 and at_ns == stamp_of(message)
-                        clouds[at_ns] = xyz(message.data, message.point_step)
+            clouds = {}
+            for _ in range(TRIES):  # who is slow to subscribe has missed the first scans: the next time shows all again
+                with connect(address, subprotocols=[SUBPROTOCOL], max_size=None) as client:
+                    clouds |= heard_by(client)
+                if len(clouds) == 40:
+                    break
             server.send_signal(signal.SIGINT)
             assert server.wait(BOUND_S) == 0  # Ctrl-C is the way to end it
         finally:
