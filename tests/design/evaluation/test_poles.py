@@ -11,6 +11,7 @@ from design.errors import TaskError
 from design.evaluation.poles import Pole, parse_pole, pole_chances
 from design.frames import R_rot_laser, R_world_rot, Rz
 from design.objective.problem import problem_of
+from design.sphere.painting import COLUMNS, VALUE
 from design.task.task import Task, load_task
 
 PARALLEL = np.radians([0, 0, 0, -90])  # the scan plane holds the upright axis: lines run along the poles
@@ -111,7 +112,7 @@ def test_a_pole_outside_the_region_stands_anywhere_that_is_not_hidden():
     assert pole_chances(problem, TILTED, Pole(0.1, 0.2, 10.0)).stands == "unmasked"
     assert pole_chances(problem, TILTED, Pole(0.1, 2.0, 3.0)).stands == "weighted"
     masked = turning("uniform")
-    hidden = replace(problem.field.mask, rows=np.array([[0.0, 0, 0, 0, 0, 0, 0, 1]]))
+    hidden = replace(problem.field.mask, rows=np.eye(1, COLUMNS, VALUE))  # all is hidden
     blind = masked.with_objective(replace(masked.objective, field=replace(masked.field, mask=hidden)))
     with pytest.raises(TaskError, match="hides every azimuth"):
         pole_chances(blind, TILTED, Pole(0.1, 0.2, 10.0))
