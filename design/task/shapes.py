@@ -6,6 +6,7 @@ Files speak degrees, and metres where a plane or a mesh does; every key that has
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
@@ -151,15 +152,17 @@ class OnPlane(Record):
         """What it is."""
         return f"{self._named()}{HEADINGS.get(self.heading_deg % 360, f' at {self.heading_deg:g} deg')}"
 
+    @abstractmethod
     def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
-        raise NotImplementedError
+        """The corners where it lies ahead."""
 
+    @abstractmethod
     def _named(self) -> str:
-        raise NotImplementedError
+        """What it is, but for its heading."""
 
+    @abstractmethod
     def _rising(self) -> tuple[tuple[str, str], ...]:
         """Pairs of fields: the first of each is below the second."""
-        raise NotImplementedError
 
     @model_validator(mode="after")
     def _can_be_aimed_at(self) -> OnPlane:

@@ -73,5 +73,5 @@ def _with_voice(function: Callable[..., Any]) -> Callable[..., Any]:
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("quiet", Quiet), ("verbose", Verbose))
     ]
-    spoken.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *added])  # type: ignore[attr-defined]
+    vars(spoken)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), *added])
     return spoken

@@ -22,6 +22,7 @@ from design.errors import DeviceError, RecordingError
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.recording.mcap_chunks import read_note
 from firmware_io.recording.metadata import NOTE, held_by
+from firmware_io.recording.recording import open_recording
 from firmware_io.ros.replay import replay
 from firmware_io.ros.robot_frames import description
 from firmware_io.samples import JointSample, Scan
@@ -68,6 +69,7 @@ def view_recording(recording: Path, angles: Path, say: Say, *, port: int = PORT,
         RecordingError: the recording is unreadable.
         DeviceError: the port is taken.
     """
+    open_recording(recording)  # what cannot be read is refused before an address is told
     with _server(recording.name, port, say) as context:
         channels = _channels(recording, angles, context)
         while True:

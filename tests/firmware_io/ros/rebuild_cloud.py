@@ -58,7 +58,10 @@ def main(count, out):
     node = rclpy.create_node("somebody_else")
     scans, joints, points, urdf = [], [], {}, []
     node.create_subscription(LaserScan, "scan", scans.append, qos_profile_sensor_data)  # as Nav2 asks
-    angle = lambda message: joints.append((nanoseconds(message.header), message.position[0]))  # noqa: E731
+
+    def angle(message):
+        joints.append((nanoseconds(message.header), message.position[0]))
+
     node.create_subscription(JointState, "joint_states", angle, 1000)
     node.create_subscription(PointCloud2, "points", lambda m: points.update({nanoseconds(m.header): m}), 5)  # as RViz
     kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
