@@ -30,10 +30,17 @@ PREFIXES = {"lidar": "lidar_", "slip ring": "ring_"}
 
 @dataclass(frozen=True, slots=True)
 class PlacedBody:
-    """One body of the scanner as it stands: corners of its triangles [m], shape (t, 3, 3), and whether it turns."""
+    """One body of the scanner as it stands.
+
+    Attributes:
+        triangles_m: corners of its triangles [m], shape (t, 3, 3).
+        turns: with the axis.
+        colour: sRGB, 0 to 1.
+    """
 
     triangles_m: Array
     turns: bool
+    colour: tuple[float, ...] = (0.6, 0.6, 0.6)
 
 
 def bodies_named(where: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]) -> tuple[str, ...]:

@@ -34,7 +34,8 @@ PLAIN = [(17, 17, 17), (255, 255, 255), (221, 221, 221), (119, 119, 119), (255, 
 HATCH_CELLS = 12
 MOST_LEVELS = 8
 BESIDE_DEG, STEEPEST_DEG = 25.0, 50.0  # of the camera: a ball looks round from beside
-UPRIGHT = 0.05  # a middle less far from the vertical, or from nowhere, has no yaw
+UPRIGHT = 0.05  # a middle less far from the vertical has no yaw
+NOWHERE = 1e-3  # a mean direction shorter than this is none
 
 Indices = NDArray[np.uint8]
 
@@ -63,17 +64,19 @@ class DensitySphere:
     Attributes:
         maps: at least one.
         axis_world: direction of the rotation axis.
-        look_deg: yaw and pitch of the camera at the start, somewhat beside the middle of what counts.
+        middle: of what counts, of length 1; nowhere, (0, 0, 0), where it is all around.
+        below: share of what counts that lies below the horizon.
     """
 
     maps: tuple[SphereMap, ...]
     axis_world: tuple[float, ...]
-    look_deg: tuple[float, float]
+    middle: tuple[float, ...]
+    below: float
 
     def data(self) -> dict[str, Any]:
         """What the page needs beside the pictures, ready for JSON."""
         views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.maps]
-        return {"axis": list(self.axis_world), "look_deg": list(self.look_deg), "views": views}
+        return {"axis": list(self.axis_world), "look_deg": list(_look(*self.middle)), "views": views}
 
 
 def density_sphere(problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float) -> DensitySphere:
@@ -93,16 +96,19 @@ def density_sphere(problem: Problem, angles: AngleSet, axes: Array | None, step_
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
-    solid_angle = np.sqrt(1 - directions[:, 2] ** 2)
-    return DensitySphere(tuple(maps), axis, _look((weight.ravel() * solid_angle) @ directions))
+    counts = weight.ravel() * np.sqrt(1 - directions[:, 2] ** 2)
+    middle = counts @ directions / max(float(counts.sum()), 1e-12)
+    length = float(np.linalg.norm(middle))
+    middle *= (length > NOWHERE) / max(length, NOWHERE)
+    below = float(counts[directions[:, 2] < 0].sum() / max(float(counts.sum()), 1e-12))
+    return DensitySphere(tuple(maps), axis, tuple(middle.round(6).tolist()), below)
 
 
-def _look(middle: Array) -> tuple[float, float]:
-    """Where the camera stands for what is about a direction, of any length: yaw and pitch [deg]."""
-    x, y, z = middle / max(float(np.linalg.norm(middle)), 1e-12)
+def _look(x: float, y: float, z: float) -> tuple[float, float]:
+    """Where the camera of the ball stands, beside a direction: yaw and pitch [deg]."""
     across = float(np.hypot(x, y))
     yaw = np.degrees(np.arctan2(y, x)) if across > UPRIGHT else 0.0
-    pitch = np.clip(np.degrees(np.arctan2(z, across)), -STEEPEST_DEG, STEEPEST_DEG) if across + abs(z) > UPRIGHT else 0
+    pitch = np.clip(np.degrees(np.arctan2(z, across)), -STEEPEST_DEG, STEEPEST_DEG)
     return round(float(yaw)) + BESIDE_DEG, float(round(float(pitch)))
 
 

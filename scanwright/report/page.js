@@ -1,6 +1,6 @@
 "use strict";
-// on paper nothing is folded
-const folded = () => [...document.querySelectorAll("details:not([open])")];
+// on paper nothing is folded; what is for the screen only is not there
+const folded = () => [...document.querySelectorAll("details:not([open]):not(.screen)")];
 let opened = [];
 window.addEventListener("beforeprint", () => {
   opened = folded();

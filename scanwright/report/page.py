@@ -14,15 +14,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 from design.angles import AngleSet, load_angles
 from design.arrays import Array
 from design.errors import BuildError
+from design.evaluation.metres import on_planes
 from design.shadow import load_own_body
 from design.task.task import LoadedTask, load_task
-from scanwright.report.answer import OFF_DEG, answer, hidden_by, problem_as_built
+from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_table, read_text
-from scanwright.report.check_pictures import CheckPictures, bodies_named
+from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.landscapes import AXIS, PLANE, landscape
-from scanwright.report.scanner_scene import LARGEST_BYTES, load_glb, placed_bodies, scanner_scene
+from scanwright.report.room_picture import room_picture
+from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
+from scanwright.report.sentences import sentences
 
 REPORT = "report.html"
 SEVERITIES = ("error", "warning", "note", "pass")
@@ -72,10 +75,11 @@ def report_html(folder: Path) -> str:
         "bom": bom,
         "steps": read(folder / "assembly.md", lambda path: steps_html(read_text(path))),
         "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},
+        "sheets": [f"drawings/{path.name}" for path in sorted((folder / "drawings").glob("*.pdf"))],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
         "manifest": read(folder / "manifest.json", _manifest),
         "task_text": read(folder / "task.toml", read_text),
-        **_on_task(loaded, angles, axes),
+        **_on_task(folder, loaded, angles, axes, [] if assembly is None else about_centre(assembly, angles)),
     }
     try:
         return _environment().get_template("page.html.j2").render(facts)
@@ -85,16 +89,22 @@ def report_html(folder: Path) -> str:
         ) from error
 
 
-def _on_task(loaded: LoadedTask | None, angles: AngleSet, axes: Array | None) -> dict[str, Any]:
+def _on_task(
+    folder: Path, loaded: LoadedTask | None, angles: AngleSet, axes: Array | None, scanner: list[PlacedBody]
+) -> dict[str, Any]:
     """What cannot be said without the task."""
     if loaded is None:
-        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere"))
+        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said"))
     problem, task = problem_as_built(loaded, angles), loaded.task
+    setting = mounting_rad(angles)
+    found, sphere = answer(problem, angles), density_sphere(problem, angles, axes, task.angles.step_deg)
     return {
         "objective": task.density.objective,
         "ball_deg": task.density.ball_radius_deg,
-        "answer": answer(problem, angles),
-        "sphere": density_sphere(problem, angles, axes, task.angles.step_deg),
+        "answer": found,
+        "sphere": sphere,
+        "room": room_picture(task, folder, problem, setting, sphere, scanner),
+        "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting)),
     }
 
 

@@ -48,6 +48,19 @@
   });
   const axisLine = webgl.shape(gl, new Float32Array([0, 0, -scene.reach, 0, 0, scene.reach]));
 
+  // squares under the scanner, and an arrow ahead on them
+  const grid = (() => {
+    const { z, square, squares } = scene.grid;
+    const side = square * squares;
+    const corners = [];
+    for (let i = -squares; i <= squares; i += 1) corners.push(i * square, -side, z, i * square, side, z, -side, i * square, z, side, i * square, z);
+    const lines = webgl.shape(gl, new Float32Array(corners));
+    const [tip, neck, wide] = [side, side - square, square / 3];
+    const arrow = webgl.shape(gl, new Float32Array([tip, 0, z, neck, wide, z, neck, -wide, z, neck, wide / 4, z, 0, wide / 4, z, 0, -wide / 4, z, neck, wide / 4, z, 0, -wide / 4, z, neck, -wide / 4, z]));
+    return { lines, count: corners.length / 3, arrow, tip: [side + square / 2, 0, z] };
+  })();
+  const ahead = element("ahead");
+
   // one triangle a beam, half a step to either side of it
   const fan = scene.fan && (() => {
     const bearings = new Float32Array(webgl.bytes(scene.fan.bearings).buffer);
@@ -101,8 +114,10 @@
     const radius = scene.fit.radius + share * (scene.fit_apart.radius - scene.fit.radius);
     const distance = webgl.distanceTo(1.05 * radius) / camera.zoom;
     const turn = webgl.product(webgl.product(scene.axis, webgl.aboutZ(degrees * webgl.DEG)), scene.axis_inverse);
-    gl.uniformMatrix4fv(uniform.projection, false, webgl.perspective(aspect, distance / 50, distance + 10 * radius));
-    gl.uniformMatrix4fv(uniform.view, false, webgl.orbit({ ...camera, distance }, centre));
+    const projection = webgl.perspective(aspect, distance / 50, distance + 10 * radius);
+    const view = webgl.orbit({ ...camera, distance }, centre);
+    gl.uniformMatrix4fv(uniform.projection, false, projection);
+    gl.uniformMatrix4fv(uniform.view, false, view);
     gl.uniform1i(uniform.lit, 1);
     gl.vertexAttrib1f(1, 0);
     const drawBody = (body, colour) => {
@@ -115,11 +130,23 @@
     const whole = (body) => !picked || picked.has(body.name);
     for (const body of bodies.filter(whole)) drawBody(body, [...body.colour, 1]);
     gl.uniform1i(uniform.lit, 0);
+    const ink = webgl.ink(canvas);
     gl.uniformMatrix4fv(uniform.model, false, scene.axis);
-    gl.uniform4f(uniform.colour, 0, 0, 0, 1);
+    gl.uniform4f(uniform.colour, ...ink, 1);
     gl.bindVertexArray(axisLine);
     gl.drawArrays(gl.LINES, 0, 2);
     seeThrough();
+    ahead.hidden = share > 0;
+    if (share === 0) {
+      gl.uniformMatrix4fv(uniform.model, false, webgl.aboutZ(0));
+      gl.uniform4f(uniform.colour, ...ink, 0.25);
+      gl.bindVertexArray(grid.lines);
+      gl.drawArrays(gl.LINES, 0, grid.count);
+      gl.uniform4f(uniform.colour, ...ink, 0.8);
+      gl.bindVertexArray(grid.arrow);
+      gl.drawArrays(gl.TRIANGLES, 0, 9);
+      webgl.placed(ahead, webgl.product(projection, view), grid.tip);
+    }
     for (const body of bodies.filter((other) => !whole(other))) drawBody(body, PALE);
     if (fan && fanShown.checked && share === 0 && (!picked || picked.has("lidar_body"))) {
       gl.bindVertexArray(fan.array);

@@ -7,6 +7,7 @@ base64, all in the world frame in metres.
 from __future__ import annotations
 
 from base64 import b64encode
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from scanwright.report.check_pictures import PlacedBody
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
 FULL_TURN_DEG = (0.0, 360.0)
 A_TURN_S = 10.0  # shown where the motion is not known
+SQUARE_M = 0.05  # of the grid that the scanner stands over
 FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
 FRAMES = ("rot", "laser")
@@ -76,6 +78,7 @@ def scanner_scene(
         )
     T_world_rot, T_world_laser = _pose(assembly, "rot"), _pose(assembly, "laser")
     reach = FAN_REACH * _fit(together)["radius"]
+    grid = _grid(np.concatenate(together))
     if own_body is not None:  # the fan comes round everywhere within its reach of the axis
         together.append(T_world_laser[:3, 3] + reach * np.concatenate([np.eye(3), -np.eye(3)]))
     return {
@@ -83,6 +86,7 @@ def scanner_scene(
         "fit": _fit(together),
         "fit_apart": _fit(spread),
         "explodes": exploded is not None,
+        "grid": grid,
         "axis": _column_by_column(T_world_rot),
         "axis_inverse": _column_by_column(np.linalg.inv(T_world_rot)),
         "reach": round(reach, 6),
@@ -100,8 +104,15 @@ def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
     bodies = {}
     for node in sorted(assembly.graph.nodes_geometry):
         mesh = assembly.geometry[assembly.graph.get(node)[1]]
-        bodies[node] = PlacedBody(apply(_pose(assembly, node), mesh.vertices)[mesh.faces], node in turning)
+        triangles = apply(_pose(assembly, node), mesh.vertices)[mesh.faces]
+        bodies[node] = PlacedBody(triangles, node in turning, tuple(_srgb(mesh.visual.material.baseColorFactor)))
     return bodies
+
+
+def about_centre(assembly: Any, angles: AngleSet) -> list[PlacedBody]:
+    """The same bodies, from the optical centre."""
+    centre_m = angles.T_world_rot(0.0)[:3, 3]
+    return [replace(body, triangles_m=body.triangles_m - centre_m) for body in placed_bodies(assembly).values()]
 
 
 def _pose(scene: Any, node: str) -> Array:
@@ -115,6 +126,16 @@ def _fan(shadow: Shadow, bearings_rad: Array) -> dict[str, Any]:
     hidden = stator | shadow.beams[:, None]
     rows = {str(beam): _packed(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
     return {"bearings": _packed(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
+
+
+def _grid(points: Array) -> dict[str, Any]:
+    """Squares below all points, whole ones about the z axis of the world, and how many there are to each side."""
+    reach = float(np.abs(points[:, :2]).max())
+    return {
+        "z": round(float(points[:, 2].min()), 6),
+        "square": SQUARE_M,
+        "squares": int(np.ceil(reach / SQUARE_M)) + 1,
+    }
 
 
 def _fit(points: list[Array]) -> dict[str, Any]:

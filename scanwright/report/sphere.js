@@ -15,6 +15,7 @@
     in vec3 direction;
     uniform sampler2D picture;
     uniform bool lines;
+    uniform vec3 ink;
     out vec4 shown;
     const float PI = 3.14159265;
     float near_line(float degrees, float wide) {
@@ -22,7 +23,7 @@
     }
     void main() {
       if (lines) {
-        shown = vec4(0.0, 0.0, 0.0, 1.0);
+        shown = vec4(ink, 1.0);
         return;
       }
       vec3 n = normalize(direction);
@@ -31,7 +32,7 @@
       vec4 own = texture(picture, vec2(phi / (2.0 * PI) + 0.5, theta / PI));
       float grid = max(near_line(degrees(theta), 0.2), near_line(degrees(phi), 0.2 / max(sin(theta), 0.02)));
       shown = vec4(mix(own.rgb, vec3(0.0), 0.25 * grid), 1.0);
-    }`, ["view", "projection", "picture", "lines"]);
+    }`, ["view", "projection", "picture", "lines", "ink"]);
   if (!uniform) return;
   const scene = JSON.parse(element("sphere").textContent);
   const AXIS_REACH = 1.35;
@@ -64,12 +65,10 @@
   // words where their directions are, as long as the ball does not stand before them
   const place = (both) => {
     for (const { mark, place: [x, y, z] } of marks) {
-      const [cx, cy, , w] = [0, 1, 2, 3].map((i) => both[i] * x + both[4 + i] * y + both[8 + i] * z + both[12 + i]);
       const front = x * Math.cos(camera.yaw) * Math.cos(camera.pitch) + y * Math.sin(camera.yaw) * Math.cos(camera.pitch) + z * Math.sin(camera.pitch);
       const beside = Math.hypot(x, y, z) ** 2 - front ** 2 > 1.12;
       mark.hidden = front < 0 && !beside;
-      mark.style.left = `${(50 * (cx / w + 1)).toFixed(2)}%`;
-      mark.style.top = `${(50 * (1 - cy / w)).toFixed(2)}%`;
+      webgl.placed(mark, both, [x, y, z]);
     }
   };
   const redraw = webgl.onceAFrame(() => {
@@ -84,6 +83,7 @@
     gl.bindVertexArray(ball.array);
     gl.drawElements(gl.TRIANGLES, ball.count, gl.UNSIGNED_SHORT, 0);
     gl.uniform1i(uniform.lines, 1);
+    gl.uniform3f(uniform.ink, ...webgl.ink(canvas));
     gl.bindVertexArray(axisLine);
     gl.drawArrays(gl.LINES, 0, 2);
     place(webgl.product(projection, view));

@@ -24,6 +24,13 @@ const webgl = (() => {
     return [0, 1, 2].flatMap((i) => [right[i], up[i], back[i], 0]).concat(along(right), along(up), along(back) - distance, 1);
   };
 
+  // puts a word where a point of the world is, by view and projection in one
+  const placed = (mark, both, [x, y, z]) => {
+    const [cx, cy, , w] = [0, 1, 2, 3].map((i) => both[i] * x + both[4 + i] * y + both[8 + i] * z + both[12 + i]);
+    mark.style.left = `${(50 * (cx / w + 1)).toFixed(2)}%`;
+    mark.style.top = `${(50 * (1 - cy / w)).toFixed(2)}%`;
+  };
+
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
   // kept after drawing, or it would be printed empty; opaque, or the page would shine through what is half transparent
@@ -59,6 +66,10 @@ const webgl = (() => {
     if (indices) filled(gl, gl.ELEMENT_ARRAY_BUFFER, indices);
     return array;
   };
+  // what a page's style says that is behind the picture, which may be dark
+  const ground = (canvas) => getComputedStyle(canvas).backgroundColor.match(/\d+/g).slice(0, 3).map((part) => part / 255);
+  const ink = (canvas) => getComputedStyle(canvas).color.match(/\d+/g).slice(0, 3).map((part) => part / 255);
+
   // an empty picture as large as the canvas is shown, and its width over its height
   const cleared = (gl) => {
     const canvas = gl.canvas;
@@ -69,7 +80,7 @@ const webgl = (() => {
       canvas.height = height;
     }
     gl.viewport(0, 0, width, height);
-    gl.clearColor(1, 1, 1, 1);
+    gl.clearColor(...ground(canvas), 1);
     gl.depthMask(true); // before clearing: a depth that is not written is not cleared either
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
@@ -142,8 +153,11 @@ const webgl = (() => {
       keys[event.key]();
     });
     new ResizeObserver(redraw).observe(canvas);
+    for (const query of ["(prefers-color-scheme: dark)", "print"]) {
+      window.matchMedia(query).addEventListener("change", redraw);
+    }
     return { zoomBy };
   };
 
-  return { DEG, product, between, aboutZ, distanceTo, perspective, orbit, bytes, started, program, filled, shape, cleared, onceAFrame, moved };
+  return { DEG, product, between, aboutZ, distanceTo, perspective, orbit, placed, bytes, started, program, filled, shape, ink, cleared, onceAFrame, moved };
 })();

@@ -1,0 +1,59 @@
+"""The sentences that a report begins with."""
+
+from dataclasses import replace
+
+import pytest
+
+from design.angles import Angles, AngleSet
+from design.evaluation.metres import on_planes
+from design.motion import StopAndGo, Sweep
+from design.task.task import load_task
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
+from scanwright.report.sentences import sentences, turns
+
+ANGLES = AngleSet(
+    task="ground_ahead",
+    angles_deg=Angles(alpha_rot=0, beta_rot=90, alpha_laser=0, beta_laser=-90),
+    sensor="UTM-30LX",
+    servo="MX-64R",
+    motion={"mode": "spin", "period_s": 18.0},
+    J=-5.0,
+    J_error=1e-3,
+)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return answer(problem_as_built(load_task("ground_ahead"), ANGLES), ANGLES)
+
+
+def test_what_it_is_what_it_sees_and_what_that_is_worth(found):
+    is_, sees, worth = sentences(ANGLES, found, 0.07, ())
+    assert is_.endswith("once around in 18 s, measures 778,320 points: 720 lines of 1,081.")
+    assert sees.startswith("Wherever it counts, a disc 21 cm wide, 3 m away") and f"gets {found.own.least}" in sees
+    factor, name = min((each.factor, each.name) for each in found.standard)
+    assert f"{factor:.2f} times as many as with {name}, the better" in worth
+
+
+def test_a_hole_is_told_instead_of_a_count_and_nothing_is_compared_that_has_no_ratio(found):
+    standard = tuple(replace(each, factor=None) for each in found.standard)
+    said = sentences(ANGLES, replace(found, holes=("blind ahead", "blind behind"), standard=standard), 0.07, ())
+    assert said[1:] == ["It is blind ahead; and blind behind."]
+
+
+def test_planes_are_told_in_metres(found):
+    ground = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height_m": 0.4}
+    told = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
+    loaded = load_task(told | {"motion": {"period_s": 18.0}, "weight": [ground]})
+    planes = on_planes(loaded, problem_as_built(loaded, ANGLES), mounting_rad(ANGLES))
+    said = sentences(ANGLES, found, 0.07, planes)
+    assert said[1].startswith("Ground 0.5 to 3 m ahead: ") and "points per m2" in said[1]
+    assert said[2] == "No direction that counts is left out."
+
+
+def test_every_motion_has_its_words():
+    assert turns(None) == "in a motion that the angle set does not tell"
+    assert turns(Sweep(mode="sweep", period_s=12, limits_deg=(-90, 80), accel_deg_s2=200)) == (
+        "from -90 to 80 deg and back in 12 s"
+    )
+    assert turns(StopAndGo(mode="stop_and_go", stops=36, dwell_s=0.5)) == "to 36 stops of 0.5 s each"
