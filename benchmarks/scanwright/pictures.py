@@ -32,7 +32,7 @@ def main() -> None:
     build = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ground_ahead")
     found = sw.load_angles(build / "angles.json").angles_deg
     mounting = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
-    settings = {"rolling, a usual mount": ROLLING, "the angles that were found": mounting}
+    settings = {"the angles that were found": mounting, "rolling, a usual mount": ROLLING}
     sw.draw_density("ground_ahead", settings).savefig(HERE / "density.png", dpi=80, metadata={"Software": None})
     parts(build / "exploded.glb", HERE / "parts.png")
     emulated_room(sw.load_angles(build / "angles.json"), HERE / "cloud.png")

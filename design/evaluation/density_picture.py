@@ -6,16 +6,22 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from numpy import ndarray
 
-from design.arrays import Setting
+from design.arrays import Array, Setting
 from design.evaluation.coverage import mean_density_at
 from design.objective.problem import Problem
 
 STEP_DEG = 0.5
 INK = "#111111"
+SEEN = 1e-9  # mean beams in a ball
+EXTENT = (-180, 180, 180, 0)
+LEAST_FACTOR, MOST_FACTOR = 2.0, 10.0  # at the ends of the colours of a ratio
+ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
 def density_picture(path: Path, problem: Problem, settings: Mapping[str, Setting], title: str) -> None:
@@ -24,7 +30,9 @@ def density_picture(path: Path, problem: Problem, settings: Mapping[str, Setting
 
 
 def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str) -> Figure:
-    """Density maps one above the other on one colour scale.
+    """Density maps one above the other on one colour scale; of two or more, the first one over the second below them.
+
+    Densities span decades, so that a gain of a half is a shade that nobody sees: the ratio shows where it is.
 
     Args:
         problem: the task as numbers.
@@ -41,27 +49,61 @@ def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str
     highest = max(float(m.max()) for m in maps.values())
     norm = LogNorm(vmin=max(1.0, highest / 300), vmax=highest, clip=True)
 
-    figure = Figure(figsize=(8, 0.9 + 3.1 * len(maps)), layout="constrained")
-    axes: list[Axes] = list(np.atleast_1d(figure.subplots(len(maps), 1, sharex=True)))
+    with_ratio = len(maps) > 1
+    figure = Figure(figsize=(8, 0.9 + 3.1 * (len(maps) + with_ratio)), layout="constrained")
+    axes: list[Axes] = list(np.atleast_1d(figure.subplots(len(maps) + with_ratio, 1, sharex=True)))
     image = None
-    for axis, (name, density) in zip(axes, maps.items(), strict=True):
-        axis.set_facecolor("white")
-        shown = np.ma.masked_less(density, 1e-9)
-        image = axis.imshow(shown, norm=norm, cmap="cividis", extent=(-180, 180, 180, 0), aspect="auto")
-        if np.ptp(weight) > 0:
-            levels = np.unique(weight)
-            axis.contour(phi, theta, weight, levels=(levels[:-1] + levels[1:]) / 2, colors="white", linewidths=2.4)
-            axis.contour(phi, theta, weight, levels=(levels[:-1] + levels[1:]) / 2, colors=INK, linewidths=1.1)
-        if masked.any():
-            axis.contourf(phi, theta, masked, levels=[0.5, 1.5], colors=["#dddddd"], alpha=0.75)
-            axis.contourf(phi, theta, masked, levels=[0.5, 1.5], colors="none", hatches=["///"])
+    for axis, (name, density) in zip(axes, maps.items(), strict=False):
+        shown = np.ma.masked_less(density, SEEN)
+        image = axis.imshow(shown, norm=norm, cmap="cividis", extent=EXTENT, aspect="auto")
+        _frame(axis, phi, theta, weight, masked)
         axis.set_title(name, fontsize=10, loc="left")
-        axis.set_ylabel("theta [deg]\n(0 is up)")
-        axis.set_yticks(range(0, 181, 45))
+    ball = np.degrees(problem.ball_rad)
+    if image is not None:
+        label = f"mean beams within {ball:g} deg (white: never seen)"
+        figure.colorbar(image, ax=axes[: len(maps)], label=label, shrink=0.9)
+    if with_ratio:
+        (first, own), (second, other), *_ = maps.items()
+        _ratio(axes[-1], own, other, weight * ~masked)
+        _frame(axes[-1], phi, theta, weight, masked)
+        axes[-1].set_facecolor("#bbbbbb")
+        axes[-1].set_title(f"{_short(first)} over {_short(second)}: how many times the beams", fontsize=10, loc="left")
     axes[-1].set_xlabel("phi [deg] (0 is ahead, 90 is left)")
     axes[-1].set_xticks(range(-180, 181, 45))
-    if image is not None:
-        ball = np.degrees(problem.ball_rad)
-        figure.colorbar(image, ax=axes, label=f"mean beams within {ball:g} deg (white: never seen)", shrink=0.9)
     figure.suptitle(title, fontsize=11)
     return figure
+
+
+def _short(title: str) -> str:
+    """What stands before the colon of a map's title."""
+    return title.split(":")[0]
+
+
+def _ratio(axis: Axes, own: Array, other: Array, weight: Array) -> None:
+    """One density over another where both see; colours reach as far as the ratio does where it counts."""
+    both = (own > SEEN) & (other > SEEN)
+    ratio = np.ma.masked_where(~both, np.divide(own, other, out=np.ones_like(own), where=both))
+    counts = both & (weight > 0)
+    widest = np.exp(np.percentile(abs(np.log(ratio.data[counts])), 95)) if counts.any() else LEAST_FACTOR
+    limit = float(np.clip(widest, LEAST_FACTOR, MOST_FACTOR))
+    norm = LogNorm(1 / limit, limit, clip=True)
+    image = axis.imshow(ratio, norm=norm, cmap="PuOr_r", extent=EXTENT, aspect="auto")
+    bar = axis.figure.colorbar(image, ax=axis, label="orange: more, purple: fewer\n(grey: one of them sees nothing)")
+    ticks = [factor for factor in ROUND if factor <= limit]
+    bar.set_ticks([*(1 / factor for factor in ticks[:0:-1]), *ticks])
+    bar.set_ticklabels([*(f"1/{factor:g}" for factor in ticks[:0:-1]), *(f"{factor:g}" for factor in ticks)])
+    bar.minorticks_off()
+
+
+def _frame(axis: Axes, phi: Array, theta: Array, weight: Array, masked: Bool[ndarray, "rows columns"]) -> None:
+    """What counts, what is hidden, and the angles."""
+    axis.set_facecolor("white")
+    if np.ptp(weight) > 0:
+        levels = np.unique(weight)
+        axis.contour(phi, theta, weight, levels=(levels[:-1] + levels[1:]) / 2, colors="white", linewidths=2.4)
+        axis.contour(phi, theta, weight, levels=(levels[:-1] + levels[1:]) / 2, colors=INK, linewidths=1.1)
+    if masked.any():
+        axis.contourf(phi, theta, masked, levels=[0.5, 1.5], colors=["#dddddd"], alpha=0.75)
+        axis.contourf(phi, theta, masked, levels=[0.5, 1.5], colors="none", hatches=["///"])
+    axis.set_ylabel("theta [deg]\n(0 is up)")
+    axis.set_yticks(range(0, 181, 45))
