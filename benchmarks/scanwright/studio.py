@@ -90,7 +90,7 @@ def main() -> None:
 def moves(task: Path, count: int) -> None:
     """From slider to picture, for a hand that moves and never rests."""
     loaded = load_task(task)
-    with guarded_server() as (server, gate):
+    with guarded_server("a page") as (server, gate):
         studio = Studio(server, loaded, Path.cwd(), Path.cwd() / "out")
         put(studio.controls.scanner, False)
         compute = []
@@ -136,7 +136,7 @@ def rebuild(task: Path, count: int) -> None:
     took: dict[str, list[float]] = {"turning": [], "standing": []}
     work: dict[str, list[float]] = {"turning": [], "standing": []}
     refused = 0
-    with guarded_server() as (server, gate):
+    with guarded_server("a page") as (server, gate):
         studio = Studio(server, loaded, Path.cwd(), Path.cwd() / "out")
         with visitor(gate) as socket:
             told: SimpleQueue[tuple[float, str]] = SimpleQueue()
@@ -222,8 +222,8 @@ def live(seconds: float, rate_hz: float) -> None:
     )
     receiving, sending = multiprocessing.Pipe(duplex=False)
     finished: list[float] = []
-    with guarded_server() as (server, gate):
-        view = CloudView(server, "bench")
+    with guarded_server("a page") as (server, gate):
+        view = CloudView(server)
 
         def watch() -> None:
             for more in growing(receiving, Placing(angles, None)):

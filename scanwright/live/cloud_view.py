@@ -32,7 +32,7 @@ class _Chunk:
 class CloudView:
     """The page of one scan."""
 
-    def __init__(self, server: viser.ViserServer, title: str) -> None:
+    def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
@@ -41,7 +41,6 @@ class CloudView:
         server.initial_camera.position = (-4.0, -3.0, 3.0)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.scene.add_frame("/scanner", axes_length=0.3, axes_radius=0.01)
-        server.gui.add_html(note_html(title))
         self.facts = server.gui.add_html("")
         self._line = server.gui.add_html(note_html("waiting for the first scan"))
         self.by = server.gui.add_dropdown("colour by", COLOUR_BY, initial_value="height")

@@ -43,8 +43,8 @@ def _show(receiving: Connection, folder: Path) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     placing = Placing(in_use.angles, own_body_beside(in_use.path))
-    with guarded_server() as (server, gate):
-        view = CloudView(server, f"scan of {folder.name}")
+    with guarded_server(f"Scanwright: scan of {folder.name}") as (server, gate):
+        view = CloudView(server)
         print(f"open {gate.address}", flush=True)
         for growth in growing(receiving, placing):
             view.add(growth)

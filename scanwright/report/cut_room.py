@@ -34,6 +34,13 @@ class Room:
         choose = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T
         return np.where(choose == 1, self.high, self.low)
 
+    def walls_along(self, directions: Float[ndarray, "*k 3"]) -> Float[ndarray, "*k 3"]:
+        """Where rays from the optical centre meet its walls, shape (..., 3)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along_m = np.where(directions > 0, self.high, self.low) / directions
+        away_m = np.where(directions == 0, np.inf, along_m).min(axis=-1, keepdims=True)
+        return np.asarray(away_m * directions)
+
 
 @dataclass(frozen=True, slots=True)
 class Camera:

@@ -16,10 +16,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import secrets
 import socket
 from collections import Counter
 from collections.abc import Callable
+from html import escape
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
@@ -39,6 +41,13 @@ SAID = "ViewerCameraMessage", "GuiUpdateMessage", "SceneNodeClickMessage", "Scen
 KNOWN: dict[str, Any] = {kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in SAID}
 """What a page may say; everything else is dropped and counted."""
 
+ICON = (
+    "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 32 32'%3E%3Crect width='32' height='32' "
+    "rx='6' fill='%2300224e'/%3E%3Cpath d='M16 25 6 9a16 16 0 0 1 20 0z' fill='%23fee838'/%3E%3Ccircle cx='16' cy='25' "
+    "r='3' fill='%23fff'/%3E%3C/svg%3E"
+)
+"""A fan of beams, for the tab of the browser."""
+
 Answer = Callable[[ServerConnection, Request], Response | None]
 
 
@@ -46,12 +55,14 @@ class Gate:
     """One page's door.
 
     Attributes:
+        title: of the page.
         token: of its address.
         port: on 127.0.0.1.
         refused: what was turned away, reason -> how often.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, title: str) -> None:
+        self.title = title
         self.token = secrets.token_urlsafe(24)
         self.refused: Counter[str] = Counter()
         self.visitors = 0
@@ -101,13 +112,25 @@ class Gate:
                 text = f"refused: {why}; open the address that scanwright printed\n".encode()
                 headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
                 return Response(status.value, status.phrase, headers, text)
+            if "Accept-Encoding" in request.headers:
+                del request.headers["Accept-Encoding"]  # the page comes whole then, and its title can be put in
             response = answer(connection, request)
             if response is not None:
+                response.body = self._titled(bytes(response.body))
+                del response.headers["Content-Length"]
+                response.headers["Content-Length"] = str(len(response.body))
                 for name, value in self._headers().items():
                     response.headers[name] = value
             return response
 
         return checked
+
+    def _titled(self, page: bytes) -> bytes:
+        """The page with its own name and icon in place of the library's."""
+        head, end, rest = page.partition(b"</title>")
+        head = re.sub(rb"<title>.*", lambda _: f"<title>{escape(self.title)}".encode(), head, flags=re.DOTALL)
+        head = re.sub(rb'href="data:image/svg\+xml,[^"]*"', lambda _: f'href="{ICON}"'.encode(), head)
+        return head + end + rest
 
     def admits(self, data: str | bytes) -> bool:
         """Whether a message is one that the page sends, whole and of the right types."""

@@ -19,15 +19,17 @@ from websockets.asyncio.server import ServerConnection
 
 from scanwright.serving.gate import MOST_BYTES, Answer, Gate
 
+BRAND = (35, 77, 140)
+
 
 @contextmanager
-def guarded_server(port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
-    """A viser server that listens behind a gate while the body runs; `port` 0 is any that is free.
+def guarded_server(title: str, port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
+    """A viser server of a page with a title that listens behind a gate while the body runs; `port` 0 is any free one.
 
     Raises:
         TaskError: the port is taken.
     """
-    gate = Gate(port)
+    gate = Gate(port, title)
     rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
     # viser 1.1 takes a host and a port (`ViserServer`, `viser.infra.WebsockServer`), no socket and no check of its own
     opening = library.serve
@@ -39,7 +41,8 @@ def guarded_server(port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
     if not gate.opened:  # viser serves in another way than it did: never without the gate
         server.stop()
         raise RuntimeError("viser did not open its server through websockets.asyncio.server.serve")
-    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+    server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND)
+    server.gui.set_panel_label(title)
     try:
         yield server, gate
     finally:

@@ -131,7 +131,7 @@ class Studio:
         c.scanner.on_update(self._told(self._show_scanner))
         c.scene.on_update(self._told(self._change_scene))
         for button, act in (
-            (c.optimise, self._optimise),
+            (c.optimise, self.optimise),
             (c.keep, self._keep),
             (c.undo, lambda: self._repaint(self._canvas.dabs[:-1])),
             (c.clear, lambda: self._repaint(())),
@@ -205,6 +205,7 @@ class Studio:
         self._highest = max(highest_density(self.judge.problem, angles) for angles in settings)
         self.controls.scale.content = panel_html.scale_html(self._highest)
         self.view.outline(self.judge.problem)
+        self.view.stand_in(self.judge.loaded.task)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
         count = len(self._canvas.dabs)
         self.controls.painted.content = note_html(f"{count} dabs on the task, {masks} of them hide")
@@ -221,6 +222,9 @@ class Studio:
         sphere.remove_drag_callback()
         if not self.controls.painting.value:
             return
+        if not self.view.on_sphere:
+            put(self.controls.look, "sphere from inside")  # which is what the brush paints on
+            self._look()
 
         @sphere.on_click
         async def _(event: Any) -> None:
@@ -234,6 +238,7 @@ class Studio:
     def _look(self) -> None:
         if self.controls.look.value in SIDES:
             self.view.look(self.controls.look.value)
+            self.judging.wish(self.setting)
 
     # Other processes and long work
 
@@ -254,7 +259,8 @@ class Studio:
             self.view.show_points(np.empty((0, 3)))
         self._order()
 
-    def _optimise(self) -> None:
+    def optimise(self) -> None:
+        """Search all angles of the task beside everything else, and move the sliders to what is found."""
         c, canvas, judge = self.controls, self._canvas, self.judge
         if c.optimise.disabled:
             return
@@ -278,7 +284,8 @@ class Studio:
                 bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
                 self.move(bare)
                 found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
-                holes = "; ".join(optimum.hole_lines())
+                blind = optimum.hole_lines()
+                holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
                 self.say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
                 with second_process() as begin:
                     chosen = begin(setting_built, optimum)()

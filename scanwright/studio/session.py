@@ -29,11 +29,12 @@ def run_studio(
     Raises:
         TaskError: the port is taken, or the task has no region.
     """
-    with guarded_server(port) as (server, gate):
+    with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
         say("reading the task (the first run compiles the numerics: some 20 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
             print(f"open {gate.address}", flush=True)
+            studio.optimise()
             print(f"Ctrl-C ends it; without a visitor it ends by itself after {alone_s / 60:g} minutes", flush=True)
             wait_until_alone(gate, alone_s)
         finally:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import viser
 
@@ -11,6 +11,7 @@ from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
 from scanwright.studio.view.view_3d import SIDES
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
+QUIET: Literal["gray"] = "gray"  # every button but the one that a tab is for
 BRUSHES: tuple[Brush, ...] = get_args(Brush)
 
 
@@ -35,7 +36,7 @@ class Controls:
             )
             self.optimise = gui.add_button("Optimise", hint="Search all angles of the task, and move the sliders there")
             self.progress = gui.add_progress_bar(0.0, visible=False)
-            self.keep = gui.add_button("Keep this setting", hint="Put it into the table under Compare")
+            self.keep = gui.add_button("Keep this setting", hint="Put it into the table under Compare", color=QUIET)
             self.scale = gui.add_html("")
         with tabs.add_tab("Paint"):
             self.painting = gui.add_checkbox(
@@ -44,15 +45,15 @@ class Controls:
             self.brush = gui.add_dropdown("paints", BRUSHES, initial_value=BRUSHES[0])
             self.radius = gui.add_slider("radius [deg]", 1.0, 60.0, 0.5, 12.0)
             self.weight = gui.add_number("weight", 1.0, min=0.01, max=1000.0, step=0.1)
-            self.undo, self.clear = gui.add_button("Undo"), gui.add_button("Clear")
+            self.undo, self.clear = gui.add_button("Undo", color=QUIET), gui.add_button("Clear", color=QUIET)
             self.painted = gui.add_html("")
         with tabs.add_tab("Compare"):
             self.table = gui.add_html("")
             self.kept = gui.add_dropdown("setting", ("rolling", "pitching"), initial_value="rolling")
-            self.restore, self.remove = gui.add_button("Restore"), gui.add_button("Remove")
+            self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
         with tabs.add_tab("View"):
             looks = tuple(SIDES)
-            self.look = gui.add_dropdown("sphere", looks, initial_value=looks[0])
+            self.look = gui.add_dropdown("density", looks, initial_value=looks[0])
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
@@ -61,7 +62,7 @@ class Controls:
                 "fix these angles", initial_value=False, hint="Write the angles in place of ranges"
             )
             self.overwrite = gui.add_checkbox("overwrite", initial_value=False)
-            self.save, self.build = gui.add_button("Save task"), gui.add_button("Save and build")
+            self.save, self.build = gui.add_button("Save task", color=QUIET), gui.add_button("Save and build")
             self.building = gui.add_progress_bar(0.0, visible=False)
             self.built = gui.add_html("")
 

@@ -32,7 +32,7 @@ class Saving:
         path = self._folder / f"{name}.toml"
         if not (path.is_file() and path.read_text(encoding="utf-8") == text):
             save_task(loaded, self._folder, name, fixed, overwrite=c.overwrite.value)
-        c.built.content = note_html(f"saved {path.name}")
+        c.built.content = note_html(f"saved to {path}")
         return path
 
     def build(self, loaded: LoadedTask, setting: Setting) -> None:

@@ -1,4 +1,4 @@
-"""What stands in the middle of the page: the sphere, the scanner in it, its fan, and a scan of a scene."""
+"""What stands in the middle of the page: the sphere or the room, the scanner in it, its fan, and a scan of a scene."""
 
 from __future__ import annotations
 
@@ -11,13 +11,24 @@ import viser.transforms
 from design.arrays import Array
 from design.frames import R_world_rot
 from design.objective.problem import Problem
+from design.task.task import Task
+from scanwright.report.cut_room import Room, room_about
 from scanwright.serving.style import Colours, ramp
 from scanwright.studio.state import Setting
 from scanwright.studio.view.coloured_sphere import RADIUS_M, density_colours, edges, hexagons
+from scanwright.studio.view.room_tiles import room_tiles
 from scanwright.studio.view.scanner_bodies import BodyMesh
 
-Look = Literal["from inside", "from outside", "hidden"]
-SIDES: dict[Look, Literal["front", "back"]] = {"from inside": "back", "from outside": "front", "hidden": "back"}
+Look = Literal["in its room", "sphere from inside", "sphere from outside", "hidden"]
+SIDES: dict[Look, Literal["front", "back"]] = {
+    "in its room": "front",  # of the tiles, which look inwards: the nearer walls are not seen
+    "sphere from inside": "back",
+    "sphere from outside": "front",
+    "hidden": "back",
+}
+AMBIENT, LAMP, LAMP_M = 2.7, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body is as bright as it is at pi
+SPHERE_EYE_M = (-0.75, 0.95, 0.65)
+MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
 WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
 POINT_M = 0.012
@@ -27,20 +38,24 @@ class View3D:
     """The scene of one page."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._scene = server.scene
-        self._looked: Look = "from inside"
+        self._server, self._scene = server, server.scene
+        self._looked: Look = "in its room"
+        self._room: viser.BatchedMeshHandle | None = None
+        self._stands_in: Room | None = None
+        self._room_eye_m = SPHERE_EYE_M
         self._bodies: dict[bool, list[viser.MeshHandle]] = {True: [], False: []}
-        self._edges: list[viser.LineSegmentsHandle] = []
+        self._edges: tuple[Array, ...] = ()
         self._cloud: viser.PointCloudHandle | None = None
         self.points = 0
         self._scene.configure_default_lights(enabled=False, cast_shadow=False)
-        self._scene.add_light_ambient("/light/all", intensity=2.2)
-        self._scene.add_light_directional("/light/above", intensity=1.2, position=(1.0, 0.6, 2.0), cast_shadow=False)
-        server.initial_camera.position = (-0.75, 0.95, 0.65)
+        self._scene.add_light_ambient("/light/all", intensity=AMBIENT)
+        self._scene.add_light_directional("/light/above", intensity=LAMP, position=LAMP_M, cast_shadow=False)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self._scanner = self._scene.add_frame("/scanner", show_axes=False)
-        self._scene.add_label("/ahead", "ahead", position=(1.12 * RADIUS_M, 0.0, 0.0))
-        self._scene.add_label("/left", "left", position=(0.0, 1.12 * RADIUS_M, 0.0))
+        self._marks = {
+            (1.0, 0.0, 0.0): self._scene.add_label("/ahead", "ahead"),
+            (0.0, 1.0, 0.0): self._scene.add_label("/left", "left"),
+        }
         self.tiles = hexagons()
         self.sphere = self._scene.add_batched_meshes_simple(
             "/sphere",
@@ -53,26 +68,63 @@ class View3D:
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
+            visible=self.on_sphere,
         )
 
     @property
     def inside(self) -> bool:
         """Whether the far wall is seen, from within."""
-        return self._looked != "from outside"
+        return self._looked != "sphere from outside"
 
     def look(self, looked: Look) -> None:
-        """Show the far half of the sphere with the scanner before it, the near half, or none."""
+        """Show the far half of the sphere with the scanner before it, the near half, the room instead, or nothing."""
+        in_room = (self._looked == "in its room") != (looked == "in its room")
         self._looked = looked
         self.sphere.side = SIDES[looked]
-        self.sphere.visible = looked != "hidden"
-        for handle in self._edges:
-            handle.visible = looked != "hidden"
-            handle.scale = self._lift()
+        self.sphere.visible = self.on_sphere
+        if self._room is not None:
+            self._room.visible = looked == "in its room"
+        self._draw_edges()
+        if in_room:
+            eye = self._room_eye_m if looked == "in its room" else SPHERE_EYE_M
+            for client in self._server.get_clients().values():
+                client.camera.position, client.camera.look_at = eye, (0.0, 0.0, 0.0)
+
+    def stand_in(self, task: Task) -> None:
+        """Put up the room of a task, in the colour of what has none yet."""
+        room, _ = room_about(task)
+        self._stands_in, self.room = room, room_tiles(room)
+        x, y, z = room.high - room.low
+        self._room_eye_m = (float(-0.8 * x), float(0.8 * y), float(0.5 * (x + z)))
+        self._server.initial_camera.position = self._room_eye_m
+        self._room = self._scene.add_batched_meshes_simple(
+            "/room",
+            self.room.corners_m,
+            self.room.faces,
+            self.room.wxyz,
+            self.room.middles_m,
+            batched_colors=(200, 200, 200),
+            side="front",
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=self._looked == "in its room",
+        )
+        self._draw_edges()
+
+    @property
+    def on_sphere(self) -> bool:
+        """Whether the sphere is shown."""
+        return self._looked in ("sphere from inside", "sphere from outside")
 
     def colour(self, problem: Problem, setting: Setting, highest: float) -> None:
         """Colour the tiles by the density of a setting, and show its axis and fan."""
-        colours = density_colours(problem, setting.angles_rad, self.tiles.directions, highest)
-        self.sphere.batched_colors = _linear(colours)
+        if self._looked == "in its room" and self._room is not None:
+            painted, directions, normals = self._room, self.room.directions, self.room.normals
+        else:
+            painted, directions = self.sphere, self.tiles.directions
+            normals = -directions if self.inside else directions
+        painted.batched_colors = _unlit(density_colours(problem, setting.angles_rad, directions, highest), normals)
         R = R_world_rot(*setting.angles_rad[:2])
         beams = problem.beams_rot(setting.angles_rad[2:]) @ R.T
         rim = 0.98 * RADIUS_M * beams[:: max(1, len(beams) // 90)]
@@ -85,24 +137,31 @@ class View3D:
 
     def outline(self, problem: Problem) -> None:
         """Draw the edges of what matters and of what is hidden."""
-        self._edges = []
-        for name, segments, colour in zip(
-            ("weight", "mask"), edges(problem.field), (WEIGHT_EDGE, MASK_EDGE), strict=True
-        ):
+        self._edges = edges(problem.field)
+        self._draw_edges()
+
+    def _draw_edges(self) -> None:
+        """Where the density is shown; the words too."""
+        for name, segments, colour in zip(("weight", "mask"), self._edges, (WEIGHT_EDGE, MASK_EDGE), strict=False):
             node = f"/edge/{name}"
-            if len(segments):
-                handle = self._scene.add_line_segments(
+            if len(segments) and self._looked != "hidden":
+                self._scene.add_line_segments(
                     node,
-                    (RADIUS_M * segments).astype(np.float32),
+                    self._shown_at(segments).astype(np.float32),
                     colors=colour,
                     thickness=3.0,
                     thickness_units="screen",
-                    scale=self._lift(),
                 )
-                handle.visible = self._looked != "hidden"
-                self._edges.append(handle)
             else:
                 self._scene.remove_by_name(node)
+        for direction, mark in self._marks.items():
+            mark.position = tuple((MARK * self._shown_at(np.array(direction))).tolist())
+
+    def _shown_at(self, directions: Array) -> Array:
+        """Where directions are drawn: just before the walls of the room or the tiles of the sphere, shape (..., 3)."""
+        if self._looked == "in its room" and self._stands_in is not None:
+            return (1 - LIFT) * self._stands_in.walls_along(directions)
+        return RADIUS_M * (1 - LIFT if self.inside else 1 + LIFT) * directions
 
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Put up the half of the scanner that turns, or the one that stands, in place of what stood there."""
@@ -142,11 +201,10 @@ class View3D:
                 precision="float32",
             )
 
-    def _lift(self) -> float:
-        return 1 - LIFT if self.inside else 1 + LIFT
 
-
-def _linear(colours: Colours) -> Colours:
-    """What the page's renderer takes colours of tiles for: linear light, not sRGB."""
+def _unlit(colours: Colours, normals: Array) -> Colours:
+    """Colours of tiles that look alike wherever they face: in linear light, darker where the lamp shines on them."""
     c = colours / 255.0
-    return np.round(255 * np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)).astype(np.uint8)
+    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    lit = AMBIENT + LAMP * np.maximum(0, normals @ np.array(LAMP_M) / np.linalg.norm(LAMP_M))
+    return np.round(255 * linear * AMBIENT / lit[:, None]).astype(np.uint8)

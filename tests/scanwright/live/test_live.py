@@ -102,8 +102,8 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
     monkeypatch.setattr(cloud_view, "CHUNK_POINTS", 500)
     monkeypatch.setattr(cloud_view, "MOST_POINTS", 2000)
     rng = np.random.default_rng(0)
-    with guarded_server() as (server, _):
-        view = CloudView(server, "scan of live")
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server)
         for index in range(30):
             points = rng.normal(0, 1 + index, (100, 3)).astype(np.float32)
             view.add(CloudGrowth(points, np.zeros(100, np.float32), np.full(100, index, np.float32), (), 0))

@@ -30,7 +30,7 @@ CAMERA = {
 
 @pytest.fixture(scope="module")
 def page():
-    with guarded_server() as (server, gate):
+    with guarded_server("a page") as (server, gate):
         server.slider = server.gui.add_slider("angle", -90.0, 90.0, 0.01, 0.0)
         yield server, gate
 
@@ -77,7 +77,8 @@ def moves(server, gate, value):
 def test_the_address_opens_the_page_and_leaves_a_cookie_that_scripts_cannot_read(page):
     _, gate = page
     status, headers, body = get(gate, f"/?token={gate.token}")
-    assert status == 200 and b"<html" in body
+    assert status == 200 and b"<html" in body and int(headers["Content-Length"]) == len(body)
+    assert b"<title>a page</title>" in body and b"Viser</title>" not in body and body.count(b"image/svg+xml") >= 1
     cookie, *rules = headers["Set-Cookie"].split("; ")
     assert {"HttpOnly", "SameSite=Strict"} <= set(rules)
     assert get(gate, "/", Cookie=cookie)[0] == 200
@@ -214,7 +215,10 @@ def test_only_so_many_visitors_get_in(page):
 
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):
-    with pytest.raises(TaskError, match=f"--port {page[1].port}: address already in use"), guarded_server(page[1].port):
+    with (
+        pytest.raises(TaskError, match=f"--port {page[1].port}: address already in use"),
+        guarded_server("a page", page[1].port),
+    ):
         pass
-    with pytest.raises(TaskError, match="--port 70000"), guarded_server(70_000):
+    with pytest.raises(TaskError, match="--port 70000"), guarded_server("a page", 70_000):
         pass

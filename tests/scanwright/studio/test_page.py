@@ -37,7 +37,7 @@ def dots(_scanner, joint_rad, _placed, _folder):
 def opened(folder, text):
     """The studio of a task, without the kernel, as it is started in a folder."""
     (folder / "small.toml").write_text(text)
-    with guarded_server() as (server, gate), pytest.MonkeyPatch.context() as patch:
+    with guarded_server("a page") as (server, gate), pytest.MonkeyPatch.context() as patch:
         patch.setattr(coloured_sphere, "TILES", 300)  # drawn without a graphics card here
         patch.setattr(workers, "make_bodies", box)
         patch.setattr(workers, "preview_scan", dots)
@@ -147,7 +147,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.locator(".mantine-TextInput-input:visible").first.blur()
     until(lambda: studio.controls.name.value == "mine")
     page.get_by_role("button", name="Save task").click()
-    page.get_by_text("saved mine.toml").wait_for()
+    page.get_by_text(f"saved to {folder / 'mine.toml'}").wait_for()
     saved = load_task(folder / "mine.toml")
     assert saved.task.weight == studio.judge.loaded.task.weight
     assert sorted(path.name for path in folder.glob("*.toml")) == ["mine.toml", "small.toml"]
