@@ -43,7 +43,7 @@ class Room:
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
+class Pinhole:
     """A pinhole.
 
     Attributes:
@@ -117,7 +117,7 @@ def room_about(task: Task) -> tuple[Room, str]:
     return Room(low, high), f"The room is {size}, {said}"
 
 
-def camera_behind(room: Room, middle: Vector, looks_up: bool) -> Camera:
+def pinhole_behind(room: Room, middle: Vector, looks_up: bool) -> Pinhole:
     """A camera behind the scanner and beside it, and the window through which it sees the whole room.
 
     Args:
@@ -138,10 +138,10 @@ def camera_behind(room: Room, middle: Vector, looks_up: bool) -> Camera:
     low, high = corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
     pixel = np.sqrt(np.prod(high - low) / PIXELS)
     columns, rows = np.round((high - low) / pixel).astype(int)
-    return Camera(eye, R_world_camera, low, high, (int(rows), int(columns)))
+    return Pinhole(eye, R_world_camera, low, high, (int(rows), int(columns)))
 
 
-def walls_behind(room: Room, camera: Camera, rays: Float[ndarray, "n 3"]) -> Walls:
+def walls_behind(room: Room, camera: Pinhole, rays: Float[ndarray, "n 3"]) -> Walls:
     """Where rays of the camera leave the room."""
     with np.errstate(divide="ignore"):
         ends = (np.where(rays > 0, room.high, room.low) - camera.eye) / rays

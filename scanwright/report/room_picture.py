@@ -27,7 +27,7 @@ from design.scene import ray_caster
 from design.task.shapes import MeshRegion
 from design.task.task import Task
 from scanwright.report.check_pictures import PlacedBody
-from scanwright.report.cut_room import Camera, Room, Walls, camera_behind, room_about, walls_behind
+from scanwright.report.cut_room import Pinhole, Room, Walls, pinhole_behind, room_about, walls_behind
 from scanwright.report.data_uri import png_uri
 from scanwright.report.density_sphere import DensitySphere
 
@@ -84,7 +84,7 @@ def room_picture(
     """
     looks_up = sphere.below < LITTLE
     room, words = room_about(task)
-    camera = camera_behind(room, np.array(sphere.middle), looks_up)
+    camera = pinhole_behind(room, np.array(sphere.middle), looks_up)
     rays = camera.rays()
     picture, low, high = _painted(problem, setting, room, camera, walls_behind(room, camera, rays))
     level_m = room.high[2] if looks_up else room.low[2]  # of the ceiling, where the floor is cut away
@@ -97,7 +97,7 @@ def room_picture(
 
 
 def _painted(
-    problem: Problem, setting: Setting, room: Room, camera: Camera, walls: Walls
+    problem: Problem, setting: Setting, room: Room, camera: Pinhole, walls: Walls
 ) -> tuple[Array, float, float]:
     """Colour of each pixel, shape (rows, columns, 3), NaN beside the room, and the density of darkest and brightest."""
     inside, size = walls.inside, camera.size
@@ -180,7 +180,7 @@ def _robot(task: Task, folder: Path) -> list[PlacedBody]:
     return robots
 
 
-def _add_bodies(picture: Array, camera: Camera, rays: Array, bodies: Sequence[PlacedBody]) -> None:
+def _add_bodies(picture: Array, camera: Pinhole, rays: Array, bodies: Sequence[PlacedBody]) -> None:
     """Draw bodies over the room, lit from the camera."""
     triangles = np.concatenate([body.triangles_m for body in bodies])
     shares = camera.shares(triangles.reshape(-1, 3))

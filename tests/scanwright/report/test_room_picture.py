@@ -16,7 +16,7 @@ from design.evaluation.coverage import mean_density_at
 from design.objective.problem import problem_of
 from design.task.task import load_task
 from scanwright.report.check_pictures import PlacedBody
-from scanwright.report.cut_room import Room, camera_behind, room_about, walls_behind
+from scanwright.report.cut_room import Room, pinhole_behind, room_about, walls_behind
 from scanwright.report.density_sphere import DensitySphere, density_sphere
 from scanwright.report.room_picture import room_picture
 
@@ -43,7 +43,7 @@ def drawn():
         problem,
         room,
         np.asarray(image, dtype=float),
-        camera_behind(room_about(loaded.task)[0], AHEAD_AND_DOWN, False),
+        pinhole_behind(room_about(loaded.task)[0], AHEAD_AND_DOWN, False),
     )
 
 
@@ -94,7 +94,7 @@ def test_the_room_is_that_of_the_task():
 )
 def test_every_corner_is_on_the_picture_and_rays_end_on_walls(sizes, middle, looks_up):
     room = Room(-np.array(sizes[:3]), np.array(sizes[3:]))
-    camera = camera_behind(room, np.array(middle), looks_up)
+    camera = pinhole_behind(room, np.array(middle), looks_up)
     assert camera.eye[2] < room.low[2] if looks_up else camera.eye[2] > room.high[2]
     shares = camera.shares(room.corners())
     assert (shares > 0).all() and (shares < 1).all()
@@ -128,7 +128,7 @@ def test_a_robot_is_drawn_where_its_mesh_is(tmp_path):
     loaded = task(mask=[mask])
     room = room_picture(loaded.task, tmp_path, problem_of(loaded), SETTING, SPHERE, [])
     image = Image.open(io.BytesIO(b64decode(room.picture.split(",")[1]))).convert("RGB")
-    camera = camera_behind(room_about(loaded.task)[0], AHEAD_AND_DOWN, False)
+    camera = pinhole_behind(room_about(loaded.task)[0], AHEAD_AND_DOWN, False)
     left, top = camera.shares(np.array([[-0.35, 0.1, -0.2]]))[0]  # on its back
     grey = np.array(image.getpixel((int(left * image.width), int(top * image.height))), dtype=float)
     assert np.ptp(grey) < 8 and 50 < grey[0] < 160
