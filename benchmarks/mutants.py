@@ -38,7 +38,7 @@ MODULES = {
     "encoder": ("firmware_io/assembly/axis_curve.py", "tests/firmware_io/assembly/test_axis_curve.py"),
     "clock": ("firmware_io/lidar/scip/device_clock.py", "tests/firmware_io/lidar/test_device_clock.py"),
     "registers": (
-        "firmware_io/servo/dynamixel/registers.py",
+        "firmware_io/servo/bus/registers.py",
         "tests/firmware_io/servo/test_registers.py tests/firmware_io/servo/test_servo.py",
     ),
     "scip": (

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from firmware_io.recording.recording import Recording
     from firmware_io.registration.register_files import RegisteredFiles
     from firmware_io.scan.acquire import ScanSummary
-    from firmware_io.servo.dynamixel.driver import DynamixelServo
+    from firmware_io.servo.servo import ServoDriver
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A loaded task, the name of a shipped one, a file, or a table with the keys of a task file."""
@@ -215,7 +215,7 @@ def check(folder: str | Path, *, say: Say = _quiet) -> list[Check]:
     return check_scanner(scanner, say)
 
 
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> DynamixelServo:
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:
     """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
 
     Args:
@@ -226,7 +226,7 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     Raises:
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
-    from firmware_io.servo.dynamixel.driver import open_servo
+    from firmware_io.servo.servo import open_servo
 
     return open_servo(port, model, servo_id)
 

@@ -166,7 +166,7 @@ def outside(out: Path, twins: EmulatedScanner, number: int | None) -> Outcome:
 
 def trial(name: str, seed: int) -> Outcome:
     """One run of one fault with a fresh scanner."""
-    protocol = 2.0 if "2.0" in name else 1.0
+    protocol = "2.0" if "2.0" in name else "1.0"
     with (
         tempfile.TemporaryDirectory() as folder,
         emulated_scanner(ANGLES, room(None), protocol=protocol, seed=seed) as twins,

@@ -14,10 +14,11 @@ from unittest.mock import patch
 
 from design.errors import DeviceError, ProtocolError
 from firmware_io.lidar.scip import parameters, protocol
-from firmware_io.servo.dynamixel import bus, serial_line
-from firmware_io.servo.dynamixel.bus import ServoBus
-from firmware_io.servo.dynamixel.registers import Register
-from firmware_io.twins.servo_packets import status
+from firmware_io.servo.bus import bus, serial_line
+from firmware_io.servo.bus.bus import ServoBus
+from firmware_io.servo.bus.registers import Register
+from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
+from firmware_io.twins.servo.dynamixel_packets import status
 
 _SCIP_SCRAPS = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
@@ -138,10 +139,10 @@ def servo(answers: int, seed: int) -> None:
         patch.object(serial_line.SerialLine, "wait_s", 0.0002),
         patch.object(bus, "_TRIES", 1),
     ):
-        buses = {protocol: ServoBus("wire", protocol=protocol) for protocol in (1.0, 2.0)}
+        buses = {packets.protocol: ServoBus("wire", packets) for packets in (PROTOCOL_1, PROTOCOL_2)}
         accepted, slowest_s, began_s = 0, 0.0, time.perf_counter()
         for k in range(answers):
-            protocol = rng.choice((1.0, 2.0))
+            protocol = rng.choice(("1.0", "2.0"))
             data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(_BLOCK.size))
             wire.answer = damaged(rng, status(protocol, 1, 0, data), _SERVO_SCRAPS, 2, 4)
             asked_s = time.perf_counter()

@@ -112,6 +112,8 @@ class Servo(Product):
     position_feedback_deg: float = Field(gt=0, le=360)
     mass_g: float = Field(gt=0)
     price_usd: float | None = Field(default=None, gt=0)
+    supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
+    rated_v: float = Field(default=12.0, gt=0, exclude=True, description="of torque and speed; shapes no part")
     stall_torque_nm: float = Field(gt=0)
     no_load_rpm: float = Field(gt=0)
     radial_load_n: float | None = Field(default=None, gt=0)

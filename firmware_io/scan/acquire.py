@@ -33,7 +33,8 @@ from firmware_io.scan.axis_thread import AxisThread, turning_servo
 from firmware_io.scan.live_feed import NOBODY, Watch
 from firmware_io.scan.plan import ScanPlan
 from firmware_io.scan.recorder import recorder_of
-from firmware_io.servo.dynamixel.driver import ServoState, open_servo
+from firmware_io.servo.progress import ServoState
+from firmware_io.servo.servo import open_servo
 
 Say = Callable[[str], None]
 

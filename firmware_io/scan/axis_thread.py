@@ -22,7 +22,8 @@ from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from design.motion import Motion
 from firmware_io.samples import Scan
 from firmware_io.scan.setpoints import Move, course
-from firmware_io.servo.dynamixel.driver import DynamixelServo, ServoState
+from firmware_io.servo.progress import ServoState
+from firmware_io.servo.servo import ServoDriver
 
 SERVO_HZ = 100.0
 
@@ -125,7 +126,7 @@ class AxisThread:
 
 
 @contextmanager
-def turning_servo(servo: DynamixelServo, motion: Motion) -> Iterator[AxisThread]:
+def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
     """The servo makes its motion, and is asked where it is, while the body runs.
 
     Raises:
@@ -158,7 +159,7 @@ def _join(thread: Thread) -> None:
         raise again
 
 
-def _follow(servo: DynamixelServo, axis: AxisThread, done: Event) -> None:
+def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
     """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
     began_s = due_s = heard_s = time.monotonic()
     moves: Iterator[Move] = iter(())

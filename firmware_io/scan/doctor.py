@@ -8,12 +8,9 @@ seconds, its laser on, and keeps no setting of that. What is to be set is set by
 from __future__ import annotations
 
 import platform
-import time
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import Literal
 
 import numpy as np
@@ -25,13 +22,10 @@ from firmware_io.lidar.scip.driver import new_clock, open_lidar
 from firmware_io.scan.acquire import CLOCK_GOOD_NS, check_model
 from firmware_io.scan.axis_thread import SERVO_HZ
 from firmware_io.serial_port import latency_timer
-from firmware_io.servo.dynamixel import servo_settings
-from firmware_io.servo.dynamixel.bus import ServoBus
-from firmware_io.servo.dynamixel.setup import find_servo, slow_adapter, unfit_settings, value
+from firmware_io.servo import settings
+from firmware_io.servo.examine import examine_servo
 
 _LOOK_S = 4.0
-_LISTEN_S = 0.3
-_SERVO_READS = 100
 _BOUND_MS = 2.0
 
 
@@ -89,12 +83,12 @@ def fix(out: Path | None, servo: str | None, servo_id: int | None) -> Iterator[D
         yield DeviceFinding("wrong", "--fix writes, so it does not guess: name the servo's port with --servo PORT")
         return
     model = None if out is None else load_angles(out / "angles.json").servo
-    yield from _told(servo_settings.fix(port, model, servo_id, Path() if out is None else out))
+    yield from _told(settings.fix(port, model, servo_id, Path() if out is None else out))
 
 
 def restore(file: Path, servo: str | None) -> Iterator[DeviceFinding]:
     """Set a servo back to what `fix` found; `servo` is its port where that has another name now."""
-    yield from _told(servo_settings.restore(file, servo))
+    yield from _told(settings.restore(file, servo))
 
 
 def _told(lines: Iterator[str]) -> Iterator[DeviceFinding]:
@@ -150,40 +144,27 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
 
 
 def _examine_servo(port: str, model: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
-    with closing(ServoBus(port)) as bus:
-        if heard := bus.listen(_LISTEN_S):
-            raise DeviceError(
-                f"{port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
-                "this bus, or something else hangs on this port; nothing was sent to it"
-            )
-        found = find_servo(bus, model, servo_id)
-        table, who = found.table, f"{port}: servo {found.id}"
-        yield DeviceFinding("ok", f"{who} ({table.model}), protocol {table.protocol:.1f} at {bus.baud} baud")
-        first = bus.read(found.id, table.block)
-        if first.conditions:
-            code = first.conditions if table.hardware_error is None else value(bus, found.id, table.hardware_error)
-            says = f"{who} reports {table.names(code)}: find out why before it turns again; `scan` resets it"
-            yield DeviceFinding("warning", says)
-        if value(bus, found.id, table.torque):
-            yield DeviceFinding("warning", f"{who} has its torque on: something has driven it, and it may move")
-        for unfit in unfit_settings(bus, found):
-            yield DeviceFinding("warning", f"{who}: {unfit}: `scanwright doctor --fix --servo {port}` sets it")
-        if timer := slow_adapter(port):
-            yield DeviceFinding("warning", f"{port}: {timer}")
-        bus.return_delay_ns = value(bus, found.id, table.return_delay_ns) * table.return_delay_ns.unit
-        began_s = time.monotonic()
-        answers = [bus.read(found.id, table.block) for _ in range(_SERVO_READS)]
-        rate_hz = _SERVO_READS / (time.monotonic() - began_s)
-    volts, degC = (table.pick(register, answers[-1].data) for register in (table.voltage, table.temperature))
-    yield DeviceFinding("ok", f"{port}: {volts:.1f} V, {degC:.0f} deg C")
+    found = examine_servo(port, model, servo_id)
+    yield DeviceFinding("ok", f"{found.who} ({found.model}), {found.speaks}")
+    if found.reports:
+        says = f"{found.who} reports {found.reports}: find out why before it turns again; `scan` resets it"
+        yield DeviceFinding("warning", says)
+    if found.has_torque:
+        yield DeviceFinding("warning", f"{found.who} has its torque on: something has driven it, and it may move")
+    for unfit in found.unfit:
+        yield DeviceFinding("warning", f"{found.who}: {unfit}: `scanwright doctor --fix --servo {port}` sets it")
+    if found.slow_adapter:
+        yield DeviceFinding("warning", f"{port}: {found.slow_adapter}")
+    yield DeviceFinding("ok", f"{port}: {found.voltage_V:.1f} V, {found.temperature_degC:.0f} deg C")
     remedy = "set the latency timer of the adapter to 1 ms" if latency_timer(port) else "end other programs"
     yield _judged(
-        rate_hz > 1.2 * SERVO_HZ,
-        f"{port}: {rate_hz:.0f} reads/s, {SERVO_HZ:.0f} are needed",
+        found.reads_hz > 1.2 * SERVO_HZ,
+        f"{port}: {found.reads_hz:.0f} reads/s, {SERVO_HZ:.0f} are needed",
         f"{remedy}, and mind the servo's settings above",
     )
-    bound_ms = median(answer.bound_ns for answer in answers) / 1e6
-    yield _judged(bound_ms < _BOUND_MS, f"{port}: the time of an angle is known to {bound_ms:.2f} ms", remedy)
+    yield _judged(
+        found.bound_ms < _BOUND_MS, f"{port}: the time of an angle is known to {found.bound_ms:.2f} ms", remedy
+    )
 
 
 def _judged(good: bool, says: str, remedy: str) -> DeviceFinding:

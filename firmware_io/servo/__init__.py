@@ -1,1 +1,1 @@
-"""Servos: one folder a family, and the guard that takes the torque whatever happens."""
+"""Servos: what everybody asks of one (`servo`), the guard that takes its torque, and one folder a family."""

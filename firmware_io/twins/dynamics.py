@@ -33,10 +33,11 @@ from scipy.integrate import BDF, LSODA, Radau
 from design.arrays import Floats
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
-from firmware_io.servo.dynamixel.registers import RPM
+from firmware_io.servo.bus.registers import RPM
 
 Mode = Literal["off", "share", "velocity", "position"]
 
+_PLASTIC_TEETH = ("AX-12A", "XL330-M288", "XL430-W250")
 _SLOW_RAD_S = 1e-4  # below it Coulomb friction fades, so that it has a slope a solver can follow
 _SOLVERS = {"LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 
@@ -100,14 +101,16 @@ def plant_of(model: str) -> Plant:
     no_load_rad_s, play_deg = servo.no_load_rpm * RPM, servo.backlash_deg
     if play_deg is None:
         play_deg = 0.5 if ax else 0.333  # assumed
+    # Assumed, mechanical time constants: rotors of 0.3 and 1 g cm2, geared 254:1 (AX-12A) and 200:1 (MX-64R).
+    time_constant_s = 0.0082 if ax else 0.0044
     count_rad = math.radians(300 / 1024 if ax else 360 / 4096)
     return Plant(
         stall_torque_nm=servo.stall_torque_nm,
         no_load_rad_s=no_load_rad_s,
-        inertia_kg_m2=2e-3 if ax else 4e-3,  # assumed: rotors of 0.3 and 1 g cm2, geared 254:1 and 200:1
+        inertia_kg_m2=time_constant_s * servo.stall_torque_nm / no_load_rad_s,
         friction_nm=(0.015 if ax else 0.05) * servo.stall_torque_nm,  # assumed
         backlash_rad=math.radians(play_deg),
-        stiffness_nm_rad=100.0 if ax else 300.0,  # assumed: plastic and metal teeth
+        stiffness_nm_rad=100.0 if model in _PLASTIC_TEETH else 300.0,  # assumed
         impact_s_rad=20.0,  # assumed
         sensor_lag_s=0.030 if ax else 0.004,  # assumed: potentiometer with filter, encoder
         velocity_p=0.5 / no_load_rad_s,  # assumed, with the next one: some 20 rad/s of bandwidth

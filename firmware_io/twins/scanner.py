@@ -19,7 +19,7 @@ from design.scene.ray_caster import Scene, build_scene, cast, load_scene
 from firmware_io.device_ports import Ports
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.lidar import LidarTwin
-from firmware_io.twins.servo import ServoTwin
+from firmware_io.twins.servo.twin import ServoTwin
 from firmware_io.twins.world import furnished_room, looking, range_model, rays
 
 
@@ -49,7 +49,7 @@ def emulated_scanner(
     scene: Scene,
     *,
     load: Load | None = None,
-    protocol: float | None = None,
+    protocol: str | None = None,
     sigma_mm: float | None = None,
     seed: int = 0,
 ) -> Iterator[EmulatedScanner]:

@@ -3,7 +3,7 @@
 import pytest
 
 from firmware_io.lidar.scip import driver
-from firmware_io.servo.dynamixel import bus, serial_line
+from firmware_io.servo.bus import bus, serial_line
 
 
 @pytest.fixture(autouse=True)

@@ -33,9 +33,10 @@ from firmware_io.samples import JointLog
 from firmware_io.scan import acquire, axis_thread
 from firmware_io.scan.plan import plan_scan
 from firmware_io.scan.setpoints import course
-from firmware_io.servo.dynamixel.driver import ServoState, open_servo
+from firmware_io.servo.progress import ServoState
+from firmware_io.servo.servo import open_servo
 from firmware_io.twins.scanner import emulated_scanner, room
-from firmware_io.twins.servo import ServoTwin
+from firmware_io.twins.servo.twin import ServoTwin
 
 ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}
@@ -473,7 +474,7 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, twins):
             acquire.acquire(plan, lambda _: None)
 
 
-@pytest.mark.parametrize(("servo", "protocol"), [("MX-64R", 1.0), ("XM430-W350", 2.0)])
+@pytest.mark.parametrize(("servo", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0")])
 def test_a_servo_is_emulated_as_it_comes_from_the_factory(servo, protocol):
     with emulated_scanner(angle_set(servo=servo), room(None)) as twins, open_servo(twins.ports.servo) as opened:
         assert (opened.model, opened.protocol) == (servo, protocol)

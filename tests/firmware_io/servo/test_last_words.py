@@ -13,8 +13,9 @@ from design.motion import Spin
 from firmware_io.scan import acquire, axis_thread
 from firmware_io.scan.axis_thread import turning_servo
 from firmware_io.servo import guard
-from firmware_io.servo.dynamixel.driver import ServoState, open_servo
-from firmware_io.twins.servo import ServoTwin
+from firmware_io.servo.progress import ServoState
+from firmware_io.servo.servo import open_servo
+from firmware_io.twins.servo.twin import ServoTwin
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
 UNHEARD = "could not be stopped: take its power"

@@ -17,13 +17,16 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo import guard
-from firmware_io.servo.dynamixel import bus as servo_bus
-from firmware_io.servo.dynamixel import serial_line
-from firmware_io.servo.dynamixel.bus import ServoBus
-from firmware_io.servo.dynamixel.driver import nearest_turn, open_servo
-from firmware_io.servo.dynamixel.registers import RPM, TABLES, Register
-from firmware_io.servo.dynamixel.setup import find_servo
-from firmware_io.twins.servo_packets import packet_2, status
+from firmware_io.servo.bus import bus as servo_bus
+from firmware_io.servo.bus import serial_line
+from firmware_io.servo.bus.bus import ServoBus
+from firmware_io.servo.bus.registers import RPM, Register
+from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
+from firmware_io.servo.dynamixel.tables import TABLES
+from firmware_io.servo.find import find_servo
+from firmware_io.servo.progress import nearest_turn
+from firmware_io.servo.servo import open_servo
+from firmware_io.twins.servo.dynamixel_packets import packet_2, status
 
 REGISTERS = [
     getattr(table, name) for table in TABLES for name in ("wheel_speed", "joint_speed", "goal", "load", "torque")
@@ -62,7 +65,7 @@ def bus(monkeypatch):
         monkeypatch.setattr(serial_line, "open_serial_port", lambda *_: wire)
         monkeypatch.setattr(serial_line.SerialLine, "wait_s", wait_s)
         monkeypatch.setattr(servo_bus, "_TRIES", tries)
-        return ServoBus("wire", protocol=protocol), wire
+        return ServoBus("wire", {"1.0": PROTOCOL_1, "2.0": PROTOCOL_2}[protocol]), wire
 
     return make
 
@@ -84,7 +87,7 @@ def test_what_does_not_fit_is_refused_and_never_masked(register, beyond, above):
 
 def test_counts_as_the_manual_writes_them():
     by_name = {(table.model, table.protocol): table for table in TABLES}
-    mx_1, mx_2, ax = by_name["MX-64R", 1.0], by_name["MX-64R", 2.0], by_name["AX-12A", 1.0]
+    mx_1, mx_2, ax = by_name["MX-64R", "1.0"], by_name["MX-64R", "2.0"], by_name["AX-12A", "1.0"]
     assert mx_1.wheel_speed.encode(-300 * 0.114 * RPM) == (1024 + 300).to_bytes(2, "little")  # bit 10 is clockwise
     assert mx_2.wheel_speed.encode(-300 * 0.229 * RPM) == (-300).to_bytes(4, "little", signed=True)
     assert ax.load.decode((1024 + 512).to_bytes(2, "little")) == pytest.approx(-0.512)
@@ -112,11 +115,11 @@ def test_turns_are_added_whole_and_to_the_nearest(angle, expected):
 
 # From the e-manual's pages protocol1 and protocol2; the writes from its examples.
 DIALOGUES = [
-    (1.0, "read", Register(43, 1), None, "ff ff 01 04 02 2b 01 cc", "ff ff 01 03 00 20 db"),
-    (1.0, "write", Register(24, 1), b"\1", "ff ff 01 04 03 18 01 de", "ff ff 01 02 00 fc"),
-    (2.0, "read", Register(132, 4), None, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15",
+    ("1.0", "read", Register(43, 1), None, "ff ff 01 04 02 2b 01 cc", "ff ff 01 03 00 20 db"),
+    ("1.0", "write", Register(24, 1), b"\1", "ff ff 01 04 03 18 01 de", "ff ff 01 02 00 fc"),
+    ("2.0", "read", Register(132, 4), None, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15",
      "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
-    (2.0, "write", Register(116, 4), b"\0\2\0\0", "ff ff fd 00 01 09 00 03 74 00 00 02 00 00 ca 89",
+    ("2.0", "write", Register(116, 4), b"\0\2\0\0", "ff ff fd 00 01 09 00 03 74 00 00 02 00 00 ca 89",
      "ff ff fd 00 01 04 00 55 00 a1 0c"),
 ]  # fmt: skip
 
@@ -126,10 +129,10 @@ def test_packets_of_the_manual(bus, protocol, verb, register, data, request_hex,
     line, wire = bus(protocol, lambda _: bytes.fromhex(answer_hex))
     answer = line.read(1, register) if verb == "read" else line.write(1, register, data)
     assert wire.sent == [bytes.fromhex(request_hex)]
-    assert answer.data == bytes.fromhex(answer_hex)[5 if protocol == 1.0 else 9 : -1 if protocol == 1.0 else -2]
+    assert answer.data == bytes.fromhex(answer_hex)[5 if protocol == "1.0" else 9 : -1 if protocol == "1.0" else -2]
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_an_answer_that_waits_for_a_late_host_counts(bus, protocol):
     """The deadline passes while this process is kept from running; the bytes have long been there."""
     line, _ = bus(protocol, lambda _: status(protocol, 1, 0, b"\x2a\x07"), wait_s=-1.0)
@@ -137,17 +140,17 @@ def test_an_answer_that_waits_for_a_late_host_counts(bus, protocol):
 
 
 def test_requests_are_stuffed_which_the_sdk_forgets(bus):
-    line, wire = bus(2.0, lambda _: status(2.0, 1, 0, b""))
+    line, wire = bus("2.0", lambda _: status("2.0", 1, 0, b""))
     line.write(1, Register(116, 4), bytes.fromhex("ff ff fd 00"))
     assert wire.sent[-1][:-2].hex(" ") == "ff ff fd 00 01 0a 00 03 74 00 ff ff fd fd 00"
     assert wire.sent[-1] == packet_2(1, 3, bytes.fromhex("74 00 ff ff fd 00"))
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_every_answer_is_read_as_it_was_sent(bus, protocol):
     """Also those of headers and stuffing only, where the SDK loses bytes: ff ff fd ff fd fd."""
     line, wire = bus(protocol, lambda _: b"")
-    rng = random.Random(int(protocol))
+    rng = random.Random(int(protocol[0]))
     for data in [bytes.fromhex("ff ff fd ff fd fd"), *(bytes(rng.choices(b"\xff\xfd\x00", k=9)) for _ in range(500))]:
         wire.reply = lambda _, data=data: status(protocol, 1, 0, data)
         assert line.read(1, Register(36, len(data))).data == data
@@ -156,19 +159,19 @@ def test_every_answer_is_read_as_it_was_sent(bus, protocol):
 @pytest.mark.parametrize(
     ("protocol", "reply", "kind", "words"),
     [
-        (1.0, b"", DeviceTimeoutError, "no answer"),
-        (2.0, b"", DeviceTimeoutError, "no answer"),
-        (1.0, status(1.0, 1, 0, b"")[:-1], ProtocolError, "damaged"),
-        (1.0, status(1.0, 1, 0, b""), ProtocolError, "0 bytes where 2"),  # the SDK: IndexError
-        (2.0, status(2.0, 1, 0, b""), ProtocolError, "0 bytes where 2"),
-        (1.0, status(1.0, 1, 8, b""), DeviceError, "out of range"),
-        (2.0, status(2.0, 1, 7, b""), DeviceError, "cannot be accessed"),
-        (1.0, status(1.0, 1, 16, b""), ProtocolError, "request arrived damaged"),
-        (2.0, status(2.0, 1, 3, b""), ProtocolError, "request arrived damaged"),
-        (1.0, status(1.0, 1, 0, b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
-        (2.0, status(2.0, 1, 0, b"\1\2\3"), ProtocolError, "3 bytes where 2"),  # the SDK cuts it silently
-        (1.0, status(1.0, 7, 0, b"\1\2"), DeviceTimeoutError, "no answer"),  # another servo's
-        (1.0, b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged|wrong length"),
+        ("1.0", b"", DeviceTimeoutError, "no answer"),
+        ("2.0", b"", DeviceTimeoutError, "no answer"),
+        ("1.0", status("1.0", 1, 0, b"")[:-1], ProtocolError, "damaged"),
+        ("1.0", status("1.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),  # the SDK: IndexError
+        ("2.0", status("2.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),
+        ("1.0", status("1.0", 1, 8, b""), DeviceError, "out of range"),
+        ("2.0", status("2.0", 1, 7, b""), DeviceError, "cannot be accessed"),
+        ("1.0", status("1.0", 1, 16, b""), ProtocolError, "request arrived damaged"),
+        ("2.0", status("2.0", 1, 3, b""), ProtocolError, "request arrived damaged"),
+        ("1.0", status("1.0", 1, 0, b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
+        ("2.0", status("2.0", 1, 0, b"\1\2\3"), ProtocolError, "3 bytes where 2"),  # the SDK cuts it silently
+        ("1.0", status("1.0", 7, 0, b"\1\2"), DeviceTimeoutError, "no answer"),  # another servo's
+        ("1.0", b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged|wrong length"),
     ],
 )
 def test_every_bad_answer_is_a_typed_error(bus, protocol, reply, kind, words):
@@ -180,16 +183,16 @@ def test_every_bad_answer_is_a_typed_error(bus, protocol, reply, kind, words):
 
 
 def test_a_damaged_answer_is_asked_again(bus):
-    replies = iter([b"", status(1.0, 1, 0, b"\1\2")[:-1] + b"\0", status(1.0, 1, 0, b"\1\2")])
-    line, wire = bus(1.0, lambda _: next(replies), tries=3)
+    replies = iter([b"", status("1.0", 1, 0, b"\1\2")[:-1] + b"\0", status("1.0", 1, 0, b"\1\2")])
+    line, wire = bus("1.0", lambda _: next(replies), tries=3)
     assert line.read(1, Register(36, 2)).data == b"\1\2"
     assert len(wire.sent) == 3
 
 
 def test_late_answers_to_orders_are_not_taken_for_those_to_questions(bus):
     """Three orders were given twice on a busy computer: their answers come one by one, each after the next request."""
-    late = [status(1.0, 1, 0, b"")] * 3
-    line, wire = bus(1.0, lambda _: late.append(status(1.0, 1, 0, b"\1\2")) or b"", tries=3, wait_s=0.02)
+    late = [status("1.0", 1, 0, b"")] * 3
+    line, wire = bus("1.0", lambda _: late.append(status("1.0", 1, 0, b"\1\2")) or b"", tries=3, wait_s=0.02)
     take, deadlines = wire.read, set()
 
     def read(length):
@@ -204,15 +207,15 @@ def test_late_answers_to_orders_are_not_taken_for_those_to_questions(bus):
 
 def test_a_late_answer_is_not_taken_for_the_next(bus):
     """Answers carry no number; the one that comes while the next is asked for tells of an earlier moment."""
-    answers = iter([b"", status(1.0, 1, 0, b"\7\7")])
-    line, wire = bus(1.0, lambda _: next(answers), tries=2, wait_s=0.02)
+    answers = iter([b"", status("1.0", 1, 0, b"\7\7")])
+    line, wire = bus("1.0", lambda _: next(answers), tries=2, wait_s=0.02)
     take, deadlines = wire.read, set()
 
     def read(length):
         deadlines.add(line._line.deadline_s)
         if len(deadlines) == 2:  # the first wait is over, the next request not yet sent
             deadlines.add(None)
-            wire.pending += status(1.0, 1, 0, b"\1\1")
+            wire.pending += status("1.0", 1, 0, b"\1\1")
         return take(length)
 
     wire.read = read
@@ -229,8 +232,8 @@ def test_a_try_in_which_this_computer_slept_says_nothing_of_the_servo(bus, monke
 
     clock = SimpleNamespace(monotonic=monotonic, monotonic_ns=lambda: round(monotonic() * 1e9))
     monkeypatch.setattr(serial_line, "time", clock)
-    answers = iter([b"", b"", b"", b"", status(1.0, 1, 0, b"\7\7")])
-    line, wire = bus(1.0, lambda _: next(answers), tries=1)
+    answers = iter([b"", b"", b"", b"", status("1.0", 1, 0, b"\7\7")])
+    line, wire = bus("1.0", lambda _: next(answers), tries=1)
     take = wire.read
 
     def read(length):
@@ -249,29 +252,30 @@ def test_a_try_in_which_this_computer_slept_says_nothing_of_the_servo(bus, monke
 
 
 def test_of_several_servos_on_a_bus_one_is_named(bus):
-    line, wire = bus(1.0, lambda _: status(1.0, 1, 0, b"") + status(1.0, 2, 0, b""))
+    line, wire = bus("1.0", lambda _: status("1.0", 1, 0, b"") + status("1.0", 2, 0, b""))
     with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: say which one with --servo-id"):
         find_servo(line, None, None)
-    wire.reply = lambda request: status(1.0, 2, 0, b"\x36\x01" if request[4] == 2 else b"")
+    held = {0: b"\x36\x01", 3: b"\x02"}  # model number and id
+    wire.reply = lambda request: status("1.0", 2, 0, held[request[5]] if request[4] == 2 else b"")
     found = find_servo(line, None, 2)
     assert (found.table.model, found.id) == ("MX-64R", 2)
 
 
 def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):
     answer = b""
-    line, wire = bus(1.0, lambda request: request + answer)
+    line, wire = bus("1.0", lambda request: request + answer)
     wire.reply = lambda request: request + answer
     line._line.echoes = True
     with pytest.raises(DeviceTimeoutError):  # the SDK takes it for an answer
         line.read(1, Register(36, 2))
-    answer = status(1.0, 1, 0, b"\1\2")
+    answer = status("1.0", 1, 0, b"\1\2")
     assert line.read(1, Register(36, 2)).data == b"\1\2"
 
 
 def test_garbage_without_end_does_not_hold_the_program(bus, monkeypatch):
     """The SDK looks at its clock only when nothing comes."""
     rng = random.Random(1)
-    line, wire = bus(1.0, lambda _: b"")
+    line, wire = bus("1.0", lambda _: b"")
     wire.read = lambda length: rng.randbytes(length)
     now_s = itertools.count(step=0.001)  # a clock that goes on by a millisecond with every look at it
     clock = SimpleNamespace(monotonic=lambda: next(now_s), monotonic_ns=lambda: round(next(now_s) * 1e9))
@@ -302,9 +306,9 @@ def mutated(rng, packet):
     return bytes(data)
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_mutated_answers_are_right_or_typed_errors(bus, protocol):
-    rng = random.Random(int(protocol))
+    rng = random.Random(int(protocol[0]))
     line, wire = bus(protocol, lambda _: b"", wait_s=0.0005)
     accepted = 0
     for _ in range(1500):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, suppress
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,13 +20,16 @@ from pyax12.connection import Connection
 
 from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from firmware_io import serial_port
-from firmware_io.servo.dynamixel.driver import open_servo
+from firmware_io.servo.bus.registers import Register
+from firmware_io.servo.dynamixel.tables import TABLES
+from firmware_io.servo.servo import open_servo
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.servo import ServoTwin
-from firmware_io.twins.servo_machine import ServoMachine
-from firmware_io.twins.servo_packets import crc16, packet_2, status, take
+from firmware_io.twins.servo.dynamixel_machine import DynamixelMachine
+from firmware_io.twins.servo.dynamixel_packets import crc16, packet_2, status, take
+from firmware_io.twins.servo.twin import ServoTwin
 
-MODELS = [("MX-64R", 1.0), ("MX-28", 1.0), ("MX-64R", 2.0), ("XM430-W350", 2.0)]
+MODELS = [("MX-64R", "1.0"), ("MX-28", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
+MODELS_2 = [table.model for table in TABLES if table.protocol == "2.0"]
 RATE = math.radians(180)
 # Bytes that make up headers and stuffing; random ones hardly ever do.
 payload = st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x01, 0x55]), max_size=40).map(bytes)
@@ -61,7 +65,7 @@ def read_for(servo, seconds):
 @given(servo_id=st.integers(0, 252), instruction=st.integers(1, 8), parameters=payload, noise=payload)
 def test_requests_come_out_of_noise_whole(servo_id, instruction, parameters, noise):
     buffer = bytearray(noise.replace(b"\xff", b"") + packet_2(servo_id, instruction, parameters))
-    request = take(buffer, 2.0)
+    request = take(buffer, "2.0")
     assert (request.id, request.instruction, request.parameters, request.intact) == (
         *(servo_id, instruction, parameters, True),
     )
@@ -71,11 +75,11 @@ def test_requests_come_out_of_noise_whole(servo_id, instruction, parameters, noi
 @given(data=payload, error=st.integers(0, 127), cut=st.integers(0, 60))
 def test_the_sdk_reads_the_statuses_of_the_twin(data, error, cut):
     """Both protocols, and the stream in two parts; where a status is stuffed, as it is on the wire (`servo_bus`)."""
-    for protocol, begin in ((1.0, 4), (2.0, 8)):
+    for protocol, begin in (("1.0", 4), ("2.0", 8)):
         wire = status(protocol, 9, error, data)
-        stuffed = protocol == 2.0 and b"\xff\xff\xfd" in bytes([error]) + data
-        options = [] if protocol == 1.0 else [stuffed]
-        packet, result = dynamixel_sdk.PacketHandler(protocol).rxPacket(Replay(wire, cut), *options)
+        stuffed = protocol == "2.0" and b"\xff\xff\xfd" in bytes([error]) + data
+        options = [] if protocol == "1.0" else [stuffed]
+        packet, result = dynamixel_sdk.PacketHandler(float(protocol)).rxPacket(Replay(wire, cut), *options)
         assert result == dynamixel_sdk.COMM_SUCCESS
         if stuffed:
             assert bytes(packet) == wire
@@ -101,10 +105,12 @@ class Replay:
         return not self.parts
 
 
-def machine(protocol=2.0):
+def machine(protocol="2.0"):
     """In protocol 2.0 the servo of the e-manual's examples: model 1030, firmware 38, at count 166."""
-    servo = ServoMachine("MX-64R", protocol, Load(), 0, 0.0 if protocol == 1.0 else (166 - 2048) * 2 * math.pi / 4096)
-    if protocol == 2.0:
+    servo = DynamixelMachine(
+        "MX-64R", protocol, Load(), 0, 0.0 if protocol == "1.0" else (166 - 2048) * 2 * math.pi / 4096
+    )
+    if protocol == "2.0":
         servo.memory[0], servo.memory[6] = 1030, 38
     return servo
 
@@ -117,16 +123,16 @@ def ask(servo, wire, time_ns=0):
 @pytest.mark.parametrize(
     ("protocol", "request_hex", "answer_hex"),
     [
-        (1.0, "ff ff 01 02 01 fb", "ff ff 01 02 00 fc"),  # ping
-        (1.0, "ff ff 01 04 02 2b 01 cc", "ff ff 01 03 00 1e dd"),  # 30 degC
-        (1.0, "ff ff 01 04 02 2b 01 cd", "ff ff 01 02 10 ec"),  # checksum error
-        (1.0, "ff ff 01 02 05 f7", "ff ff 01 02 40 bc"),  # action without a registered write
-        (1.0, "ff ff 01 05 03 1e ff 1f ba", "ff ff 01 02 08 f4"),  # goal 8191
-        (1.0, "ff ff 02 02 01 fa", None),  # not for us
-        (2.0, "ff ff fd 00 01 03 00 01 19 4e", "ff ff fd 00 01 07 00 55 00 06 04 26 65 5d"),
-        (2.0, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
-        (2.0, "ff ff fd 00 01 07 00 02 84 00 04 00 1d 16", "ff ff fd 00 01 04 00 55 03 ab 0c"),  # CRC error
-        (2.0, "ff ff fd 00 fe 09 00 82 84 00 04 00 01 02 ce fa", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
+        ("1.0", "ff ff 01 02 01 fb", "ff ff 01 02 00 fc"),  # ping
+        ("1.0", "ff ff 01 04 02 2b 01 cc", "ff ff 01 03 00 1e dd"),  # 30 degC
+        ("1.0", "ff ff 01 04 02 2b 01 cd", "ff ff 01 02 10 ec"),  # checksum error
+        ("1.0", "ff ff 01 02 05 f7", "ff ff 01 02 40 bc"),  # action without a registered write
+        ("1.0", "ff ff 01 05 03 1e ff 1f ba", "ff ff 01 02 08 f4"),  # goal 8191
+        ("1.0", "ff ff 02 02 01 fa", None),  # not for us
+        ("2.0", "ff ff fd 00 01 03 00 01 19 4e", "ff ff fd 00 01 07 00 55 00 06 04 26 65 5d"),
+        ("2.0", "ff ff fd 00 01 07 00 02 84 00 04 00 1d 15", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
+        ("2.0", "ff ff fd 00 01 07 00 02 84 00 04 00 1d 16", "ff ff fd 00 01 04 00 55 03 ab 0c"),  # CRC error
+        ("2.0", "ff ff fd 00 fe 09 00 82 84 00 04 00 01 02 ce fa", "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"),
     ],
 )
 def test_answers_byte_by_byte(protocol, request_hex, answer_hex):
@@ -189,7 +195,7 @@ def test_the_bus_watchdog_stops_the_wheel_and_locks_the_goals():
 
 
 def test_a_strained_servo_protects_itself():
-    servo, second = machine(protocol=1.0), 1_000_000_000
+    servo, second = machine(protocol="1.0"), 1_000_000_000
     servo.memory[6] = servo.memory[8] = 0
     servo.memory[32], servo.memory[24] = 263, 1
     ask(servo, bytes.fromhex("ff ff 01 05 03 20 07 01 ce"))
@@ -246,7 +252,7 @@ def patient_sdk(monkeypatch):
 
 @pytest.mark.usefixtures("patient_sdk")
 def test_the_official_sdk_drives_the_mx_64_of_protocol_2():
-    with ServoTwin("MX-64R", 2.0) as twin:
+    with ServoTwin("MX-64R", "2.0") as twin:
         port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
         assert port.setBaudRate(57600)
         try:
@@ -268,7 +274,7 @@ def test_the_official_sdk_drives_the_mx_64_of_protocol_2():
 
 @pytest.mark.usefixtures("patient_sdk")
 def test_bytes_take_their_time_and_the_return_delay_is_kept(monkeypatch):
-    with ServoTwin("MX-64R", 2.0) as twin:
+    with ServoTwin("MX-64R", "2.0") as twin:
         twin.memory[9] = 254
         port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
         port.setBaudRate(57600)
@@ -298,10 +304,26 @@ def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
         assert states[-1].velocity_rad_s == pytest.approx(-RATE, rel=0.02)
         servo.hold()
         until(lambda: not turns(twin))
-        assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(12.0), 30)
+        volts = 5.0 if model == "XL330-M288" else 12.0
+        assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(volts), 30)
         servo.sweep_to(2.0, 3.0)
         until(lambda: abs(servo.read().position_rad - 2.0) < 0.03)
         assert abs(math.remainder(true_rad(twin) - 2.0, 2 * math.pi)) < 0.03
+
+
+@pytest.mark.parametrize("model", MODELS_2)
+def test_the_tables_of_driver_and_twin_are_of_one_servo(model):
+    """Every register that the driver uses is one that the twin has, with its size."""
+    table = next(table for table in TABLES if (table.model, table.protocol) == (model, "2.0"))
+    servo = DynamixelMachine(model, "2.0", Load(), 0, 0.0)
+    named = [getattr(table, field.name) for field in fields(table)]
+    for register in [one for one in named if isinstance(one, Register)]:
+        item = servo.memory.items[register.address]
+        assert (item.size, item.low < 0 or not item.writable) == (register.size, register.sign == "twos") or (
+            not item.writable and item.size == register.size
+        )
+    assert servo.memory[0] == table.number
+    assert (38 in servo.memory, 102 in servo.memory) == ((model not in ("MX-28", "XL430-W250")),) * 2
 
 
 def slack_rad(servo, state):
@@ -356,7 +378,7 @@ def test_a_servo_stuck_in_its_dead_sector_stalls():
             read_for(servo, 60.0)
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_an_adapter_that_echoes_and_flips_bits(protocol):
     with ServoTwin("MX-64R", protocol, echo=True, seed=3) as twin, open_servo(twin.port) as servo:
         twin.bit_errors(0.001)
@@ -438,7 +460,7 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 @pytest.mark.parametrize(("fault", "words"), FAULTS)
 def test_a_fault_stops_the_turn_and_says_what_to_do(protocol, fault, words):
     with ServoTwin("MX-64R", protocol) as twin:
@@ -449,7 +471,7 @@ def test_a_fault_stops_the_turn_and_says_what_to_do(protocol, fault, words):
             with pytest.raises(DeviceFaultError, match=words):
                 read_on(servo, 60.0)
         until(lambda: not turns(twin))
-        assert twin.memory[24 if protocol == 1.0 else 64] == 0
+        assert twin.memory[24 if protocol == "1.0" else 64] == 0
 
 
 def read_on(servo, seconds):
@@ -461,7 +483,7 @@ def read_on(servo, seconds):
 
 
 def test_after_an_overload_it_can_be_opened_and_turns_again():
-    for protocol in (1.0, 2.0):
+    for protocol in ("1.0", "2.0"):
         with ServoTwin("MX-64R", protocol) as twin:
             for again in (False, True):
                 with open_servo(twin.port) as servo:
@@ -489,7 +511,7 @@ def test_it_stands_however_the_program_leaves(kind):
 
 PROGRAM = """
 import sys, time
-from firmware_io.servo.dynamixel.driver import open_servo
+from firmware_io.servo.servo import open_servo
 with open_servo(sys.argv[1], servo_id=1) as servo:
     servo.spin(3.0)
     print("turning", flush=True)
@@ -498,7 +520,7 @@ with open_servo(sys.argv[1], servo_id=1) as servo:
 """
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_it_stands_when_its_program_is_killed(protocol):
     with ServoTwin("MX-64R", protocol) as twin:
         with subprocess.Popen([sys.executable, "-c", PROGRAM, twin.port], stdout=subprocess.PIPE) as program:
@@ -506,7 +528,7 @@ def test_it_stands_when_its_program_is_killed(protocol):
             until(lambda: turns(twin))
             program.kill()
         until(lambda: not turns(twin))
-        assert twin.memory[24 if protocol == 1.0 else 64] == 0
+        assert twin.memory[24 if protocol == "1.0" else 64] == 0
 
 
 def test_closing_insists_while_the_bus_is_disturbed():
@@ -525,7 +547,7 @@ def test_closing_insists_while_the_bus_is_disturbed():
 def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
     """Two seconds for all three; a cut bus of protocol 1.0 is the one case that nobody can help."""
     with ExitStack() as stack:
-        twins = [stack.enter_context(ServoTwin("MX-64R", protocol)) for protocol in (1.0, 1.0, 2.0)]
+        twins = [stack.enter_context(ServoTwin("MX-64R", protocol)) for protocol in ("1.0", "1.0", "2.0")]
         silent, helpless, watched = twins
         servos = [stack.enter_context(open_servo(twin.port, servo_id=1)) for twin in twins]
         for servo in servos:
@@ -547,7 +569,7 @@ def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
             until(lambda: not turns(helpless))  # opening it takes the torque
 
 
-@pytest.mark.parametrize("protocol", [1.0, 2.0])
+@pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_unplugged_is_said_and_plugged_in_it_is_found_again(protocol):
     with ServoTwin("MX-64R", protocol) as twin:
         with pytest.raises(DeviceTimeoutError, match="the port is gone") as caught, open_servo(twin.port) as servo:

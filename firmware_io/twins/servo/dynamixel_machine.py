@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
 from design.errors import DeviceError
-from firmware_io.servo.dynamixel.registers import TABLES, ControlTable
+from firmware_io.servo.bus.registers import ControlTable
+from firmware_io.servo.dynamixel.tables import TABLES
 from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
-from firmware_io.twins.servo_memory import ACCESS, ITEMS, RANGE, Memory
-from firmware_io.twins.servo_packets import (
+from firmware_io.twins.servo.dynamixel_memory import ACCESS, INDIRECT, ITEMS, RANGE, Memory
+from firmware_io.twins.servo.dynamixel_packets import (
     BROADCAST,
     FAST_BULK_READ,
     FAST_SYNC_READ,
@@ -23,14 +26,13 @@ from firmware_io.twins.servo_packets import (
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
-_RATED_V = 12.0
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32  # bits of both protocols
 _BAUDS_2 = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 _BAUDS_1_FAST = {250: 2_250_000, 251: 2_500_000, 252: 3_000_000}
 _ERRORS_1 = {RANGE: 8, ACCESS: 8}  # the others of protocol 2.0 are instruction errors in 1.0
 
 
-class ServoMachine:
+class DynamixelMachine:
     """One servo with power.
 
     Attributes:
@@ -39,13 +41,15 @@ class ServoMachine:
         axis: the true motion of the horn.
     """
 
-    def __init__(self, model: str, protocol: float | None, load: Load, time_ns: int, angle_rad: float) -> None:
+    def __init__(self, model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> None:
         self.table = _table(model, protocol)
         self.memory = Memory({item.address: item for item in ITEMS[self.table.number]}, self.table.ram)
         self.axis = HornMotion(plant_of(model), load, time_ns, angle_rad=angle_rad)
+        self._pointers = INDIRECT.get(self.table.number, {})  # to the targets of indirect data
         self._turns = 0  # of the axis, when the servo last began to count
         self._latched = 0
         self._hot_degC = 30
+        self._rated_v = load_catalogue().get(model, Servo).rated_v
         self._supply = 1.0
         self._strained_since_ns: int | None = None
         self._mute_until_ns = time_ns
@@ -98,7 +102,7 @@ class ServoMachine:
 
     def set_voltage(self, volts: float, now_ns: int) -> None:
         """The supply gives another voltage."""
-        self._supply = volts / _RATED_V
+        self._supply = volts / self._rated_v
         self.axis.change(now_ns, supply=self._supply)
 
     def restart(self, now_ns: int) -> None:
@@ -208,7 +212,7 @@ class ServoMachine:
 
     @property
     def _two(self) -> bool:
-        return self.table.protocol == 2.0
+        return self.table.protocol == "2.0"
 
     def _error(self, number: int) -> int:
         return number if self._two else _ERRORS_1.get(number, 64)
@@ -224,11 +228,8 @@ class ServoMachine:
         return bytes(self.memory.data[self._target(place)] for place in range(address, address + size))
 
     def _target(self, place: int) -> int:
-        if self._two and 224 <= place < 252:
-            return self.memory[168 + 2 * (place - 224)]
-        if self._two and 634 <= place < 662:
-            return self.memory[578 + 2 * (place - 634)]
-        return place
+        pointer = self._pointers.get(place)
+        return place if pointer is None else self.memory[pointer]
 
     def _write(self, address: int, data: bytes, now_ns: int) -> int:
         memory, torque = self.memory, self.table.torque.address
@@ -290,7 +291,7 @@ class ServoMachine:
         rate = round(motion.rate_rad_s / table.velocity.unit)
         milliseconds = now_ns // 1_000_000 % 32768
         memory[table.position.address] = self._count(motion.angle_rad)
-        memory[table.voltage.address] = round(self._supply * _RATED_V * 10)
+        memory[table.voltage.address] = round(self._supply * self._rated_v * 10)
         memory[table.temperature.address] = self._hot_degC
         if self._two:
             memory[table.velocity.address] = rate
@@ -345,7 +346,7 @@ class ServoMachine:
 
     def _state_bits(self) -> int:
         low, high, hot = (34, 32, 31) if self._two else (12, 13, 11)
-        fits = self.memory[low] <= round(self._supply * _RATED_V * 10) <= self.memory[high]
+        fits = self.memory[low] <= round(self._supply * self._rated_v * 10) <= self.memory[high]
         return (0 if fits else _VOLTAGE) | (_HEAT if self._hot_degC > self.memory[hot] else 0)
 
     def _strained(self, now_ns: int) -> bool:
@@ -369,7 +370,7 @@ class ServoMachine:
             self._act(now_ns)
 
 
-def _table(model: str, protocol: float | None) -> ControlTable:
+def _table(model: str, protocol: str | None) -> ControlTable:
     for table in TABLES:
         if table.model == model and protocol in (None, table.protocol):
             return table

@@ -14,7 +14,7 @@ _SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenev
 
 
 class SerialLine:
-    """An open port, with what the SDK's packet handlers ask of one to read an answer; those names are theirs.
+    """An open port, with what packet handlers ask of one to read an answer; those names are the Dynamixel SDK's.
 
     Attributes:
         port: of pyserial.
@@ -31,7 +31,7 @@ class SerialLine:
 
     def __init__(self, port: str, baud: int) -> None:
         self.port = open_serial_port(port, baud, _SLICE_S)
-        self.is_using = False  # only `Tape` is ever sent to, which sets it; reading clears it
+        self.is_using = False  # which the SDK clears after reading
         self.echoes = False
         self.deadline_s = 0.0
         self.began_ns = self.ended_ns = 0
@@ -102,18 +102,3 @@ class SerialLine:
                 self._late_bytes -= len(more)  # garbage has no end
                 break
         return data
-
-
-class Tape:
-    """A line that keeps the bytes instead of sending them."""
-
-    is_using = False
-    packet = b""
-
-    def clearPort(self) -> None:
-        """Nothing comes."""
-
-    def writePort(self, packet: list[int]) -> int:
-        """Keep the request."""
-        self.packet = bytes(packet)
-        return len(packet)

@@ -1,8 +1,8 @@
 """The twin of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
 
 It answers both protocols byte by byte with their timing: bytes take their time at the baud rate, the return delay is
-kept, a client at another speed is not understood. What it answers and how it turns is `servo_machine` and `dynamics`.
-Faults come on demand, by methods.
+kept, a client at another speed is not understood. What it answers and how it turns is
+`dynamixel_machine` and `dynamics`. Faults come on demand, by methods.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from types import TracebackType
 from typing import Self
 
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.servo_machine import ServoMachine
-from firmware_io.twins.servo_packets import take
+from firmware_io.twins.servo.dynamixel_machine import DynamixelMachine
+from firmware_io.twins.servo.dynamixel_packets import take
 
 _TICK_S = 0.02  # between two looks of the servo at itself
 _FORGET_NS = 100_000_000  # a request that stays incomplete is dropped
@@ -43,7 +43,7 @@ class ServoTwin:
 
     Args:
         model: name, as in the catalogue.
-        protocol: 1.0, 2.0, or None for the one that the model has from the factory.
+        protocol: "1.0", "2.0", or None for the one that the model has from the factory.
         load: what hangs on the horn.
         angle_rad: of the horn when it is switched on.
         echo: whether the adapter returns what it sends.
@@ -53,14 +53,16 @@ class ServoTwin:
     def __init__(
         self,
         model: str = "MX-64R",
-        protocol: float | None = None,
+        protocol: str | None = None,
         *,
         load: Load | None = None,
         angle_rad: float = 0.0,
         echo: bool = False,
         seed: int = 0,
     ) -> None:
-        self._servo = ServoMachine(model, protocol, Load() if load is None else load, time.monotonic_ns(), angle_rad)
+        self._servo = DynamixelMachine(
+            model, protocol, Load() if load is None else load, time.monotonic_ns(), angle_rad
+        )
         self.axis, self.memory = self._servo.axis, self._servo.memory
         self._protocol, self._echo = self._servo.table.protocol, echo
         self._random = random.Random(seed)

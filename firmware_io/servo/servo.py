@@ -13,22 +13,20 @@ What nobody can help: a servo of protocol 1.0 in wheel mode goes on turning when
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import NoReturn, Self
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, DeviceFaultError
-from firmware_io.servo.dynamixel.bus import ServoAnswer, ServoBus
-from firmware_io.servo.dynamixel.registers import RPM, ControlTable, Register, Setting
-from firmware_io.servo.dynamixel.setup import find_servo, prepare, set_kept
+from firmware_io.servo.bus.bus import ServoAnswer
+from firmware_io.servo.bus.registers import RPM, Setting
+from firmware_io.servo.bus.unit import ServoUnit
+from firmware_io.servo.find import find_servo, open_bus
+from firmware_io.servo.fitness import prepare
 from firmware_io.servo.guard import SILENCE_S, Guard
+from firmware_io.servo.progress import Order, ServoState, Stall, follow, nearest_turn
 
-_STALL_S = 0.5
-_STALL_COUNTS = 8  # of the encoder, due at least before a stall can be told from its steps
-_STALL_SHARE = 0.1  # of the way due
-_ARRIVED_RAD = math.radians(5.0)  # a loop without integral stops short of its goal, by friction and weight
 _GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
 
 _IS_OFF = "has answered that its torque is off"
@@ -39,64 +37,29 @@ _ADVICE = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ServoState:
-    """What the servo was doing at one moment.
-
-    Attributes:
-        time_ns: `time.monotonic_ns()` of the sampling.
-        time_bound_ns: it was sampled within this of `time_ns`.
-        position_rad: turns are counted; counter-clockwise as one looks at the horn, 0 at the encoder's centre.
-            NaN in the AX-12A's dead sector.
-        velocity_rad_s: NaN in the AX-12A's wheel mode, where it measures none.
-        load: fraction of the rated torque, positive counter-clockwise.
-        voltage_V: of the supply.
-        temperature_degC: inside.
-    """
-
-    time_ns: int
-    time_bound_ns: int
-    position_rad: float
-    velocity_rad_s: float
-    load: float
-    voltage_V: float  # noqa: N815 - volts
-    temperature_degC: float  # noqa: N815
-
-
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """What the servo was told to do, and where it was when it last got on with it."""
-
-    rate_rad_s: float
-    goal_rad: float
-    since_ns: int = 0
-    from_rad: float = math.nan
-
-
-class DynamixelServo:
+class ServoDriver:
     """One servo on its port; made by `open_servo`, used as a context manager.
 
     Attributes:
         model: name, as in the catalogue.
-        protocol: 1.0 or 2.0.
+        protocol: as its maker calls it: "2.0".
         baud: bits per second.
         id: on the bus.
         port: name of the port.
         step_rad: of its encoder.
     """
 
-    def __init__(self, bus: ServoBus, table: ControlTable, servo_id: int, warnings: tuple[str, ...]) -> None:
-        self.model, self.protocol, self.id = table.model, table.protocol, servo_id
+    def __init__(self, unit: ServoUnit, warnings: tuple[str, ...]) -> None:
+        table, bus = unit.table, unit.bus
+        self.model, self.protocol, self.id = table.model, table.protocol, unit.id
         self.baud, self.port = bus.baud, bus.port
-        self.step_rad = table.position.unit
-        self._bus, self._table, self._warnings = bus, table, warnings
-        self._fastest_rad_s = load_catalogue().get(table.model, Servo).no_load_rpm * RPM
+        self.step_rad = abs(table.position.unit)
+        self._unit, self._bus, self._table, self._warnings = unit, bus, table, warnings
+        self._product = load_catalogue().get(table.model, Servo)
         self._mode: tuple[Setting, ...] = ()
-        self._order: _Order | None = None
+        self._order: Order | None = None
         self._known: ServoState | None = None  # the last state with a position, from which turns are counted
-        acknowledged = b"\xff\xff\xfd\x00%c\x04\x00\x55" if table.protocol == 2.0 else b"\xff\xff%c\x02"
-        off = bus.write_packet(servo_id, table.torque, table.torque.encode(0))
-        self._guard = Guard(bus.fileno(), off, acknowledged % servo_id)
+        self._guard = Guard(bus.fileno(), *unit.torque_off())
 
     def __str__(self) -> str:
         return f"{self.port}: servo {self.id} ({self.model})"
@@ -152,8 +115,8 @@ class DynamixelServo:
         self._enter(self._table.wheel)
         self._observe()  # turns are counted from here
         self._watch()
-        self._write(self._table.wheel_speed, rate_rad_s)
-        self._order = _Order(rate_rad_s, math.copysign(math.inf, rate_rad_s))
+        self._unit.write(self._table.wheel_speed, rate_rad_s)
+        self._order = Order(rate_rad_s, math.copysign(math.inf, rate_rad_s))
 
     def sweep_to(self, angle_rad: float, rate_rad_s: float) -> None:
         """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
@@ -162,9 +125,9 @@ class DynamixelServo:
             DeviceError: the servo has no such angle, or the rate is beyond the motor.
         """
         table = self._table
-        zero_rad = table.centre * table.goal.unit
-        if not -zero_rad <= angle_rad <= table.last * table.goal.unit - zero_rad:
-            span = f"{-math.degrees(zero_rad):.1f} .. {math.degrees(table.last * table.goal.unit - zero_rad):.1f}"
+        low_rad, high_rad = table.reach_rad
+        if not low_rad <= angle_rad <= high_rad:
+            span = f"{math.degrees(low_rad):.1f} .. {math.degrees(high_rad):.1f}"
             raise DeviceError(f"{self}: sweep to {math.degrees(angle_rad):.1f} deg: it reaches {span} deg")
         if not rate_rad_s > 0:
             raise DeviceError(f"{self}: sweep at {math.degrees(rate_rad_s):.1f} deg/s: choose a rate above 0")
@@ -172,20 +135,24 @@ class DynamixelServo:
         self._enter(table.joint)
         self._observe()
         self._watch()
-        self._write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
-        self._write(table.goal, angle_rad + zero_rad)
-        self._order = _Order(rate_rad_s, angle_rad)
+        self._unit.write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
+        self._unit.write(table.goal, angle_rad + table.centre * table.goal.unit)
+        self._order = Order(rate_rad_s, angle_rad)
 
     def hold(self) -> None:
         """Stand where it is, with torque on. An AX-12A that spins only loses its drive, for want of a speed loop."""
         self._observe()
         if self._mode == self._table.joint:
-            self._write(self._table.goal, self._here())
+            self._unit.write(self._table.goal, self._here())
         elif self._mode == self._table.wheel:
-            self._write(self._table.wheel_speed, 0.0)
+            self._unit.write(self._table.wheel_speed, 0.0)
         else:
             self._enter(self._table.joint)
         self._rest()
+
+    def release(self) -> None:
+        """Stand without torque, so that a hand can turn it."""
+        self._stop()
 
     def read(self) -> ServoState:
         """Position, velocity, load, voltage and temperature of one moment, in one transaction.
@@ -205,9 +172,9 @@ class DynamixelServo:
         return state
 
     def _observe(self) -> ServoState:
-        answer = self._bus.read(self.id, self._table.block)
+        answer = self._unit.read(self._table.block)
         if answer.conditions:
-            self._fault(self._conditions(answer))
+            self._fault(self._told(answer))
         state = self._state(answer)
         if not math.isnan(state.position_rad):
             self._known = state
@@ -244,34 +211,24 @@ class DynamixelServo:
         rate_rad_s = sum(measured) / len(measured) if measured else self._order.rate_rad_s
         return rate_rad_s * (answer.sampled_ns - known.time_ns) / 1e9
 
-    def _follow(self, order: _Order, state: ServoState) -> _Order | None:
+    def _follow(self, order: Order, state: ServoState) -> Order | None:
         """The order with the progress made; None when the goal is reached."""
-        here_rad = state.position_rad
-        if abs(order.goal_rad - here_rad) < _ARRIVED_RAD:
-            self._rest()
-            return None
-        if not order.since_ns or math.isnan(order.from_rad) > math.isnan(here_rad):
-            return replace(order, since_ns=state.time_ns, from_rad=here_rad)
-        elapsed_s = (state.time_ns - order.since_ns) / 1e9
-        due_rad, moved_rad = abs(order.rate_rad_s) * elapsed_s, abs(here_rad - order.from_rad)
-        enough_rad = math.pi if math.isnan(here_rad) else _STALL_COUNTS * self._table.position.unit
-        if elapsed_s < _STALL_S or due_rad < enough_rad:
-            return order
-        if not moved_rad >= _STALL_SHARE * due_rad:
-            if self._value(self._table.torque) == 0:
+        progress = follow(order, state, self.step_rad)
+        if isinstance(progress, Stall):
+            if self._unit.value(self._table.torque) == 0:
                 self._fault(f"it has restarted by itself, {state.voltage_V:.1f} V now: {_ADVICE['voltage']}")
-            moved = "stuck in the dead sector" if math.isnan(moved_rad) else f"moved {math.degrees(moved_rad):.1f} deg"
-            due = f"where {math.degrees(due_rad):.1f} were due, load {state.load:.0%}"
-            self._fault(f"stall: {moved} {due}: {_ADVICE['overload']}")
-        return replace(order, since_ns=state.time_ns, from_rad=here_rad)
+            self._fault(f"{progress}, load {state.load:.0%}: {_ADVICE['overload']}")
+        if progress is None:
+            self._rest()
+        return progress
 
-    def _conditions(self, answer: ServoAnswer) -> str:
-        table = self._table
-        code = answer.conditions if table.hardware_error is None else round(self._value(table.hardware_error))
-        names, volts = table.names(code), table.pick(table.voltage, answer.data)
+    def _told(self, answer: ServoAnswer) -> str:
+        """What it reports of itself, and what to do about it."""
+        table, names = self._table, self._unit.told(answer) or ""
+        volts, degC = table.pick(table.voltage, answer.data), table.pick(table.temperature, answer.data)
         broken = "switch its power off and on; if it comes again, the servo is broken"
         advice = next((text for name, text in _ADVICE.items() if name in names), broken)
-        return f"{names} at {volts:.1f} V, {table.pick(table.temperature, answer.data):.0f} degC: {advice}"
+        return f"{names} at {volts:.1f} V, {degC:.0f} degC: {advice}"
 
     def _fault(self, what: str) -> NoReturn:
         error = DeviceFaultError(f"{self}: {what}")
@@ -289,9 +246,10 @@ class DynamixelServo:
         raise DeviceError(f"{self}: {neglected}: read it more often, open it again")
 
     def _check_rate(self, rate_rad_s: float) -> None:
-        if not abs(rate_rad_s) <= self._fastest_rad_s:
-            fastest = f"at most {math.degrees(self._fastest_rad_s):.0f} deg/s"
-            raise DeviceError(f"{self}: rate {math.degrees(rate_rad_s):.1f} deg/s: {fastest}, at 12 V and without load")
+        fastest_rad_s = self._product.no_load_rpm * RPM
+        if not abs(rate_rad_s) <= fastest_rad_s:
+            fastest = f"at most {math.degrees(fastest_rad_s):.0f} deg/s, at {self._product.rated_v:g} V"
+            raise DeviceError(f"{self}: rate {math.degrees(rate_rad_s):.1f} deg/s: {fastest} and without load")
 
     def _enter(self, mode: tuple[Setting, ...]) -> None:
         """Wheel or joint mode, standing, torque on."""
@@ -300,14 +258,14 @@ class DynamixelServo:
             return
         self._stop()
         for register, count in mode:
-            set_kept(self._bus, self.id, register, count)
+            self._unit.set_kept(register, count)
         if mode == table.wheel:
-            self._write(table.wheel_speed, 0.0)
+            self._unit.write(table.wheel_speed, 0.0)
         else:
-            self._write(table.joint_speed, _GENTLE_RAD_S)
-            self._write(table.goal, self._here())
+            self._unit.write(table.joint_speed, _GENTLE_RAD_S)
+            self._unit.write(table.goal, self._here())
             self._known = None
-        self._write(table.torque, 1)
+        self._unit.write(table.torque, 1)
         self._mode = mode
 
     def _watch(self) -> None:
@@ -315,38 +273,27 @@ class DynamixelServo:
         if not self._guard.turning():
             self._neglected()
         if self._table.watchdog:
-            self._write(self._table.watchdog, SILENCE_S)
+            self._unit.write(self._table.watchdog, SILENCE_S)
 
     def _rest(self) -> None:
         """It stands, or will by itself: silence is fine."""
         self._order = None
         self._guard.resting()
         if self._table.watchdog:
-            self._write(self._table.watchdog, 0.0)
+            self._unit.write(self._table.watchdog, 0.0)
 
     def _stop(self) -> None:
         self._mode, self._order = (), None
-        self._write(self._table.torque, 0)
+        self._unit.write(self._table.torque, 0)
         self._rest()
 
     def _here(self) -> float:
         """The goal that is the present position; in protocol 2.0 that one may count turns, which a goal must not."""
-        return self._value(self._table.position) % ((self._table.last + 1) * self._table.goal.unit)
-
-    def _value(self, register: Register) -> float:
-        return register.decode(self._bus.read(self.id, register).data)
-
-    def _write(self, register: Register, value: float) -> None:
-        self._bus.write(self.id, register, register.encode(value))
+        return self._unit.value(self._table.position) % ((self._table.last + 1) * self._table.goal.unit)
 
 
-def nearest_turn(angle_rad: float, expected_rad: float) -> float:
-    """The angle, whole turns added so that it comes nearest to the expected one."""
-    return angle_rad + 2 * math.pi * round((expected_rad - angle_rad) / (2 * math.pi))
-
-
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> DynamixelServo:
-    """Find the servo on a port, whatever its speed and protocol, and make it ready; it stands, without torque.
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:
+    """Find the servo on a port, whatever its family, speed and protocol, and make it ready; it stands, without torque.
 
     Args:
         port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
@@ -356,10 +303,10 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     Raises:
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
-    bus = ServoBus(port)
+    bus = open_bus(port)
     try:
-        found = find_servo(bus, model, servo_id, unmute=True)
-        return DynamixelServo(bus, found.table, found.id, prepare(bus, found.table, found.id))
+        unit = find_servo(bus, model, servo_id, unmute=True)
+        return ServoDriver(unit, prepare(unit))
     except BaseException:
         bus.close()
         raise

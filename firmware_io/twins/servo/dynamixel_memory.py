@@ -52,23 +52,43 @@ def _mx(number: int, firmware: int) -> list[TableItem]:
     ]
 
 
-def _protocol_2(number: int, *, current: int, speed: int, position_p: int, firmware: int) -> list[TableItem]:
-    addresses = [*range(168, 224, 2), *range(578, 634, 2)]
-    targets = [*range(224, 252), *range(634, 662)]
+_INDIRECT = ((168, 224, 28), (578, 634, 28))  # first address of the targets, of the data, how many
+_INDIRECT_XL330 = ((168, 208, 20),)
+
+
+def _protocol_2(
+    number: int,
+    *,
+    speed: int,
+    current: int | None = None,
+    volts: tuple[int, int] = (95, 160),
+    hot: int = 80,
+    position_p: int = 850,
+    firmware: int = 45,
+    acceleration: bool = False,
+    indirect: tuple[tuple[int, int, int], ...] = _INDIRECT,
+) -> list[TableItem]:
+    """Entries of protocol 2.0; without `current` it measures none, with `acceleration` it has a limit of it.
+
+    Indirect data are bytes that stand elsewhere: `indirect` tells where each stretch keeps its targets and its data.
+    """
+    targets = [(low + 2 * k, data + k) for low, data, many in indirect for k in range(many)]
+    currents = [] if current is None else [_rw(38, 2, current, current), _signed(102, 2, current)]
     return [
         *(_ro(0, 2, number), _ro(2, 4), _ro(6, 1, firmware), _rw(7, 1, 1, 252), _rw(8, 1, 1, 7), _rw(9, 1, 250, 254)),
         *(_rw(10, 1, 0, 5), _rw(11, 1, 3, 16), _rw(12, 1, 255), _rw(13, 1, 2, 2, 1), _signed(20, 4, 1_044_479)),
-        *(_rw(24, 4, 10, 1023), _rw(31, 1, 80, 100), _rw(32, 2, 160, 160, 95), _rw(34, 2, 95, 160, 95)),
-        *(_rw(36, 2, 885, 885), _rw(38, 2, current, current), _rw(40, 4, 32767, 32767), _rw(44, 4, speed, 1023)),
+        *(_rw(24, 4, 10, 1023), _rw(31, 1, hot, 100), _rw(32, 2, volts[1], volts[1], volts[0])),
+        *(_rw(34, 2, volts[0], volts[1], volts[0]), _rw(36, 2, 885, 885), _rw(44, 4, speed, 1023), *currents),
+        *([_rw(40, 4, 32767, 32767)] if acceleration else []),
         *(_rw(48, 4, 4095, 4095), _rw(52, 4, 0, 4095), _rw(63, 1, 52), _rw(64, 1, 0, 1), _rw(65, 1, 0, 1)),
         *(_rw(68, 1, 2, 2), _ro(69, 1), _ro(70, 1), _rw(76, 2, 1920, 16383), _rw(78, 2, 100, 16383)),
         *(_rw(80, 2, 0, 16383), _rw(82, 2, 0, 16383), _rw(84, 2, position_p, 16383), _rw(88, 2, 0, 16383)),
-        *(_rw(90, 2, 0, 16383), _rw(98, 1, 0, 127), _signed(100, 2, 885), _signed(102, 2, current)),
+        *(_rw(90, 2, 0, 16383), _rw(98, 1, 0, 127), _signed(100, 2, 885)),
         *(_signed(104, 4, speed), _rw(108, 4, 0, 32767), _rw(112, 4, 0, 32767), _signed(116, 4, 1_048_575)),
         *(_ro(120, 2), _ro(122, 1), _ro(123, 1), _ro(124, 2), _ro(126, 2), _ro(128, 4), _ro(132, 4), _ro(136, 4)),
         *(_ro(140, 4), _ro(144, 2), _ro(146, 1)),
-        *(_rw(address, 2, target, 661, 64) for address, target in zip(addresses, targets, strict=True)),
-        *(_rw(target, 1, 0) for target in targets),
+        *(_rw(address, 2, target, 661, 64) for address, target in targets),
+        *(_rw(target, 1, 0) for _, target in targets),
     ]
 
 
@@ -80,8 +100,24 @@ ITEMS: dict[int, list[TableItem]] = {  # by model number
     12: _AX,
     29: _mx(29, 36),
     310: [*_mx(310, 36), _rw(68, 2, 2048, 4095), _rw(70, 1, 0, 1), _rw(71, 2, 0, 2047)],
-    311: _protocol_2(311, current=1941, speed=435, position_p=850, firmware=42),
-    1020: _protocol_2(1020, current=1193, speed=350, position_p=800, firmware=45),
+    30: _protocol_2(30, speed=380, acceleration=True, firmware=42),
+    311: _protocol_2(311, speed=435, current=1941, acceleration=True, firmware=42),
+    321: _protocol_2(321, speed=360, current=2047, acceleration=True, firmware=42),
+    1000: _protocol_2(1000, speed=130, current=648, position_p=800),
+    1020: _protocol_2(1020, speed=350, current=1193, position_p=800, acceleration=True),
+    1060: _protocol_2(1060, speed=265, volts=(60, 140), hot=72, position_p=640),
+    1120: _protocol_2(1120, speed=128, current=2047, position_p=800),
+    1200: _protocol_2(1200, speed=445, current=1750, volts=(35, 70), hot=70, position_p=400, indirect=_INDIRECT_XL330),
+}
+
+INDIRECT = {  # by model number: where the target of each byte of indirect data stands
+    number: {
+        data + k: low + 2 * k
+        for low, data, many in (_INDIRECT_XL330 if number == 1200 else _INDIRECT)
+        for k in range(many)
+    }
+    for number, items in ITEMS.items()
+    if any(item.address == _INDIRECT[0][0] for item in items)
 }
 
 

@@ -46,14 +46,14 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def take(buffer: bytearray, protocol: float) -> Request | None:
+def take(buffer: bytearray, protocol: str) -> Request | None:
     """Take the next request off the buffer, and what lies before it; None until one is complete."""
-    return _take_2(buffer) if protocol == 2.0 else _take_1(buffer)
+    return _take_2(buffer) if protocol == "2.0" else _take_1(buffer)
 
 
-def status(protocol: float, servo_id: int, error: int, data: bytes) -> bytes:
+def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
     """The bytes of a status."""
-    if protocol == 2.0:
+    if protocol == "2.0":
         return packet_2(servo_id, 0x55, bytes([error]) + data)
     body = bytes([servo_id, len(data) + 2, error]) + data
     return b"\xff\xff" + body + bytes([packet_checksum(body)])

@@ -1,17 +1,7 @@
-"""Transactions with the servos on one serial port, through the packet handlers of the official SDK.
+"""Transactions with the servos on one serial port, whatever packets they speak in.
 
-The SDK packs requests and unpacks answers, and nothing else, because of its faults (measured with version 4.1.0):
-
-- its readers index past the end of a short status, and give 0 for no data: here the length must be the one asked for;
-- it waits by the wall clock, at full load, and for ever while garbage flows: `SerialLine` waits on the monotonic clock,
-  asleep, and past the deadline gives nothing more;
-- it leaves the port "in use" after an exception: it never sends;
-- it takes the echo of a protocol 1.0 request for the answer: an adapter that echoes is found on opening, and exactly
-  what was sent is taken off what comes;
-- it does not stuff protocol 2.0 requests, and unstuffs answers in place, so that FF FD FD loses a byte after the first
-  FF FF FD FD: both are done here, outside of it.
-
-Whatever goes wrong is a `DeviceError`; what can be mended by asking again (a bit error, a lost packet) is asked again.
+An adapter that echoes is found on opening, and exactly what was sent is taken off what comes. An answer must be as long
+as was asked for. Whatever goes wrong is a `DeviceError`; what asking again can mend is asked again.
 """
 
 from __future__ import annotations
@@ -21,11 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
-
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.dynamixel.registers import Register
-from firmware_io.servo.dynamixel.serial_line import SerialLine, Tape
+from firmware_io.servo.bus.packet_format import PacketFormat, Status
+from firmware_io.servo.bus.registers import Register
+from firmware_io.servo.bus.serial_line import SerialLine
 
 PING, READ, WRITE, REBOOT = 1, 2, 3, 8
 BROADCAST = 254
@@ -34,21 +23,6 @@ _TRIES = 3
 _EXCUSED = 10  # tries in which this computer was kept from running: they say nothing of the servo
 _LATE = 4  # times the wait for an answer, until it is given up for good
 
-_CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
-_CHECKSUM_1 = 0b0001_0000
-_REFUSALS_1 = {2: "an angle beyond its limits", 8: "a value out of range", 64: "an instruction it does not know"}
-_HEADER, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
-_ALERT_2 = 0x80
-_CRC_2 = 3
-_REFUSALS_2 = {
-    1: "it could not carry it out",
-    2: "an instruction it does not know",
-    4: "a value out of range",
-    5: "a wrong length",
-    6: "a value beyond its limit",
-    7: "an address that cannot be accessed now",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class ServoAnswer:
@@ -56,7 +30,7 @@ class ServoAnswer:
 
     Attributes:
         data: parameters.
-        conditions: fault bits of the servo, protocol 1.0; the alert bit, protocol 2.0; 0 when it is well.
+        conditions: fault bits of the servo, or in protocol 2.0 one that says there are some; 0 when it is well.
         sampled_ns: `time.monotonic_ns()` when the servo took its values: the middle of the transaction, without the
             bytes' own time on the wire and without the return delay.
         bound_ns: the sampling lies within this of `sampled_ns`.
@@ -73,13 +47,13 @@ class ServoBus:
 
     Attributes:
         port: name of the port.
-        protocol: 1.0 or 2.0; may be changed.
+        packets: how they are packed; may be changed.
         return_delay_ns: what the servo waits between request and answer.
     """
 
-    def __init__(self, port: str, baud: int = 57600, protocol: float = 1.0) -> None:
+    def __init__(self, port: str, packets: PacketFormat, baud: int = 57600) -> None:
         self.port = port
-        self.protocol = protocol
+        self.packets = packets
         self.return_delay_ns = 0.0
         self._line = SerialLine(port, baud)
 
@@ -133,15 +107,16 @@ class ServoBus:
             ProtocolError: what came was damaged, three times.
             DeviceError: the servo refuses.
         """
-        return self._ask(servo_id, READ, self._number(register.address) + self._number(register.size), register.size)
+        number = self.packets.number
+        return self._ask(servo_id, READ, number(register.address) + number(register.size), register.size)
 
     def write(self, servo_id: int, register: Register, data: bytes) -> ServoAnswer:
         """Write the bytes of a register; raises as `read` does."""
-        return self._ask(servo_id, WRITE, self._number(register.address) + data, 0)
+        return self._ask(servo_id, WRITE, self.packets.number(register.address) + data, 0)
 
     def write_packet(self, servo_id: int, register: Register, data: bytes) -> bytes:
         """The bytes on the wire of a write."""
-        return self._packet(servo_id, WRITE, self._number(register.address) + data)
+        return self.packets.packet(servo_id, WRITE, self.packets.number(register.address) + data)
 
     def write_unanswered(self, servo_id: int, register: Register, data: bytes) -> None:
         """Write to a servo that may be set not to answer writes."""
@@ -152,33 +127,18 @@ class ServoBus:
         """Which servos answer a ping of one, or of all (254), in time; damaged answers are left out."""
         found: set[int] = set()
         with self._port_errors():
-            self._send(self._packet(servo_id, PING, b""), wait_s)
+            self._send(self.packets.packet(servo_id, PING, b""), wait_s)
             while not self._line.isPacketTimeout() and servo_id not in found:
                 with suppress(DeviceTimeoutError, ProtocolError):
-                    found.add(self._receive().id)
+                    found.add(self.packets.receive(self._line).id)
         return sorted(found)
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo of protocol 2.0; raises as `read` does."""
         self._ask(servo_id, REBOOT, b"", 0)
 
-    def _number(self, value: int) -> bytes:
-        """An address or a length."""
-        return value.to_bytes(2 if self.protocol == 2.0 else 1, "little")
-
-    def _packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
-        tape = Tape()
-        if self.protocol == 2.0:
-            parameters = parameters.replace(_HEADER, _STUFFED)
-            length = (len(parameters) + 3).to_bytes(2, "little")
-            Protocol2PacketHandler().txPacket(tape, [0, 0, 0, 0, servo_id, *length, instruction, *parameters, 0, 0])
-        else:
-            length = (len(parameters) + 2).to_bytes(1, "little")
-            Protocol1PacketHandler().txPacket(tape, [0, 0, servo_id, *length, instruction, *parameters, 0])
-        return tape.packet
-
     def _ask(self, servo_id: int, instruction: int, parameters: bytes, expected: int) -> ServoAnswer:
-        request = self._packet(servo_id, instruction, parameters)
+        request = self.packets.packet(servo_id, instruction, parameters)
         with self._port_errors():
             tries = excused = 0
             while True:
@@ -206,42 +166,21 @@ class ServoBus:
         with suppress(DeviceTimeoutError):
             while True:
                 with suppress(ProtocolError):
-                    self._receive()
+                    self.packets.receive(self._line)
 
-    def _receive(self, servo_id: int | None = None) -> _Status:
-        """The next status of a servo, or of any.
-
-        Raises:
-            DeviceTimeoutError: the deadline passed.
-            ProtocolError: what came is damaged.
-        """
+    def _receive(self, servo_id: int) -> Status:
+        """The next status of that servo; raises as `PacketFormat.receive`."""
         while True:
-            if self.protocol == 2.0:
-                packet, result = Protocol2PacketHandler().rxPacket(self._line, True)  # "fast": without unstuffing
-            else:
-                packet, result = Protocol1PacketHandler().rxPacket(self._line)
-            if result == COMM_RX_TIMEOUT:
-                raise DeviceTimeoutError(
-                    "no answer: look at its power and cable; another program may have set another speed"
-                )
-            if result != COMM_SUCCESS:
-                raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: look at cable, ground and other senders")
-            status = _split_2(packet) if self.protocol == 2.0 else _split_1(packet)
-            if servo_id in (None, status.id):
+            status = self.packets.receive(self._line)
+            if status.id == servo_id:
                 return status
 
-    def _checked(self, status: _Status, instruction: int, expected: int) -> ServoAnswer:
-        error, complete = status.error, len(status.data) == expected
-        if self.protocol == 2.0:
-            conditions, number = error & _ALERT_2, error & ~_ALERT_2
-            damaged, refusal = number == _CRC_2, _REFUSALS_2.get(number, f"error {number}") if number else None
-        else:
-            conditions, damaged = error & _CONDITIONS_1, bool(error & _CHECKSUM_1)
-            refusal = next((text for bit, text in _REFUSALS_1.items() if error & bit), None)
-        if damaged:
+    def _checked(self, status: Status, instruction: int, expected: int) -> ServoAnswer:
+        verdict, complete = self.packets.verdict(status.error), len(status.data) == expected
+        if verdict.damaged:
             raise ProtocolError("the request arrived damaged: look at cable and ground")
-        if refusal and not (complete and instruction == READ):  # a read that brings its values was no mistake
-            raise DeviceError(f"{self.port}: servo {status.id}: refused: {refusal}")
+        if verdict.refusal and not (complete and instruction == READ):  # a read that brings its values was no mistake
+            raise DeviceError(f"{self.port}: servo {status.id}: refused: {verdict.refusal}")
         if not complete:
             raise ProtocolError(f"{len(status.data)} bytes where {expected} were asked for")
         wire_ns = (len(self._line.sent) - status.length) * self._line.byte_s * 1e9
@@ -249,7 +188,7 @@ class ServoBus:
         known_ns = (len(self._line.sent) + status.length) * self._line.byte_s * 1e9 + self.return_delay_ns
         return ServoAnswer(
             data=status.data,
-            conditions=conditions,
+            conditions=verdict.conditions,
             sampled_ns=self._line.began_ns + round((total_ns + wire_ns - self.return_delay_ns) / 2),
             bound_ns=max(0, round((total_ns - known_ns) / 2)),
         )
@@ -262,26 +201,3 @@ class ServoBus:
             raise DeviceTimeoutError(
                 f"{self.port}: the port is gone ({error}): plug the adapter in, then open it again"
             ) from error
-
-
-@dataclass(frozen=True, slots=True)
-class _Status:
-    id: int
-    error: int
-    data: bytes
-    length: int  # on the wire
-
-
-def _split_1(packet: list[int]) -> _Status:
-    if len(packet) != packet[3] + 4 or len(packet) < 6:
-        raise ProtocolError(f"an answer of a wrong length: {bytes(packet).hex(' ')}")
-    return _Status(packet[2], packet[4], bytes(packet[5:-1]), len(packet))
-
-
-def _split_2(packet: list[int]) -> _Status:
-    if len(packet) != packet[5] + 256 * packet[6] + 7:
-        raise ProtocolError(f"an answer of a wrong length: {bytes(packet).hex(' ')}")
-    body = bytes(packet[7:-2]).replace(_STUFFED, _HEADER)
-    if len(body) < 2:
-        raise ProtocolError(f"an answer that is cut short: {bytes(packet).hex(' ')}")
-    return _Status(packet[4], body[1], body[2:], len(packet))

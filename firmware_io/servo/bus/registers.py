@@ -1,0 +1,186 @@
+"""Control tables of servos: where each value stands, how it is coded, what one count is worth.
+
+Units are SI: radians, radians per second, volts. Angles are counter-clockwise as one looks at the horn, 0 at the
+encoder's centre. Load is a fraction of the rated (stall) torque, or of the duty where that is all a servo tells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from design.errors import DeviceError
+from firmware_io.servo.bus.packet_format import PacketFormat
+
+RPM = 2 * math.pi / 60
+
+Sign = Literal["none", "twos"] | int
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One entry of a control table.
+
+    Attributes:
+        address: of its lowest byte; little-endian.
+        size: in bytes.
+        unit: what one count is worth; negative where counts grow clockwise.
+        sign: how negative counts are written; a number is that of the bit which is set for them, the size standing in
+            the bits below it.
+        name: of a setting that outlasts a scan, as the e-manual has it.
+    """
+
+    address: int
+    size: int
+    unit: float = 1.0
+    sign: Sign = "none"
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name} (register {self.address})" if self.name else f"register {self.address}"
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Smallest and largest count."""
+        if isinstance(self.sign, int):
+            return 1 - (1 << self.sign), (1 << self.sign) - 1
+        bits = 8 * self.size
+        return (-(1 << bits - 1), (1 << bits - 1) - 1) if self.sign == "twos" else (0, (1 << bits) - 1)
+
+    def encode(self, value: float) -> bytes:
+        """The bytes of a value in SI units, rounded to a count.
+
+        Raises:
+            DeviceError: it does not fit; nothing is masked or clipped.
+        """
+        low, high = self.bounds
+        if not low - 0.5 < value / self.unit < high + 0.5:
+            least, most = sorted((low * self.unit, high * self.unit))
+            raise DeviceError(f"{self}: {value:g}: not in {least:g} .. {most:g}")
+        count = round(value / self.unit)
+        if isinstance(self.sign, int):
+            return (abs(count) | ((1 << self.sign) if count < 0 else 0)).to_bytes(self.size, "little")
+        return count.to_bytes(self.size, "little", signed=self.sign == "twos")
+
+    def decode(self, data: bytes) -> float:
+        """The value in SI units of `size` bytes; the inverse of `encode`."""
+        count = int.from_bytes(data, "little", signed=self.sign == "twos")
+        if isinstance(self.sign, int):
+            size = count & (1 << self.sign) - 1
+            count = -size if count >> self.sign & 1 else size
+        return count * self.unit
+
+
+Setting = tuple[Register, int]
+
+
+@dataclass(frozen=True, slots=True)
+class ControlTable:
+    """What the driver needs to know of one model with one protocol.
+
+    Attributes:
+        model: name, as in the catalogue.
+        packets: how they are packed.
+        number: of the model, that stands in `model_number`.
+        ram: first address that is not kept without power; below it torque must be off to write.
+        centre: count of the encoder's centre, angle 0.
+        last: highest count of one turn, or of the range that the sensor covers.
+        measures_turn: False where the position sensor has a dead sector.
+        speed_loop: False where "speed" in wheel mode is a share of the supply voltage, and no speed is measured.
+        wheel: settings of continuous rotation.
+        joint: settings of going to an angle.
+        neutral: settings that would turn or shift the angles' zero, with the value that does not.
+        bauds: bits per second, by the count of `baud`.
+        answers_all: count of `status_return` with which everything is answered.
+        faults: what the bits of the fault byte mean: of `hardware_error` where there is one, else of each answer.
+        joint_speed: speed on the way to an angle; count 0 means unlimited.
+        max_torque: what `torque_limit` is when the servo starts; after a shutdown it is less.
+        lock: 1 in it keeps settings as they are, or writes to them from outlasting the power.
+        watchdog: stops a servo to which nobody talks for so long.
+    """
+
+    model: str
+    packets: PacketFormat
+    number: int
+    ram: int
+    centre: int
+    last: int
+    measures_turn: bool
+    speed_loop: bool
+    wheel: tuple[Setting, ...]
+    joint: tuple[Setting, ...]
+    neutral: tuple[Setting, ...]
+    bauds: dict[int, int]
+    answers_all: int
+    faults: dict[int, str]
+    model_number: Register
+    id: Register
+    baud: Register
+    return_delay_ns: Register
+    status_return: Register
+    torque: Register
+    wheel_speed: Register
+    joint_speed: Register
+    goal: Register
+    load: Register
+    velocity: Register
+    position: Register
+    voltage: Register
+    temperature: Register
+    torque_limit: Register | None = None
+    max_torque: Register | None = None
+    hardware_error: Register | None = None
+    lock: Register | None = None
+    watchdog: Register | None = None
+
+    @property
+    def protocol(self) -> str:
+        """As its maker calls it."""
+        return self.packets.protocol
+
+    @property
+    def can_be_mute(self) -> bool:
+        """Whether it can be set to answer nothing but pings: the levels are 0 pings, 1 questions, 2 everything."""
+        return self.answers_all > 1
+
+    @property
+    def fast(self) -> Setting:
+        """The setting for 1 Mbaud."""
+        return self.baud, self.baud_count(1_000_000)
+
+    def baud_count(self, baud: int) -> int:
+        """The count of a speed.
+
+        Raises:
+            DeviceError: the servo does not know it.
+        """
+        for count, known in self.bauds.items():
+            if known == baud:
+                return count
+        raise DeviceError(
+            f"{baud} baud: {self.model} knows {', '.join(str(one) for one in sorted(self.bauds.values()))}"
+        )
+
+    @property
+    def reach_rad(self) -> tuple[float, float]:
+        """The angles that it can go to, and tell."""
+        ends = [(count - self.centre) * self.goal.unit for count in (0, self.last)]
+        return min(ends), max(ends)
+
+    @property
+    def block(self) -> Register:
+        """All present values as one stretch of addresses, to be read in one transaction."""
+        present = (self.load, self.velocity, self.position, self.voltage, self.temperature)
+        first = min(register.address for register in present)
+        return Register(first, max(register.address + register.size for register in present) - first)
+
+    def names(self, code: int) -> str:
+        """The faults that a fault byte tells of."""
+        named = " and ".join(name for bit, name in self.faults.items() if code >> bit & 1)
+        return named or f"fault code {code}"
+
+    def pick(self, register: Register, block: bytes) -> float:
+        """One value out of the block."""
+        start = register.address - self.block.address
+        return register.decode(block[start : start + register.size])

@@ -1,0 +1,137 @@
+"""Packets of the protocols 1.0 and 2.0, through the packet handlers of the official SDK.
+
+The SDK packs requests and unpacks answers, and nothing else, because of its faults (measured with version 4.1.0):
+
+- its readers index past the end of a short status, and give 0 for no data: `ServoBus` wants the length it asked for;
+- it waits by the wall clock, at full load, and for ever while garbage flows: `SerialLine` waits on the monotonic clock,
+  asleep, and past the deadline gives nothing more;
+- it leaves the port "in use" after an exception: it never sends;
+- it takes the echo of a protocol 1.0 request for the answer: `SerialLine` has taken it off;
+- it does not stuff protocol 2.0 requests, and unstuffs answers in place, so that FF FD FD loses a byte after the first
+  FF FF FD FD: both are done here, outside of it.
+"""
+
+from __future__ import annotations
+
+from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
+
+from design.errors import DeviceTimeoutError, ProtocolError
+from firmware_io.servo.bus.packet_format import NO_ANSWER, Status, Verdict
+from firmware_io.servo.bus.serial_line import SerialLine
+
+_CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
+_CHECKSUM_1 = 0b0001_0000
+_REFUSALS_1 = {2: "an angle beyond its limits", 8: "a value out of range", 64: "an instruction it does not know"}
+_HEADER, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
+_ALERT_2 = 0x80
+_CRC_2 = 3
+_REFUSALS_2 = {
+    1: "it could not carry it out",
+    2: "an instruction it does not know",
+    4: "a value out of range",
+    5: "a wrong length",
+    6: "a value beyond its limit",
+    7: "an address that cannot be accessed now",
+}
+
+
+class Protocol1:
+    """AX and MX from the factory: FF FF, sum of the bytes."""
+
+    protocol = "1.0"
+    overhead = 14
+
+    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
+        """The bytes of a request."""
+        tape, length = _Tape(), (len(parameters) + 2).to_bytes(1, "little")
+        Protocol1PacketHandler().txPacket(tape, [0, 0, servo_id, *length, instruction, *parameters, 0])
+        return tape.packet
+
+    def number(self, value: int) -> bytes:
+        """An address or a length."""
+        return value.to_bytes(1, "little")
+
+    def acknowledged(self, servo_id: int) -> bytes:
+        """What the answer to a write begins with; whatever the servo reports of itself."""
+        return b"\xff\xff%c\x02" % servo_id
+
+    def receive(self, line: SerialLine) -> Status:
+        """The next status; raises as `PacketFormat.receive`."""
+        packet = _whole(*Protocol1PacketHandler().rxPacket(line))
+        if len(packet) != packet[3] + 4 or len(packet) < 6:
+            raise ProtocolError(f"an answer of a wrong length: {packet.hex(' ')}")
+        return Status(packet[2], packet[4], packet[5:-1], len(packet))
+
+    def verdict(self, error: int) -> Verdict:
+        """What the error byte means."""
+        refusal = next((text for bit, text in _REFUSALS_1.items() if error & bit), None)
+        return Verdict(error & _CONDITIONS_1, bool(error & _CHECKSUM_1), refusal)
+
+
+class Protocol2:
+    """X, and MX that were updated: FF FF FD 00, CRC, stuffing."""
+
+    protocol = "2.0"
+    overhead = 25
+
+    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
+        """The bytes of a request."""
+        tape, parameters = _Tape(), parameters.replace(_HEADER, _STUFFED)
+        length = (len(parameters) + 3).to_bytes(2, "little")
+        Protocol2PacketHandler().txPacket(tape, [0, 0, 0, 0, servo_id, *length, instruction, *parameters, 0, 0])
+        return tape.packet
+
+    def number(self, value: int) -> bytes:
+        """An address or a length."""
+        return value.to_bytes(2, "little")
+
+    def acknowledged(self, servo_id: int) -> bytes:
+        """What the answer to a write begins with; whatever the servo reports of itself."""
+        return b"\xff\xff\xfd\x00%c\x04\x00\x55" % servo_id
+
+    def receive(self, line: SerialLine) -> Status:
+        """The next status; raises as `PacketFormat.receive`."""
+        packet = _whole(*Protocol2PacketHandler().rxPacket(line, True))  # "fast": without unstuffing
+        if len(packet) != packet[5] + 256 * packet[6] + 7:
+            raise ProtocolError(f"an answer of a wrong length: {packet.hex(' ')}")
+        body = packet[7:-2].replace(_STUFFED, _HEADER)
+        if len(body) < 2:
+            raise ProtocolError(f"an answer that is cut short: {packet.hex(' ')}")
+        return Status(packet[4], body[1], body[2:], len(packet))
+
+    def verdict(self, error: int) -> Verdict:
+        """What the error byte means."""
+        conditions, number = error & _ALERT_2, error & ~_ALERT_2
+        return Verdict(conditions, number == _CRC_2, _REFUSALS_2.get(number, f"error {number}") if number else None)
+
+
+PROTOCOL_1, PROTOCOL_2 = Protocol1(), Protocol2()
+
+
+def _whole(packet: list[int], result: int) -> bytes:
+    """What the SDK has received.
+
+    Raises:
+        DeviceTimeoutError: nothing.
+        ProtocolError: something else.
+    """
+    if result == COMM_RX_TIMEOUT:
+        raise DeviceTimeoutError(NO_ANSWER)
+    if result != COMM_SUCCESS:
+        raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: look at cable, ground and other senders")
+    return bytes(packet)
+
+
+class _Tape:
+    """A line that keeps the bytes instead of sending them."""
+
+    is_using = False
+    packet = b""
+
+    def clearPort(self) -> None:
+        """Nothing comes."""
+
+    def writePort(self, packet: list[int]) -> int:
+        """Keep the request."""
+        self.packet = bytes(packet)
+        return len(packet)

@@ -1,0 +1,86 @@
+"""What `doctor` asks of a servo, telling it nothing: who it is, what it reports, how well it can be read."""
+
+from __future__ import annotations
+
+import time
+from contextlib import closing
+from dataclasses import dataclass
+from statistics import median
+
+from design.errors import DeviceError
+from firmware_io.servo.find import find_servo, open_bus
+from firmware_io.servo.fitness import Unfit, slow_adapter, unfit_settings
+
+_LISTEN_S = 0.3
+_READS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class ServoExamination:
+    """A servo as it was found.
+
+    Attributes:
+        who: port and number.
+        model: name, as in the catalogue.
+        speaks: protocol and speed, in words.
+        reports: what it says is wrong with it; None where it is well.
+        has_torque: something has driven it.
+        unfit: settings that are not as the driver wants them.
+        slow_adapter: what to do about an adapter that gathers bytes; None where it need not be.
+        reads_hz: how often it can be asked.
+        bound_ms: within which the time of an angle is known.
+        voltage_V: of its supply.
+        temperature_degC: inside.
+    """
+
+    who: str
+    model: str
+    speaks: str
+    reports: str | None
+    has_torque: bool
+    unfit: tuple[Unfit, ...]
+    slow_adapter: str | None
+    reads_hz: float
+    bound_ms: float
+    voltage_V: float  # noqa: N815 - volts
+    temperature_degC: float  # noqa: N815
+
+
+def examine_servo(port: str, model: str | None, servo_id: int | None) -> ServoExamination:
+    """Listen, then ask.
+
+    Args:
+        port: of the servo.
+        model: what it must be; None for any that is known.
+        servo_id: its number; None if it is alone.
+
+    Raises:
+        DeviceError: somebody else speaks on this port, no servo answers, several do, or it is another model.
+    """
+    with closing(open_bus(port)) as bus:
+        if heard := bus.listen(_LISTEN_S):
+            raise DeviceError(
+                f"{port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
+                "this bus, or something else hangs on this port; nothing was sent to it"
+            )
+        unit = find_servo(bus, model, servo_id)
+        table = unit.table
+        reports, has_torque = unit.told(unit.read(table.block)), bool(unit.count(table.torque))
+        unfit = tuple(unfit_settings(unit))
+        bus.return_delay_ns = unit.value(table.return_delay_ns)
+        began_s = time.monotonic()
+        answers = [unit.read(table.block) for _ in range(_READS)]
+        reads_hz = _READS / (time.monotonic() - began_s)
+        return ServoExamination(
+            who=str(unit),
+            model=table.model,
+            speaks=f"protocol {table.protocol} at {bus.baud} baud",
+            reports=reports,
+            has_torque=has_torque,
+            unfit=unfit,
+            slow_adapter=slow_adapter(port),
+            reads_hz=reads_hz,
+            bound_ms=median(answer.bound_ns for answer in answers) / 1e6,
+            voltage_V=table.pick(table.voltage, answers[-1].data),
+            temperature_degC=table.pick(table.temperature, answers[-1].data),
+        )
