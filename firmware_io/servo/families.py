@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.servo.dynamixel.tables import TABLES as DYNAMIXEL_TABLES
+from firmware_io.servo.feetech.tables import TABLES as FEETECH_TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,7 @@ FAMILIES = (
         DYNAMIXEL_TABLES,
         (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000, 500_000, 200_000, 9600),
     ),
+    ServoFamily("Feetech", FEETECH_TABLES, (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400)),
 )
 
 

@@ -68,7 +68,9 @@ def find_servo(
             stranger = error
             continue
         table = _any_table(packets)
-        if table.can_be_mute and mute == (speed, packets.protocol, found_id):
+        if not table.can_be_mute:
+            continue
+        if mute == (speed, packets.protocol, found_id):
             raise DeviceError(
                 f"{bus.port}: servo {found_id} answers pings only: its {table.status_return} is 0; "
                 f"`scanwright doctor --fix --servo {bus.port}` sets it to {table.answers_all}"

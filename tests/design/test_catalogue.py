@@ -37,7 +37,18 @@ def test_all_products_of_the_issue_are_there(shipped):
     by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
     assert by_kind[Lidar] == {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX", "LMS 200"}
     assert by_kind[Servo] == {
-        *("AX-12A", "MX-28", "MX-64R", "MX-106", "XL330-M288", "XL430-W250", "XM430-W350", "XH430-W350", "XM540-W270"),
+        *(
+            "AX-12A",
+            "MX-28",
+            "MX-64R",
+            "MX-106",
+            "XL330-M288",
+            "XL430-W250",
+            "XM430-W350",
+            "XH430-W350",
+            "XM540-W270",
+            "STS3215",
+        ),
     }
     assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"}
     assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"}
@@ -214,7 +225,12 @@ def test_the_table_has_a_row_for_every_product_and_a_mark_for_every_doubt(shippe
 
 
 def test_a_filter_keeps_what_is_known_to_keep_it(shipped):
-    assert {p.name for p in chosen(shipped, kind="servo", max_price_usd=60)} == {"AX-12A", "XL330-M288", "XL430-W250"}
+    assert {p.name for p in chosen(shipped, kind="servo", max_price_usd=60)} == {
+        "AX-12A",
+        "STS3215",
+        "XL330-M288",
+        "XL430-W250",
+    }
     cheap = chosen(shipped, max_price_usd=1e9)
     assert all(p.price_usd is not None for p in cheap) and "MX-28" not in {p.name for p in cheap}
     assert {p.kind for p in chosen(shipped, min_range_m=15)} == {"lidar"}

@@ -7,22 +7,16 @@ that an AX-12A reads 0 or 1023 in its dead sector, the end that is nearer.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
-from design.errors import DeviceError
 from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.servo.dynamixel.tables import TABLES
 from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
-from firmware_io.twins.servo.dynamixel_memory import ACCESS, INDIRECT, ITEMS, RANGE, Memory
-from firmware_io.twins.servo.dynamixel_packets import (
-    BROADCAST,
-    FAST_BULK_READ,
-    FAST_SYNC_READ,
-    Request,
-    fast_status,
-    status,
-)
+from firmware_io.twins.servo.dynamixel_memory import INDIRECT, ITEMS
+from firmware_io.twins.servo.dynamixel_packets import FAST_BULK_READ, FAST_SYNC_READ, fast_status, status, take
+from firmware_io.twins.servo.machine import BROADCAST, Request
+from firmware_io.twins.servo.memory import ACCESS, RANGE, Memory
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
@@ -33,7 +27,7 @@ _ERRORS_1 = {RANGE: 8, ACCESS: 8}  # the others of protocol 2.0 are instruction 
 
 
 class DynamixelMachine:
-    """One servo with power.
+    """One servo with power; methods as `ServoMachine` has them.
 
     Attributes:
         table: what the driver knows of the model.
@@ -41,15 +35,15 @@ class DynamixelMachine:
         axis: the true motion of the horn.
     """
 
-    def __init__(self, model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> None:
-        self.table = _table(model, protocol)
+    def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
+        self.table = table
         self.memory = Memory({item.address: item for item in ITEMS[self.table.number]}, self.table.ram)
-        self.axis = HornMotion(plant_of(model), load, time_ns, angle_rad=angle_rad)
+        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
         self._pointers = INDIRECT.get(self.table.number, {})  # to the targets of indirect data
         self._turns = 0  # of the axis, when the servo last began to count
         self._latched = 0
         self._hot_degC = 30
-        self._rated_v = load_catalogue().get(model, Servo).rated_v
+        self._rated_v = load_catalogue().get(table.model, Servo).rated_v
         self._supply = 1.0
         self._strained_since_ns: int | None = None
         self._mute_until_ns = time_ns
@@ -84,13 +78,30 @@ class DynamixelMachine:
         error, data = self._carry_out(request, now_ns)
         return None if error is None else (error | self._conditions(), data)
 
-    def respond(self, request: Request, now_ns: int) -> bytes | None:
-        """Carry out a request; the bytes of the answer, None where there is none."""
-        if (answered := self.answer(request, now_ns)) is None:
+    def take(self, buffer: bytearray) -> Request | None:
+        """Take the next request off a buffer."""
+        return take(buffer, self.table.protocol)
+
+    def in_turn(self, request: Request) -> tuple[int, ...] | None:
+        """The servos that answer one after the other: those of sync and bulk reads."""
+        if request.id != BROADCAST or not request.intact:
             return None
-        if request.instruction in (FAST_SYNC_READ, FAST_BULK_READ):
-            return fast_status(self.id, *answered)
-        return status(self.table.protocol, self.id, *answered)
+        if request.instruction in (0x82, FAST_SYNC_READ) and self._two:
+            return tuple(request.parameters[4:])
+        if request.instruction in (0x92, FAST_BULK_READ):
+            return tuple(request.parameters[::5] if self._two else request.parameters[2::3])
+        return None
+
+    def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
+        """The bytes of what servos say: one status each, or one of all to a fast read."""
+        if self._two and request.id == BROADCAST and request.instruction in (FAST_SYNC_READ, FAST_BULK_READ):
+            parameters = request.parameters
+            if request.instruction == FAST_SYNC_READ:
+                size = len(parameters[4:]) * (self._span(parameters)[1] + 4)
+            else:
+                size = sum(self._span(parameters[k + 1 :])[1] + 4 for k in range(0, len(parameters), 5))
+            return [fast_status(size, said)]
+        return [status(self.table.protocol, *one) for one in said]
 
     def overheat(self) -> None:
         """The motor is 5 degrees above its limit."""
@@ -141,11 +152,8 @@ class DynamixelMachine:
         if request.instruction == 2 and not to_all:
             error, data = self._read(*self._span(parameters), now_ns)
             return (None if level < 1 else error), data
-        if request.instruction in (FAST_SYNC_READ, FAST_BULK_READ) and to_all and self._two:
-            # Servos add their parts to one status, in the order asked for: this one is alone on its bus.
-            ids = parameters[4:] if request.instruction == FAST_SYNC_READ else parameters[::5]
-            return self._read_among_others(request, now_ns) if ids == bytes([self.id]) else (None, b"")
-        if request.instruction in (0x82, 0x92) and to_all:
+        fast = self._two and request.instruction in (FAST_SYNC_READ, FAST_BULK_READ)
+        if to_all and (fast or request.instruction in (0x82, 0x92)):
             return self._read_among_others(request, now_ns)
         error = self._change(request, now_ns)
         return (None if to_all or level < 2 else error), b""
@@ -368,15 +376,6 @@ class DynamixelMachine:
             if not self._two:
                 memory[34] = 0
             self._act(now_ns)
-
-
-def _table(model: str, protocol: str | None) -> ControlTable:
-    for table in TABLES:
-        if table.model == model and protocol in (None, table.protocol):
-            return table
-    known = ", ".join(f"{table.model} with {table.protocol}" for table in TABLES)
-    asked = model if protocol is None else f"{model} with {protocol}"
-    raise DeviceError(f"there is no twin of a servo {asked}; there are: {known}")
 
 
 def _bit10(count: int) -> int:

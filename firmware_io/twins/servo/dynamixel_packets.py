@@ -6,29 +6,11 @@ checks the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-BROADCAST = 254
+from firmware_io.twins.servo.machine import BROADCAST, Request
+
 FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """One instruction packet.
-
-    Attributes:
-        id: of the servo it is for.
-        instruction: its number.
-        parameters: without stuffing.
-        wire: its bytes.
-        intact: whether the checksum is right.
-    """
-
-    id: int
-    instruction: int
-    parameters: bytes
-    wire: bytes
-    intact: bool
 
 
 def packet_checksum(body: bytes) -> int:
@@ -59,11 +41,20 @@ def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
     return b"\xff\xff" + body + bytes([packet_checksum(body)])
 
 
-def fast_status(servo_id: int, error: int, data: bytes) -> bytes:
-    """The bytes of the status that one servo gives to a fast read: from all of them, its own id within, not stuffed."""
-    body = bytes([0x55, error, servo_id]) + data
-    packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, "little") + body
-    return packet + crc16(packet).to_bytes(2, "little")
+def fast_status(size: int, parts: Sequence[tuple[int, int, bytes]]) -> bytes:
+    """The bytes of the one status that servos give to a fast read together: each adds its part, and none is stuffed.
+
+    A part is the error, the id, the data, and the CRC of all that went before it.
+
+    Args:
+        size: of the data of all servos that were asked, with 4 bytes for each: the length stands in front.
+        parts: id, error and data of those that answer, in the order in which they were asked.
+    """
+    packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (size + 1).to_bytes(2, "little") + b"\x55"
+    for servo_id, error, data in parts:
+        packet += bytes([error, servo_id]) + data
+        packet += crc16(packet).to_bytes(2, "little")
+    return packet
 
 
 def packet_2(servo_id: int, instruction: int, parameters: bytes) -> bytes:

@@ -1,8 +1,8 @@
 """The twin of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
 
-It answers both protocols byte by byte with their timing: bytes take their time at the baud rate, the return delay is
+It answers in each protocol byte by byte with their timing: bytes take their time at the baud rate, the return delay is
 kept, a client at another speed is not understood. What it answers and how it turns is
-`dynamixel_machine` and `dynamics`. Faults come on demand, by methods.
+the `ServoMachine` of its family. Faults come on demand, by methods.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import termios
 import threading
 import time
 import tty
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
@@ -26,8 +26,8 @@ from types import TracebackType
 from typing import Self
 
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.servo.dynamixel_machine import DynamixelMachine
-from firmware_io.twins.servo.dynamixel_packets import take
+from firmware_io.twins.servo.machine import ServoMachine, answers
+from firmware_io.twins.servo.models import machine_of
 
 _TICK_S = 0.02  # between two looks of the servo at itself
 _FORGET_NS = 100_000_000  # a request that stays incomplete is dropped
@@ -43,9 +43,10 @@ class ServoTwin:
 
     Args:
         model: name, as in the catalogue.
-        protocol: "1.0", "2.0", or None for the one that the model has from the factory.
+        protocol: as the maker calls it, or None for the one that the model has from the factory.
         load: what hangs on the horn.
         angle_rad: of the horn when it is switched on.
+        beside: other servos on the bus: model and number.
         echo: whether the adapter returns what it sends.
         seed: of the bit errors.
     """
@@ -57,14 +58,19 @@ class ServoTwin:
         *,
         load: Load | None = None,
         angle_rad: float = 0.0,
+        beside: Sequence[tuple[str, int]] = (),
         echo: bool = False,
         seed: int = 0,
     ) -> None:
-        self._servo = DynamixelMachine(
-            model, protocol, Load() if load is None else load, time.monotonic_ns(), angle_rad
-        )
+        now_ns = time.monotonic_ns()
+        self._servo = machine_of(model, protocol, Load() if load is None else load, now_ns, angle_rad)
+        self._servos = [self._servo]
+        for beside_model, beside_id in beside:
+            other = machine_of(beside_model, self._servo.table.protocol, Load(), now_ns, 0.0)
+            other.memory[other.table.id.address] = beside_id
+            self._servos.append(other)
         self.axis, self.memory = self._servo.axis, self._servo.memory
-        self._protocol, self._echo = self._servo.table.protocol, echo
+        self._echo = echo
         self._random = random.Random(seed)
         self._bit_error_rate = 0.0
         self._cut = False
@@ -167,7 +173,8 @@ class ServoTwin:
             ports = [] if self._master < 0 else [self._master]
             ready = select.select([self._wake_read, *ports], [], [], _TICK_S)[0]
             now_ns = time.monotonic_ns()
-            self._servo.protect(now_ns)
+            for servo in self._servos:
+                servo.protect(now_ns)
             if self._wake_read in ready:
                 os.read(self._wake_read, 1)
                 task = self._jobs.get()
@@ -182,21 +189,22 @@ class ServoTwin:
                 if now_ns - heard_ns > _FORGET_NS:
                     buffer.clear()
                 heard_ns = now_ns
-                if not self._cut and self._servo.listens(now_ns) and self._understands():
+                if not self._cut and (hearing := self._hearing(now_ns)):
                     buffer += data
-                    self._serve(buffer, now_ns)
+                    self._serve(hearing, buffer, now_ns)
 
-    def _understands(self) -> bool:
-        """Whether the client's baud rate is the servo's, within 3 %."""
-        return abs(_client_baud(self._master) / self._servo.baud - 1) < 0.03
+    def _hearing(self, now_ns: int) -> list[ServoMachine]:
+        """The servos that are up, and whose baud rate is the client's within 3 %."""
+        baud = _client_baud(self._master)
+        return [servo for servo in self._servos if servo.listens(now_ns) and abs(baud / servo.baud - 1) < 0.03]
 
-    def _serve(self, buffer: bytearray, begin_ns: int) -> None:
-        """Answer the requests in the buffer, the first byte of which came at `begin_ns`."""
-        byte_ns = 10e9 / self._servo.baud
-        while request := take(buffer, self._protocol):
+    def _serve(self, hearing: Sequence[ServoMachine], buffer: bytearray, begin_ns: int) -> None:
+        """Let them answer the requests in the buffer, the first byte of which came at `begin_ns`."""
+        byte_ns = 10e9 / hearing[0].baud
+        while request := hearing[0].take(buffer):
             arrived_ns = begin_ns + round(len(request.wire) * byte_ns)
-            delay_ns, begin_ns = self._servo.return_delay_ns, arrived_ns
-            if answer := self._servo.respond(request, arrived_ns):
+            delay_ns, begin_ns = hearing[0].return_delay_ns, arrived_ns
+            for answer in answers(hearing, request, arrived_ns):
                 begin_ns += delay_ns + round(len(answer) * byte_ns)
                 time.sleep(max(0.0, (begin_ns - time.monotonic_ns()) / 1e9))
                 self._send(self._damaged(answer))

@@ -13,7 +13,7 @@ import pytest
 from patience import until
 
 from firmware_io import device_ports, serial_port
-from firmware_io.servo.dynamixel.tables import TABLES
+from firmware_io.servo.families import all_tables
 from firmware_io.twins.servo import twin as servo_twin
 from firmware_io.twins.servo.dynamixel_packets import take
 from firmware_io.twins.servo.twin import ServoTwin
@@ -52,32 +52,40 @@ def instructions(said, protocol):
 
 def spoil(twin):
     """Everything that the driver would set is otherwise; in counts, by address."""
-    two = 64 in twin.memory
-    for address, count in ({10: 1, 20: -500, 9: 200} if two else {20: 500, 22: 2, 5: 200}).items():
+    spoilt = {"1.0": {20: 500, 22: 2, 5: 200}, "2.0": {10: 1, 20: -500, 9: 200}, "STS": {31: 500, 30: 2, 7: 200}}
+    for address, count in spoilt[table_of(twin).protocol].items():
         twin.memory[address] = count
 
 
 def kept(twin):
     """The settings of a twin that outlast its power."""
-    return bytes(twin.memory.data[: 64 if 64 in twin.memory else 24])
+    return bytes(twin.memory.data[: table_of(twin).ram])
 
 
-@pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("AX-12A", "1.0")])
+def table_of(twin):
+    return twin._servo.table
+
+
+@pytest.mark.parametrize(
+    ("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("AX-12A", "1.0"), ("STS3215", "STS")]
+)
 def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, heard, command):
     with ServoTwin(model, protocol) as twin:
         if model != "AX-12A":
             spoil(twin)
-        twin.memory[24 if protocol == "1.0" else 64] = 1  # somebody's arm hangs on it
+        torque = table_of(twin).torque.address
+        twin.memory[torque] = 1  # somebody's arm hangs on it
         before = bytes(twin.memory.data)
         code, said, _ = command("doctor", "--servo", twin.port)
         assert bytes(twin.memory.data[: len(kept(twin)) + 2]) == before[: len(kept(twin)) + 2]
-        assert twin.memory[24 if protocol == "1.0" else 64] == 1
+        assert twin.memory[torque] == 1
+        delay = table_of(twin).return_delay_ns
     assert set(instructions(heard, "1.0")) | set(instructions(heard, "2.0")) <= {PING, READ}
-    assert READ in instructions(heard, protocol)
+    assert READ in instructions(heard, "2.0" if protocol == "2.0" else "1.0")  # the frames of the STS are those of 1.0
     assert "has its torque on" in said
     assert code == 1  # there is no lidar
     if model != "AX-12A":
-        assert f"return_delay_time (register {5 if protocol == '1.0' else 9}) is 200, so that its answers come" in said
+        assert f"{delay} is 200, so that its answers come" in said
         assert "`scanwright doctor --fix --servo" in said
 
 
@@ -114,7 +122,7 @@ def test_where_something_speaks_first_nothing_is_said(command):
     assert "bytes came unasked" in said and "nothing was sent" in said
 
 
-@pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0")])
+@pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")])
 def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path):
     with ServoTwin(model, protocol) as twin:
         spoil(twin)
@@ -229,7 +237,7 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
 def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
     from firmware_io.servo.fitness import settable
 
-    for table in TABLES:
+    for table in all_tables():
         names = settable(table)
         assert "" not in names
         assert {register for register, _ in (*table.neutral, table.fast)} < set(names.values())

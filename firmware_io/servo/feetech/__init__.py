@@ -1,0 +1,1 @@
+"""Feetech STS and SMS: packets of our own, control tables."""

@@ -1,0 +1,95 @@
+"""Packets of Feetech's STS and SMS servos: FF FF, id, length, instruction or status, parameters, sum.
+
+The maker's SDK (`ftservo-python-sdk` 2.0.1, MIT) is a copy of the Dynamixel one for protocol 1.0 with its faults: it
+waits by the wall clock at full load, for ever while garbage flows, and keeps its port "in use" after an exception. What
+is left of it once these are worked around is this page, so this page stands here.
+
+The frame and its sum are those of Dynamixel's protocol 1.0, so each family answers the other's pings; the status byte,
+the registers and the signs are not. A servo that gets a damaged request says nothing.
+"""
+
+from __future__ import annotations
+
+from design.errors import DeviceTimeoutError, ProtocolError
+from firmware_io.servo.bus.packet_format import NO_ANSWER, Status, Verdict
+from firmware_io.servo.bus.serial_line import SerialLine
+
+_HEADER = b"\xff\xff"
+_SHORTEST = 6  # header, id, length, status, sum
+_LAST_ID = b"\xfd"
+_LONGEST = 250
+
+
+def checksum(body: bytes) -> int:
+    """Of everything between header and sum."""
+    return ~sum(body) & 0xFF
+
+
+def request(servo_id: int, instruction: int, parameters: bytes) -> bytes:
+    """The bytes of a request."""
+    body = bytes([servo_id, len(parameters) + 2, instruction]) + parameters
+    return _HEADER + body + bytes([checksum(body)])
+
+
+def begun(data: bytes) -> bytes:
+    """What is left of bytes from the first on with which a status may begin."""
+    for start in range(len(data)):
+        head = data[start : start + 4]
+        fits = head[2:3] <= _LAST_ID and (len(head) < 4 or 2 <= head[3] <= _LONGEST)
+        if fits and _HEADER.startswith(head[:2]):
+            return data[start:]
+    return b""
+
+
+def whole_length(data: bytes) -> int:
+    """How long the status is that begins here; as long as the shortest while that is not known."""
+    return data[3] + 4 if len(data) > 3 else _SHORTEST
+
+
+def status(data: bytes) -> Status:
+    """Take a whole status apart.
+
+    Raises:
+        ProtocolError: its sum is wrong.
+    """
+    if data[-1] != checksum(data[2:-1]):
+        raise ProtocolError(f"damaged answer {data.hex(' ')}: look at cable, ground and other senders")
+    return Status(data[2], data[4], data[5:-1], len(data))
+
+
+class Sts:
+    """The `PacketFormat` of them."""
+
+    protocol = "STS"
+    overhead = 14
+
+    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
+        """The bytes of a request."""
+        return request(servo_id, instruction, parameters)
+
+    def number(self, value: int) -> bytes:
+        """An address or a length."""
+        return value.to_bytes(1, "little")
+
+    def acknowledged(self, servo_id: int) -> bytes:
+        """What the answer to a write begins with; whatever the servo reports of itself."""
+        return _HEADER + bytes([servo_id, 2])
+
+    def receive(self, line: SerialLine) -> Status:
+        """The next status; raises as `PacketFormat.receive`."""
+        heard, came = b"", False
+        while len(heard) < (wanted := whole_length(heard)):
+            more = line.readPort(wanted - len(heard))
+            if not more:
+                if came:
+                    raise ProtocolError(f"damaged answer {heard.hex(' ')}: look at cable, ground and other senders")
+                raise DeviceTimeoutError(NO_ANSWER)
+            heard, came = begun(heard + more), True
+        return status(heard)
+
+    def verdict(self, error: int) -> Verdict:
+        """What the status byte means: it tells of the servo only, and refuses nothing."""
+        return Verdict(conditions=error)
+
+
+STS = Sts()

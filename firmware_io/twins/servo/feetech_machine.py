@@ -1,0 +1,241 @@
+"""A Feetech STS3215 without its bus: memory table, instructions, motion and protection, at whatever time it is told.
+
+Not published by the maker and therefore assumed: how long a restart takes, that a damaged request is not answered, that
+values beyond their bounds are not taken, and that an overload, which leaves the torque of register 34, ends when the
+torque is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
+from firmware_io.servo.bus.registers import ControlTable
+from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
+from firmware_io.twins.servo import feetech_packets
+from firmware_io.twins.servo.machine import BROADCAST, Request
+from firmware_io.twins.servo.memory import Memory, TableItem, ro, rw
+
+_BOOT_S = 0.5
+_VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32
+_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
+_PING, _READ, _WRITE, _REG_WRITE, _ACTION, _SYNC_READ, _SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
+_ID, _BAUD, _DELAY, _LEVEL, _OFFSET, _MODE, _TORQUE, _LOCK, _PRESENT = 5, 6, 7, 8, 31, 33, 40, 55, 56
+_TO_CENTRE = 128  # written to the torque: the horn stands at 2048 from now on
+
+_ITEMS: tuple[TableItem, ...] = (
+    *(
+        ro(0, 1, 3),
+        ro(1, 1, 10),
+        ro(2, 1),
+        ro(3, 2, 777),
+        rw(_ID, 1, 1, 253),
+        rw(_BAUD, 1, 0, 7),
+        rw(_DELAY, 1, 250, 254),
+    ),
+    *(rw(_LEVEL, 1, 1, 1), rw(9, 2, 0, 4094), rw(11, 2, 4095, 4095), rw(13, 1, 70, 100), rw(14, 1, 140, 254)),
+    *(rw(15, 1, 40, 254), rw(16, 2, 1000, 1000), rw(18, 1, 12, 254), rw(19, 1, 44, 254), rw(20, 1, 47, 254)),
+    *(rw(21, 1, 32, 254), rw(22, 1, 32, 254), rw(23, 1, 0, 254), rw(24, 1, 16, 254), rw(25, 1, 0, 254)),
+    *(rw(26, 1, 1, 16), rw(27, 1, 1, 16), rw(28, 2, 500, 2047), rw(30, 1, 1, 128, 1), rw(_OFFSET, 2, 0, 4095)),
+    *(rw(_MODE, 1, 0, 3), rw(34, 1, 20, 254), rw(35, 1, 200, 254), rw(36, 1, 80, 254), rw(37, 1, 10, 254)),
+    *(rw(38, 1, 200, 254), rw(39, 1, 10, 254), rw(_TORQUE, 1, 0, 128), rw(41, 1, 0, 254), rw(42, 2, 2048)),
+    *(rw(44, 2, 0), rw(46, 2, 0), rw(48, 2, 1000, 1000), rw(_LOCK, 1, 1, 1), ro(_PRESENT, 2), ro(58, 2), ro(60, 2)),
+    *(ro(62, 1), ro(63, 1), ro(64, 1), ro(65, 1), ro(66, 1), ro(67, 2), ro(69, 2)),
+)
+
+
+class FeetechMachine:
+    """One servo with power; methods as `ServoMachine` has them.
+
+    Attributes:
+        table: what the driver knows of the model.
+        memory: the memory table, signs as on the wire.
+        axis: the true motion of the horn.
+    """
+
+    def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
+        self.table = table
+        self.memory = Memory({item.address: item for item in _ITEMS}, table.ram)
+        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
+        self._rated_v = load_catalogue().get(table.model, Servo).rated_v
+        self._kept = bytes(self.memory.data[: table.ram])  # what outlasts the power
+        self._supply = 1.0
+        self._hot_degC = 30
+        self._latched = 0
+        self._strained_since_ns: int | None = None
+        self._turns = 0  # of the axis, when position mode last began
+        self._mute_until_ns = time_ns
+        self._registered: tuple[int, bytes] | None = None
+
+    @property
+    def id(self) -> int:
+        """The servo's number on the bus."""
+        return self.memory[_ID]
+
+    @property
+    def baud(self) -> float:
+        """Bits per second that it understands."""
+        return _BAUDS[self.memory[_BAUD]]
+
+    @property
+    def return_delay_ns(self) -> int:
+        """Between a request's end and the answer's begin."""
+        return self.memory[_DELAY] * 2000
+
+    def take(self, buffer: bytearray) -> Request | None:
+        """Take the next request off a buffer."""
+        return feetech_packets.take(buffer)
+
+    def listens(self, now_ns: int) -> bool:
+        """Whether it is up after a restart."""
+        return now_ns >= self._mute_until_ns
+
+    def in_turn(self, request: Request) -> tuple[int, ...] | None:
+        """The servos of a sync read answer one after the other."""
+        return tuple(request.parameters[2:]) if request.instruction == _SYNC_READ else None
+
+    def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
+        """The bytes of what servos say."""
+        del request
+        return [feetech_packets.status(*one) for one in said]
+
+    def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
+        """Carry out a request; status byte and data of the answer, None where there is none."""
+        if request.id not in (self.id, BROADCAST) or not request.intact:
+            return None
+        parameters, to_all = request.parameters, request.id == BROADCAST
+        if request.instruction == _PING:
+            return self._status(), b""
+        if request.instruction == _READ and len(parameters) == 2 and not to_all:
+            return self._status(), self._read(parameters[0], parameters[1], now_ns)
+        if request.instruction == _SYNC_READ and to_all:
+            mine = self.id in parameters[2:]
+            return (self._status(), self._read(parameters[0], parameters[1], now_ns)) if mine else None
+        answers_all = bool(self.memory[_LEVEL])
+        self._change(request, now_ns)
+        return None if to_all or not answers_all else (self._status(), b"")
+
+    def overheat(self) -> None:
+        """The motor is 5 degrees above its limit."""
+        self._hot_degC = self.memory[13] + 5
+
+    def overload(self, now_ns: int) -> None:
+        """The overload protection trips."""
+        self._latched |= _OVERLOAD
+        self._act(now_ns)
+
+    def set_voltage(self, volts: float, now_ns: int) -> None:
+        """The supply gives another voltage."""
+        self._supply = volts / self._rated_v
+        self.axis.change(now_ns, supply=self._supply)
+
+    def restart(self, now_ns: int) -> None:
+        """Back to what was kept, and the values at power-up; deaf and mute until that is done."""
+        self.memory.reset(self.table.ram)
+        self.memory.data[: self.table.ram] = self._kept
+        self.memory[48] = self.memory[16]
+        self._latched, self._registered, self._hot_degC = 0, None, 30
+        self._mute_until_ns = now_ns + round(_BOOT_S * 1e9)
+        self._act(now_ns)
+
+    def protect(self, now_ns: int) -> None:
+        """What the servo watches by itself: voltage, heat, load."""
+        bits = self._state_bits()
+        if bits & self.memory[19] and self.memory[_TORQUE]:
+            self.memory[_TORQUE] = 0
+            self._act(now_ns)
+        share, since = self.memory[36] / 100 * self._supply, self._strained_since_ns
+        if abs(self.axis.motion(now_ns).torque) < share:
+            self._strained_since_ns = None
+        elif since is None:
+            self._strained_since_ns = now_ns
+        elif now_ns - since > self.memory[35] * 10_000_000 and not self._latched & _OVERLOAD:
+            self.overload(now_ns)
+
+    def _state_bits(self) -> int:
+        fits = self.memory[15] <= round(self._supply * self._rated_v * 10) <= self.memory[14]
+        return (0 if fits else _VOLTAGE) | (_HEAT if self._hot_degC > self.memory[13] else 0)
+
+    def _status(self) -> int:
+        return self._latched | self._state_bits()
+
+    def _read(self, address: int, size: int, now_ns: int) -> bytes:
+        motion, memory, table = self.axis.motion(now_ns), self.memory, self.table
+        memory[_PRESENT] = (round(motion.angle_rad / table.position.unit) + table.centre - self._offset()) % 4096
+        memory[58] = _sized(round(motion.rate_rad_s / table.velocity.unit), 15)
+        memory[60] = _sized(round(motion.duty / table.load.unit), 10)
+        memory[62], memory[63] = round(self._supply * self._rated_v * 10), self._hot_degC
+        memory[65], memory[66] = self._status(), int(abs(motion.rate_rad_s) > 0.01)
+        return bytes(memory.data[address : address + size]).ljust(size, b"\0")
+
+    def _offset(self) -> int:
+        return _signed(self.memory[_OFFSET], 11)
+
+    def _change(self, request: Request, now_ns: int) -> None:
+        parameters = request.parameters
+        if request.instruction == _WRITE and len(parameters) > 1:
+            self._write(parameters[0], parameters[1:], now_ns)
+        elif request.instruction == _REG_WRITE and len(parameters) > 1:
+            self._registered = parameters[0], parameters[1:]
+        elif request.instruction == _ACTION and self._registered:
+            (address, data), self._registered = self._registered, None
+            self._write(address, data, now_ns)
+        elif request.instruction == _SYNC_WRITE and len(parameters) > 2:
+            address, size, rest = parameters[0], parameters[1], parameters[2:]
+            for start in range(0, len(rest) - size, size + 1):
+                if rest[start] == self.id:
+                    self._write(address, rest[start + 1 : start + 1 + size], now_ns)
+
+    def _write(self, address: int, data: bytes, now_ns: int) -> None:
+        memory = self.memory
+        if memory.refuses(address, data, locked=False):
+            return
+        was_on, mode = memory[_TORQUE], memory[_MODE]
+        memory.data[address : address + len(data)] = data
+        if not memory[_LOCK]:
+            self._kept = bytes(memory.data[: self.table.ram])
+        if memory[_TORQUE] == _TO_CENTRE:
+            memory[_OFFSET] = _sized(round(self.axis.motion(now_ns).angle_rad / self.table.position.unit), 11)
+            memory[_TORQUE] = was_on
+        if not memory[_TORQUE]:
+            self._latched &= ~_OVERLOAD
+        if (memory[_TORQUE] and not was_on) or mode != memory[_MODE]:
+            self._turns = math.floor((self.axis.motion(now_ns).angle_rad + math.pi) / (2 * math.pi))
+        self._act(now_ns)
+
+    def _act(self, now_ns: int) -> None:
+        """Make the motor do what the memory says."""
+        drive, now = self._wanted(), self.axis.drive_at(now_ns)
+        if drive != Actuation(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
+            self.axis.change(
+                now_ns, mode=drive.mode, goal=drive.goal, rate_rad_s=drive.rate_rad_s, torque_limit=drive.torque_limit
+            )
+
+    def _wanted(self) -> Actuation:
+        memory, table = self.memory, self.table
+        if not memory[_TORQUE]:
+            return Actuation()
+        limit = memory[48] / 1000
+        if self._latched & _OVERLOAD:
+            limit = min(limit, memory[34] / 100)
+        if memory[_MODE] == 1:
+            rate_rad_s = _signed(memory[46], 15) * table.wheel_speed.unit
+            return Actuation("velocity", rate_rad_s, torque_limit=limit)
+        if memory[_MODE] == 0:
+            count = _signed(memory[42], 15) + self._offset() - table.centre
+            goal_rad = count * table.goal.unit + 2 * math.pi * self._turns
+            return Actuation("position", goal_rad, memory[46] * table.joint_speed.unit or math.inf, torque_limit=limit)
+        return Actuation()
+
+
+def _signed(count: int, bit: int) -> int:
+    """The number that a size with a bit for its sign stands for."""
+    size = count & (1 << bit) - 1
+    return -size if count >> bit & 1 else size
+
+
+def _sized(number: int, bit: int) -> int:
+    """A number as its size with a bit for its sign; the inverse of `_signed`."""
+    return min(abs(number), (1 << bit) - 1) | (1 << bit if number < 0 else 0)

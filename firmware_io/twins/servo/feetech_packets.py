@@ -1,0 +1,37 @@
+"""Packets of the STS as the servo sees them: requests out of a byte stream, statuses into bytes.
+
+Written from the table of frames in Feetech's protocol manual, and not from the driver's, so that each checks the other.
+"""
+
+from __future__ import annotations
+
+from firmware_io.twins.servo.machine import Request
+
+_LONGEST = 250
+
+
+def take(buffer: bytearray) -> Request | None:
+    """Take the next request off the buffer, and what lies before it; None until one is complete."""
+    while (at := buffer.find(b"\xff\xff")) >= 0:
+        del buffer[:at]
+        if len(buffer) < 4:
+            return None
+        servo_id, length = buffer[2], buffer[3]
+        if servo_id == 0xFF or length < 2 or length > _LONGEST:
+            del buffer[0]
+            continue
+        if len(buffer) < 4 + length:
+            return None
+        wire = bytes(buffer[: 4 + length])
+        del buffer[: 4 + length]
+        intact = (sum(wire[2:]) & 0xFF) == 0xFF  # with its sum, everything adds up to FF
+        return Request(servo_id, wire[4], wire[5:-1], wire, intact)
+    del buffer[: max(0, len(buffer) - 1)]
+    return None
+
+
+def status(servo_id: int, error: int, data: bytes) -> bytes:
+    """The bytes of a status."""
+    packet = bytearray(b"\xff\xff") + bytes([servo_id, 2 + len(data), error]) + data
+    packet.append(0xFF - sum(packet[2:]) % 256)
+    return bytes(packet)

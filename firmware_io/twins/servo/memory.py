@@ -1,0 +1,82 @@
+"""The control table of a twin: its entries, and the bytes that a program reads and writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+# Errors of a request, as protocol 2.0 numbers them; 1.0 knows only some (see `ServoTwin`).
+RANGE, LENGTH, ACCESS = 4, 5, 7
+
+
+@dataclass(frozen=True, slots=True)
+class TableItem:
+    """One entry; a writable one takes counts from `low` to `high`."""
+
+    address: int
+    size: int
+    value: int
+    low: int = 0
+    high: int = 0
+    writable: bool = False
+
+
+def rw(address: int, size: int, value: int, high: int | None = None, low: int = 0) -> TableItem:
+    """An entry to read and write, up to the most that its bytes hold unless told."""
+    return TableItem(address, size, value, low, (1 << 8 * size) - 1 if high is None else high, True)
+
+
+def ro(address: int, size: int, value: int = 0) -> TableItem:
+    """An entry to read."""
+    return TableItem(address, size, value)
+
+
+def signed(address: int, size: int, bound: int) -> TableItem:
+    """An entry to read and write, in two's complement."""
+    return TableItem(address, size, 0, -bound, bound, True)
+
+
+@dataclass(slots=True)
+class Memory:
+    """The bytes of a control table; `ram` is its first address that a restart resets."""
+
+    items: dict[int, TableItem]
+    ram: int
+    data: bytearray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.data = bytearray(max(item.address + item.size for item in self.items.values()))
+        self.reset(0)
+
+    def reset(self, first: int) -> None:
+        """Factory values from an address on."""
+        for item in self.items.values():
+            if item.address >= first:
+                self[item.address] = item.value
+
+    def __getitem__(self, address: int) -> int:
+        item = self.items[address]
+        return int.from_bytes(self.data[address : address + item.size], "little", signed=item.low < 0)
+
+    def __setitem__(self, address: int, value: int) -> None:
+        item = self.items[address]
+        self.data[address : address + item.size] = (value % (1 << 8 * item.size)).to_bytes(item.size, "little")
+
+    def __contains__(self, address: int) -> bool:
+        return address in self.items
+
+    def refuses(self, address: int, data: bytes, *, locked: bool) -> int:
+        """Why these bytes cannot be written there; 0 when they can. `locked`: nothing before the RAM can."""
+        end = address + len(data)
+        if not data or end > len(self.data):
+            return ACCESS
+        while address < end:
+            item = self.items.get(address)
+            if item is None or not item.writable or (locked and address < self.ram):
+                return ACCESS
+            if address + item.size > end:
+                return LENGTH
+            part = data[len(data) - (end - address) :][: item.size]
+            if not item.low <= int.from_bytes(part, "little", signed=item.low < 0) <= item.high:
+                return RANGE
+            address += item.size
+        return 0

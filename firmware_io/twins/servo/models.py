@@ -1,0 +1,36 @@
+"""Which machine a model of the catalogue is."""
+
+from __future__ import annotations
+
+from design.errors import DeviceError
+from firmware_io.servo.dynamixel import tables as dynamixel
+from firmware_io.servo.families import all_tables
+from firmware_io.servo.feetech import tables as feetech
+from firmware_io.twins.dynamics import Load
+from firmware_io.twins.servo.dynamixel_machine import DynamixelMachine
+from firmware_io.twins.servo.feetech_machine import FeetechMachine
+from firmware_io.twins.servo.machine import ServoMachine
+
+
+def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> ServoMachine:
+    """A servo with power.
+
+    Args:
+        model: name, as in the catalogue.
+        protocol: as its maker calls it; None for the one that the model has from the factory.
+        load: what hangs on the horn.
+        time_ns: now.
+        angle_rad: of the horn.
+
+    Raises:
+        DeviceError: nobody has written such a twin.
+    """
+    for table in all_tables():
+        if table.model == model and protocol in (None, table.protocol):
+            if table in dynamixel.TABLES:
+                return DynamixelMachine(table, load, time_ns, angle_rad)
+            if table in feetech.TABLES:
+                return FeetechMachine(table, load, time_ns, angle_rad)
+    known = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
+    asked = model if protocol is None else f"{model} with {protocol}"
+    raise DeviceError(f"there is no twin of a servo {asked}; there are: {known}")
