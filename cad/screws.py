@@ -66,9 +66,16 @@ class Trap:
         return self.across / math.sqrt(3)
 
 
-def trap_of(screw: Screw, printer: Printer) -> Trap | None:
-    """Nut trap of a screw; None where the profile asks for none."""
-    if printer.thread != "nut":
+def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | None:
+    """Nut trap of a screw; None where the profile asks for none.
+
+    Args:
+        screw: the size.
+        printer: the profile.
+        carries: whether the lidar hangs on it: threads in bare plastic creep, so these get nuts whatever it asks for.
+    """
+    bare = printer.plastic and (printer.thread == "cut" or screw.insert is None)
+    if printer.thread != "nut" and not (carries and bare):
         return None
     fit = printer.fit_clearance_mm
     return Trap(screw.nominal + printer.screw_clearance_mm / 2, screw.nut_across + fit, screw.nut_height + fit)
@@ -89,9 +96,20 @@ class Thread:
     insert: bool
 
 
-def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True) -> Thread:
-    """What a printer's profile gives a screw to hold on to."""
-    trap = trap_of(screw, printer) if room_for_nut else None
+def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True, carries: bool = False) -> Thread:
+    """What a printer's profile gives a screw to hold on to.
+
+    Args:
+        screw: the size.
+        printer: the profile.
+        room_for_nut: whether a nut finds room; where it does not and the lidar hangs on it, an insert does.
+        carries: whether the lidar hangs on it.
+    """
+    trap = trap_of(screw, printer, carries=carries)
+    if trap is not None and not room_for_nut:
+        if carries and screw.insert is not None:
+            return Thread(screw.insert, None, True)
+        trap = None
     hole = thread_hole(screw, printer) if trap is None else trap.hole
     return Thread(hole, trap, printer.thread == "insert" and screw.insert is not None)
 

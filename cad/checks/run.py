@@ -18,6 +18,7 @@ from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
+from cad.checks.retention import retention_checks
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
 
@@ -65,6 +66,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *clearance_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(scanner, layout.stack, bodies),
+        *retention_checks(scanner, assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes),
         *doubts,

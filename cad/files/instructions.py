@@ -7,14 +7,21 @@ from collections.abc import Iterator
 
 from cad.assembly.assembly import Assembly
 from cad.assembly.steps import steps_of
+from cad.checks.retention import material_of
 from cad.layout.joints import ALL_SCREWS, CASE_EAR, DECK_MM, Joint, screws
 from cad.layout.names import FIT_COUPON, LIDAR, LIDAR_BODY
+from cad.layout.tightening import hold_of
 from design.scanner import Scanner
 
 NUTS = (
-    "Put the nuts into their traps before anything else: those of a hub from within its bore, flat against the wall; "
-    "those of a plate or an arm from below; those of a boss from above into the slots; those of a foot from its "
-    "corners. Pull each home with a screw. What has no trap is a plain thread."
+    "Put the nuts into their traps before anything else: those of a plate or an arm from below; those of a boss from "
+    "above into the slots; those of a foot from its corners. Pull each home with a screw. What has no trap is a plain "
+    "thread."
+)
+LOCKED = (
+    "Where a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread, none on plastic, "
+    "which it makes crack. Tighten to the torque that stands behind each screw, and once more after a day, since "
+    "plastic under a head gives way. `checks.json` tells under `retention` and `screw` what each joint holds, and why."
 )
 LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
@@ -38,6 +45,7 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
         "mm; all others follow from the parts.",
         "",
     ]
+    lines += [LOCKED, ""]
     if any(joint.inserts for joint in joints):
         lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
     if any(joint.traps for joint in joints):
@@ -47,8 +55,8 @@ def instructions_text(scanner: Scanner, assembly: Assembly, joints: list[Joint],
     return "\n".join(lines)
 
 
-def screws_in_words(joint: Joint) -> str:
-    """One joint as a sentence."""
+def screws_in_words(assembly: Assembly, joint: Joint) -> str:
+    """One joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}"
     where = {
         "thread": f"from {joint.part} into {joint.onto}",
@@ -60,7 +68,9 @@ def screws_in_words(joint: Joint) -> str:
     held = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         held = f", through {joint.count} nuts {joint.screw.name} in its bore"
-    return f"{what} {where}{held}."
+    hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
+    torque = "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
+    return f"{what} {where}{held}, {torque}."
 
 
 def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[tuple[str, str]]:
@@ -74,10 +84,10 @@ def _filled(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterat
             marks += [screws(joint.onto), ALL_SCREWS] if joint.part == carrier else []
             place = next((mark for mark in marks if mark in text), None)
             if place is not None and i not in done:
-                text = text.replace(place, f"**{screws_in_words(joint)}** {place}")
+                text = text.replace(place, f"**{screws_in_words(assembly, joint)}** {place}")
                 done.add(i)
         yield step.title, " ".join(re.sub(r"\{.*?\}", "", text).split())
     for i, joint in enumerate(joints):
         if i not in done:
-            yield f"{joint.part} to {joint.onto}", f"**{screws_in_words(joint)}**"
+            yield f"{joint.part} to {joint.onto}", f"**{screws_in_words(assembly, joint)}**"
     yield "Look, then wire", LAST + (IN_A_LOOP if scanner.slip_ring is None else THROUGH_RING)

@@ -25,7 +25,7 @@ from cad.layout.joints import (
     upright_axes,
 )
 from cad.layout.layout import Layout
-from cad.layout.linkage import CLAMP_SCREW, SPOT_FACE, clamp_floor_mm
+from cad.layout.linkage import CROSS_SCREW, cross_floor_mm, cross_seat_mm, cross_thread_mm
 
 
 def joints_of(layout: Layout) -> list[Joint]:
@@ -36,19 +36,25 @@ def joints_of(layout: Layout) -> list[Joint]:
     """
     scanner, stack = layout.scanner, layout.stack
     drive = belt_joints(scanner, stack) if isinstance(stack, BeltStack) else direct_joints(scanner, stack)
-    joints = [*drive, _clamp(layout), *_of_lidar(layout), *_on_deck(layout)]
+    joints = [*drive, _crossed(layout), *_of_lidar(layout), *_on_deck(layout)]
     if isinstance(layout.counterweight, Counterweight):
         joints.append(_bar(layout.counterweight))
     return sorted(joints, key=lambda joint: joint.slot_mm is not None)
 
 
-def _clamp(layout: Layout) -> Joint:
-    """The hub on the shaft."""
-    p, outer = layout.linkage, layout.stack.hub_radius - SPOT_FACE
-    axes = inward_axes(p.clamp_azimuths, outer, layout.stack.clamp)
-    wall = outer - min(clamp_floor_mm(p, azimuth) for azimuth in p.clamp_azimuths)
-    part, shaft = names.ALIGNMENT_LINKAGE, layout.drive.shaft
-    return Joint(part, shaft, "grub", CLAMP_SCREW, axes, grip_mm=wall, thread_mm=0.0, thread=p.clamp_thread)
+def _crossed(layout: Layout) -> Joint:
+    """The hub on the shaft: cap screws through its wall into threads of the shaft, which no play lets out."""
+    p, stack = layout.linkage, layout.stack
+    heads = cross_seat_mm(stack)
+    return Joint(
+        names.ALIGNMENT_LINKAGE,
+        layout.drive.shaft,
+        "thread",
+        CROSS_SCREW,
+        inward_axes(p.cross_azimuths, heads, stack.cross),
+        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
+        thread_mm=cross_thread_mm(stack),
+    )
 
 
 def _of_lidar(layout: Layout) -> Iterator[Joint]:

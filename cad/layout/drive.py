@@ -42,8 +42,9 @@ class Rod:
 
 @dataclass(frozen=True, slots=True)
 class Mass:
-    """What a bought product weighs, as a homogeneous box; `turning` is the share of it that turns."""
+    """What a bought product of a name weighs, as a homogeneous box; `turning` is the share of it that turns."""
 
+    product: str
     mass_g: float
     box: Cuboid
     turning: float = 0.0
@@ -88,6 +89,7 @@ class DriveLayout:
         built: parts and products in the order in which they are put in.
         stacked: parts and products from the deck to the linkage, in which the exploded view lifts them.
         left_out: parts that this scanner does not need.
+        borne: parts that a bearing keeps on another one along the axis.
         ring_needs: small things that the ring asks for, each with its source.
     """
 
@@ -101,3 +103,4 @@ class DriveLayout:
     stacked: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     ring_needs: tuple[tuple[str, str], ...]
+    borne: tuple[tuple[str, str], ...] = ()

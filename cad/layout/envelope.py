@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.hub import CLAMP_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS
 from design.arrays import Array
@@ -164,7 +164,7 @@ def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, su
     heads = float((box_corners(envelope.under) @ R[2]).min())
     wishes = [1.0 - z for z in lowest]
     wishes.append(1.0 - heads - HUB_HEIGHT)
-    wishes.append(1.0 - plate - (HUB_HEIGHT - CLAMP_ABOVE_BOTTOM - 3.0))  # a driver reaches the radial screws
+    wishes.append(1.0 - plate - (HUB_HEIGHT - CROSS_ABOVE_BOTTOM - 3.0))  # a driver reaches the cross screws
     if ring_radius > hub_radius:
         # the hub stays inside the cone that the ring hides anyway
         wishes.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))

@@ -15,10 +15,10 @@ from design.arrays import Array
 from design.catalogue.products import Bearing
 
 HUB_HEIGHT = 14.0
-HUB_WALL = 11.0  # around the spigot: thread length of the radial screws
+HUB_WALL = 11.0  # around the spigot: between the heads of the cross screws and the shaft
 HUB_GAP = 10.0  # the rotor's wires leave here
 SPIGOT = 11.0  # length of the shaft inside the hub
-CLAMP_ABOVE_BOTTOM = 5.0  # of the radial screws, from the hub's lower face
+CROSS_ABOVE_BOTTOM = 5.0  # of the cross screws, from the hub's lower face
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_END = 1.0  # of the journal below the bearing
 
@@ -62,9 +62,9 @@ class Hub:
         return self.shoulder - self.journal
 
     @property
-    def clamp(self) -> float:
-        """Height of the radial screws."""
-        return self.shoulder + CLAMP_ABOVE_BOTTOM
+    def cross(self) -> float:
+        """Height of the screws that cross from the hub into the shaft."""
+        return self.shoulder + CROSS_ABOVE_BOTTOM
 
     @property
     def spigot(self) -> float:

@@ -20,14 +20,14 @@ from cad.layout.envelope import (
     envelope_of,
 )
 from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from design.arrays import Array
 from design.errors import BuildError
 from design.scanner import Scanner
 
-CLAMP_SCREW = SCREWS["M3"]
-SPOT_FACE = 1.5  # of a radial screw, into the hub: no tangent plane
-CLAMP_DRIVER = 6.0  # diameter of the way to a radial screw
+CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
+CROSSING = 0.2  # between the end of one cross screw and the thread of the other
+CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 HEEL = 8.0  # how far the neck reaches below a lying plate
 
 
@@ -58,7 +58,6 @@ class AlignmentLinkage:
     ears: Box | None  # room of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
-    clamp_thread: Thread
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
@@ -66,7 +65,8 @@ class AlignmentLinkage:
     screw_hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
     fit: float  # diametral clearance of the spigot
-    clamp_azimuths: tuple[float, ...]
+    cross_hole: float  # diameter, in the hub
+    cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
     ear: Ear | None = None
 
 
@@ -101,8 +101,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         body=envelope.body,
         ears=None if stack.sub_plate is None else _grown(envelope.under),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
-        ear_thread=thread_in_part(EAR_SCREW, printer),
-        clamp_thread=thread_in_part(CLAMP_SCREW, printer),
+        ear_thread=thread_in_part(EAR_SCREW, printer, carries=True),
         cables=envelope.cables,
         fan_z=(low - lidar.optical_height_mm, high - lidar.optical_height_mm),
         fan=_free_bearings(stack, lidar.bearings_rad()),
@@ -110,7 +109,8 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         screw_hole=hole,
         holes=lidar.mount_holes_mm,
         fit=printer.fit_clearance_mm,
-        clamp_azimuths=_clamp_azimuths(stack.R()[:, 2]),
+        cross_hole=passing_hole(CROSS_SCREW, printer),
+        cross_azimuths=_cross_azimuths(stack.R()[:, 2]),
     )
 
 
@@ -171,23 +171,26 @@ def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], 
     return tuple(pieces)
 
 
-def _clamp_azimuths(normal: Array) -> tuple[float, ...]:
-    """Two radial screws 90 deg apart on the side away from the plate, in steps of 45 deg from the flat at +y."""
-    towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else math.pi / 4
-    middle = round((towards - math.pi / 2) / (math.pi / 4) - 1e-6) * (math.pi / 4) + math.pi / 2
+def _cross_azimuths(normal: Array) -> tuple[float, ...]:
+    """The two of CROSS_AT on the side away from the plate."""
+    towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else 0.0
+    middle = round(towards / (math.pi / 2) - 1e-6) * (math.pi / 2)
     return middle - math.pi / 4, middle + math.pi / 4
 
 
-def clamp_trap_floor_mm(p: AlignmentLinkage, trap: Trap) -> float:
-    """Distance from the axis of the floor of a radial screw's nut trap."""
-    return (p.stack.shaft_diameter + p.fit) / 2 + trap.depth
+def cross_seat_mm(stack: Stack) -> float:
+    """Distance from the axis of the faces that the heads of the cross screws bear on: sunk flush into the hub."""
+    return stack.hub_radius - CROSS_SCREW.head_height
 
 
-def clamp_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
-    """Distance from the axis at which a radial screw leaves the hub: at the bore or its flat, or at a nut."""
-    if p.clamp_thread.trap is not None:
-        return clamp_trap_floor_mm(p, p.clamp_thread.trap)
-    bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.clamp_thread.hole / 2
+def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
+    """Distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
+    bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
     flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
     on_flat = (flat - half * abs(math.cos(azimuth))) / out if out > 0 else bore
     return min(math.sqrt(bore**2 - half**2), on_flat)
+
+
+def cross_thread_mm(stack: Stack) -> float:
+    """Thread that a cross screw finds in the shaft before the other one crosses it."""
+    return stack.shaft_diameter / 2 - CROSS_SCREW.nominal / 2 - CROSSING

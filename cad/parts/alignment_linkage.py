@@ -1,12 +1,12 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub clamps the shaft's spigot (blind bore
-with a flat at +y, two radial screws on the free side); a neck, the convex hull of hub and plate less all that must
-stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x
-(FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the hub,
-its lower end is the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel along the
-journal. Under a sub-plate (`sub_plate.py`) the plate lies lower, with threads for its ears and pockets for the heads
-of its screws. Where a counterweight balances the rotor, an ear of the hub carries it.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore
+with a flat at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all
+that must stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the
+lidar's +x (FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds
+the hub, its lower end is the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel
+along the journal. Under a sub-plate (`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the
+heads of its screws. Where a counterweight balances the rotor, an ear of the hub carries it.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
     pocket = p.top - p.screw.head_height - 0.5
     pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
     low = p.top - PLATE_THICKNESS - 1.0
-    traps = [] if p.clamp_thread.trap is None else [_ear_trap(p, p.clamp_thread.trap, hole) for hole in p.ear_screws]
+    traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
 
 

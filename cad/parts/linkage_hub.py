@@ -1,4 +1,4 @@
-"""The hub of the alignment linkage: clamp of the shaft, journal of the bearing, way of the wires, ear of the bar.
+"""The hub of the alignment linkage: seat of the shaft, journal of the bearing, way of the wires, ear of the bar.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
 """
@@ -12,13 +12,12 @@ import numpy as np
 
 from cad import outlines, solids
 from cad.layout.direct.loads import JOURNAL_WALL
-from cad.layout.linkage import CLAMP_DRIVER, SPOT_FACE, AlignmentLinkage, Ear, clamp_trap_floor_mm
+from cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
 
 INNER_RING = 1.2  # how far the hub's face may touch the bearing's inner ring, on the radius
-WIRES_HALF_WIDTH = 5.0
+WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
 EAR_CORNER = 0.3  # of its half width
-TRAP_WALL = 1.2  # between wires and a nut
 
 
 def hub(p: AlignmentLinkage) -> cq.Shape:
@@ -34,8 +33,8 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
 
 
 def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
-    """What is cut from it: radial screws, way of the wires, index groove, bore, slots of the ear."""
-    return [*_clamps(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p)]
+    """What is cut from it: cross screws, way of the wires, index groove, bore, slots of the ear."""
+    return [*_crossed(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p)]
 
 
 def _ear(ear: Ear, start: float) -> cq.Shape:
@@ -61,37 +60,27 @@ def _journal_radius(p: AlignmentLinkage) -> float:
 
 
 def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
-    """Channel between the two radial screws: along the journal, inside the bearing, then out over the cage."""
+    """Channel between the two cross screws: along the journal, inside the bearing, then out over the cage."""
     stack = p.stack
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    if p.clamp_thread.trap is not None:  # clear of the corners of the traps on either side
-        beside = clamp_trap_floor_mm(p, p.clamp_thread.trap) + p.clamp_thread.trap.across / 2
-        inner = max(inner, beside * math.sqrt(0.5) + TRAP_WALL)
     low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
     channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
     return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
 
 
 def _free_side(p: AlignmentLinkage) -> float:
-    """Azimuth between the two radial screws."""
-    return sum(p.clamp_azimuths) / 2
+    """Azimuth between the two cross screws."""
+    return sum(p.cross_azimuths) / 2
 
 
-def _clamps(p: AlignmentLinkage) -> list[cq.Solid]:
-    stack = p.stack
-    cuts = []
-    for azimuth in p.clamp_azimuths:
-        out = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        cuts.append(solids.radial(p.clamp_thread.hole / 2, azimuth, stack.clamp))
-        cuts.append(solids.radial(CLAMP_DRIVER / 2, azimuth, stack.clamp, stack.hub_radius - SPOT_FACE))
-        # from within the bore, where the shaft holds the nut in and the screw pushes it out
-        if p.clamp_thread.trap is not None:
-            frame = np.stack([[-out[1], out[0], 0.0], [0.0, 0.0, 1.0], out], axis=1)
-            outline = outlines.polygon(p.clamp_thread.trap.corner, 6, math.pi / 2)
-            pocket = solids.prism(outline, 0.0, clamp_trap_floor_mm(p, p.clamp_thread.trap))
-            cuts.append(pocket.moved(solids.location(frame, (0.0, 0.0, stack.clamp))))
+def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Holes of the cross screws, and the way of their heads and drivers."""
+    stack, cuts = p.stack, []
+    for azimuth in p.cross_azimuths:
+        cuts.append(solids.radial(p.cross_hole / 2, azimuth, stack.cross))
+        cuts.append(solids.radial(CROSS_SCREW.head_room, azimuth, stack.cross, cross_seat_mm(stack)))
     return cuts
 
 

@@ -7,15 +7,17 @@ through two windows below the web under the spigot.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import cadquery as cq
 
 from cad import solids
-from cad.layout.belt.stack import BeltStack
+from cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltStack
 from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
 from cad.layout.names import MAIN_SHAFT
 from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from cad.parts.servo_shaft import cross_holes, cross_words
 from cad.solids import building
 from design.scanner import Scanner
 
@@ -36,7 +38,10 @@ def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         process="turned",
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
-        sheet=OnSheet((seat, turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm))),
+        sheet=OnSheet(
+            (seat, turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
+            (*cross_words(stack), _ring_words()),
+        ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
     )
 
@@ -58,5 +63,13 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
             solids.upright(stack.shaft_bore / 2, stack.shaft_bottom - 1.0, end),
             solids.cylinder(WINDOW / 2, (-stack.tube_diameter, 0.0, end - WINDOW / 2), (1.0, 0.0, 0.0), 99.0),
             solids.box((-2 * radius, stack.flat, stack.hub_bottom), (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
+            *cross_holes(stack),
         ]
+        for azimuth in RING_SCREWS_DEG:
+            cuts.append(solids.radial(RING_SCREW.core / 2, math.radians(azimuth), stack.ring_screws))
         return checked(body.cut(*cuts).clean())
+
+
+def _ring_words() -> str:
+    """What the sheet says of the threads of `shaft_ring`."""
+    return f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads pass."

@@ -16,7 +16,9 @@ import cadquery as cq
 from cad import outlines, solids
 from cad.layout.direct.stack import WAIST, DirectStack
 from cad.layout.fits import OnSheet, turned_spigot
+from cad.layout.hub import Hub
 from cad.layout.joints import horn_centres, screws
+from cad.layout.linkage import CROSS_AT, CROSS_SCREW
 from cad.layout.names import SERVO_HORN, SERVO_SHAFT
 from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
 from cad.screws import SCREWS, passing_hole
@@ -24,13 +26,10 @@ from cad.solids import building
 from design.catalogue.products import Printer, Servo
 from design.scanner import Scanner
 
-SHAFT_PRINTABLE = 20.0  # mm: below it a printed shaft bends by about 1 deg (measured study)
-
 
 def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
     """The shaft of one scanner."""
-    turned = stack.shaft_diameter < SHAFT_PRINTABLE
-    fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),) if turned else ()
+    fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
     words = (
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
@@ -41,10 +40,10 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
         turns=True,
         make=partial(servo_shaft, stack, scanner.servo, scanner.printer),
         step=Step("Shaft on the horn", words),
-        process="turned" if turned else "printed",
-        material=TURNED_FROM if turned else "",
-        why_metal=f"{stack.shaft_diameter:g} mm is too thin to print (0.9 deg of bending with the axis horizontal)",
-        sheet=OnSheet(fits),
+        process="turned",
+        material=TURNED_FROM,
+        why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
+        sheet=OnSheet(fits, cross_words(stack)),
         shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
     )
 
@@ -68,11 +67,27 @@ def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
         ]
         cuts += [solids.upright(hole, horn - 1.0, flange + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
         cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, flange + 1.0))  # index groove
+        cuts += cross_holes(stack)
         if boss > 0:
             cuts.append(solids.upright(boss + 0.2, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
         if stack.bearing is not None:
             cuts.append(_waist(stack))
         return checked(body.cut(*cuts).clean())
+
+
+def cross_holes(stack: Hub) -> list[cq.Solid]:
+    """Tapped holes of the spigot, drilled through, at all azimuths that a linkage may ask for."""
+    core, reach = CROSS_SCREW.core / 2, stack.shaft_diameter
+    return [solids.radial(core, azimuth, stack.cross, -reach, 2 * reach) for azimuth in CROSS_AT[:2]]
+
+
+def cross_words(stack: Hub) -> tuple[str, ...]:
+    """What a shaft's sheet says of them."""
+    down = stack.spigot_top - stack.cross
+    return (
+        f"2 x {CROSS_SCREW.name} through the spigot, square to each other at 45 deg to the flat, {down:g} below its "
+        "end: tapped from all four sides.",
+    )
 
 
 def _waist(stack: DirectStack) -> cq.Solid:

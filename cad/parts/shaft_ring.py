@@ -1,7 +1,7 @@
 """Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that only the inner ring touches, and two
-grub screws 90 deg apart; a driver reaches them through the window of the tower.
+screws into threads of the shaft, 90 deg apart; they and a driver pass the window of the tower.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from functools import partial
 import cadquery as cq
 
 from cad import solids
-from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, BeltStack
+from cad.layout.belt.stack import BOSS, RING_SCREW, RING_SCREWS_DEG, BeltStack
 from cad.layout.hub import BEARING_STEP
 from cad.layout.joints import screws
 from cad.layout.names import MAIN_SHAFT, SHAFT_RING
 from cad.parts.part_spec import PartSpec, Step
-from cad.screws import thread_in_part
+from cad.screws import passing_hole
 from cad.solids import building
 from design.catalogue.products import Printer
 from design.scanner import Scanner
@@ -26,9 +26,9 @@ from design.scanner import Scanner
 def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     """The ring of one scanner."""
     words = (
-        "From below push the ring up the shaft, its step against the lower bearing, so that the shaft has no play "
-        f"along the axis and still turns freely. {screws(MAIN_SHAFT)} A driver reaches them through the round window "
-        "in the tower: turn the shaft until they show."
+        "From below push the ring up the shaft, its step against the lower bearing and its holes over the threads, so "
+        f"that the shaft has no play along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a driver "
+        "pass the round window in the tower: turn the shaft until the holes show."
     )
     return PartSpec(
         name=SHAFT_RING,
@@ -44,12 +44,15 @@ def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    thread = thread_in_part(GRUB, printer, room_for_nut=False)
+    hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.head_room
     with building(SHAFT_RING, "ring", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         low, high = stack.collar_low, stack.collar_low + BOSS
         body = solids.upright(stack.boss_radius, low, high).fuse(
             solids.upright(stack.collar_radius, low, high + BEARING_STEP)
         )
         bore = solids.upright((stack.tube_diameter + printer.fit_clearance_mm) / 2, low - 1.0, high + 2.0)
-        grubs = [solids.radial(thread.hole / 2, math.radians(azimuth), low + BOSS / 2) for azimuth in GRUBS_DEG]
-        return checked(body.cut(bore, *grubs).clean())
+        cuts = [bore]
+        for azimuth in (math.radians(azimuth) for azimuth in RING_SCREWS_DEG):
+            cuts.append(solids.radial(hole, azimuth, stack.ring_screws))
+            cuts.append(solids.radial(head, azimuth, stack.ring_screws, stack.ring_seat))
+        return checked(body.cut(*cuts).clean())

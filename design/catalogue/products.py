@@ -272,3 +272,8 @@ class Printer(Product):
     thread: Literal["cut", "insert", "nut"] = Field(
         default="cut", description="what screws that end in a part hold on to"
     )
+
+    @property
+    def plastic(self) -> bool:
+        """Whether its material creeps: no metal is as soft as 20 GPa, no unfilled plastic as stiff."""
+        return self.modulus_gpa < 20.0

@@ -21,8 +21,8 @@ from cad.layout.deck import FOOT_THICKNESS, FREE, Deck
 from cad.layout.direct.loads import horn_bears, horn_bears_balanced
 from cad.layout.direct.stack import DirectStack
 from cad.layout.envelope import rotor_radius
-from cad.layout.hub import CLAMP_ABOVE_BOTTOM
-from cad.layout.linkage import CLAMP_DRIVER, AlignmentLinkage, Ear, neck_corners
+from cad.layout.hub import CROSS_ABOVE_BOTTOM
+from cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, neck_corners
 from cad.layout.loads import STEEL_G_CM3, tilt_sine
 from cad.layout.names import COUNTERWEIGHT
 from cad.screws import SCREWS
@@ -54,7 +54,7 @@ SECTIONS = (
 SCREW = SCREWS["M4"]
 RUBS_NM = 5e-3  # what bearing and ring rub with at least: assumed, no data sheet of theirs says it
 UPRIGHT = 1e-6  # sine of the tilt
-EAR_ABOVE_SHOULDER = CLAMP_ABOVE_BOTTOM + CLAMP_DRIVER / 2 + 0.5  # clear of the drivers of the radial screws
+EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_SCREW.head_room + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
 FROM_HUB = 1.0
 TRIM = 5.0  # that the bar can slide either way: nobody tells where a lidar's centre of mass is

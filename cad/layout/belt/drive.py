@@ -65,15 +65,16 @@ def belt_drive(scanner: Scanner) -> DriveLayout:
         products=(stack.carrier, stack.carrier, stack.belt),
         mounted=_mounted(stack),
         masses=(
-            Mass(stack.servo.mass_g, case),
-            Mass(stack.belt.mass_g, _around_belt(stack)),
-            Mass(ring.mass_g, capsule.cuboid(), turning=0.5),
-            *(Mass(stack.carrier.mass_g, bearing.cuboid(), turning=0.5) for bearing in bearings),
+            Mass(names.SERVO, stack.servo.mass_g, case),
+            Mass(names.BELT, stack.belt.mass_g, _around_belt(stack)),
+            Mass(names.RING, ring.mass_g, capsule.cuboid(), turning=0.5),
+            *(Mass(names.BEARING, stack.carrier.mass_g, bearing.cuboid(), turning=0.5) for bearing in bearings),
         ),
         shapes=(case, capsule),
         built=BUILT,
         stacked=STACKED,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
+        borne=((names.SHAFT_RING, names.BEARING_TOWER),),
         ring_needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
     )
 

@@ -9,7 +9,20 @@ from dataclasses import replace
 from cad.layout import names
 from cad.layout.belt import plate as of_plate
 from cad.layout.belt.plate import plate_of
-from cad.layout.belt.stack import BOSS, DISC, GRUB, GRUBS_DEG, PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
+from cad.layout.belt.stack import (
+    BOSS,
+    DISC,
+    GRUB,
+    GRUBS_DEG,
+    PLATE,
+    PLATE_GRIP,
+    PLATE_SCREW,
+    RING_SCREW,
+    RING_SCREWS_DEG,
+    SHELF,
+    TRAVEL,
+    BeltStack,
+)
 from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_HEAD, disc_azimuths, flange_centres, tower_of
 from cad.layout.joints import (
     CASE_EAR,
@@ -21,7 +34,7 @@ from cad.layout.joints import (
     round_wall_mm,
     upright_axes,
 )
-from cad.screws import SCREWS, thread_in_part
+from cad.screws import SCREWS, passing_hole, thread_in_part
 from design.scanner import Scanner
 
 
@@ -33,7 +46,7 @@ def belt_joints(scanner: Scanner, stack: BeltStack) -> Iterator[Joint]:
     """
     fit, tube = scanner.printer.fit_clearance_mm, stack.tube_diameter / 2
     yield _grub(scanner, stack, names.SHAFT_PULLEY, tube + fit / 4, stack.pulley_top - BOSS / 2)
-    yield _grub(scanner, stack, names.SHAFT_RING, tube + fit / 2, stack.collar_low + BOSS / 2)
+    yield _ring(scanner, stack)
     yield from _in_tower(scanner, stack)
     yield from _of_servo(scanner, stack)
 
@@ -44,6 +57,21 @@ def _grub(scanner: Scanner, stack: BeltStack, part: str, bore: float, z: float) 
     axes = inward_axes((math.radians(azimuth) for azimuth in GRUBS_DEG), stack.boss_radius, z)
     wall = round_wall_mm(bore, stack.boss_radius, thread.hole)
     return Joint(part, names.MAIN_SHAFT, "grub", GRUB, axes, grip_mm=wall, thread_mm=0.0, thread=thread)
+
+
+def _ring(scanner: Scanner, stack: BeltStack) -> Joint:
+    """The ring under the lower bearing, which keeps the shaft in where the axis hangs."""
+    bore = (stack.tube_diameter + scanner.printer.fit_clearance_mm) / 2
+    hole = passing_hole(RING_SCREW, scanner.printer) / 2
+    return Joint(
+        names.SHAFT_RING,
+        names.MAIN_SHAFT,
+        "thread",
+        RING_SCREW,
+        inward_axes((math.radians(azimuth) for azimuth in RING_SCREWS_DEG), stack.ring_seat, stack.ring_screws),
+        grip_mm=stack.ring_seat - math.sqrt(bore**2 - hole**2),
+        thread_mm=(stack.tube_diameter - stack.shaft_bore) / 2,
+    )
 
 
 def _in_tower(scanner: Scanner, stack: BeltStack) -> Iterator[Joint]:

@@ -31,15 +31,17 @@ from cad.screws import SCREWS
 from design.arrays import Array
 from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
 
-GRUB = SCREWS["M3"]  # of pulley and ring on the shaft
+GRUB = SCREWS["M3"]  # of the pulley on the shaft
 GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat
+RING_SCREW = SCREWS["M3"]  # of the ring under the lower bearing, into threads of the shaft: they hold up the lidar
+RING_SCREWS_DEG = (45.0, 135.0)
 PLATE_SCREW = SCREWS["M4"]
 FOOT_SCREW = SCREWS["M3"]  # between tower and mount
 LEADS_GAP = 14.0  # between hub and pulley
 SLIDES = 0.04  # of the shaft in its bearings: the lower end of f7, which slides in by hand
 SPAN = 30.0  # between the middles of the two bearings
 BOSS = 9.0  # height of the pulley's boss, and of the ring under the lower bearing
-BOSS_WALL = 9.0  # around the shaft: thread length of the grub screws
+BOSS_WALL = 9.0  # around the shaft: length of the screws
 RIM = 1.5  # thickness of a pulley's rims
 RIM_ABOVE_BELT = 0.5
 BELT_ROOM = 0.5  # on each side of the belt
@@ -163,6 +165,16 @@ class BeltStack(Hub):
     def collar_low(self) -> float:
         """Height of the lower end of the ring that holds the shaft up."""
         return self.lower_bottom - BEARING_STEP - BOSS
+
+    @property
+    def ring_screws(self) -> float:
+        """Height of its screws."""
+        return self.collar_low + BOSS / 2
+
+    @property
+    def ring_seat(self) -> float:
+        """Distance from the axis of the faces that their heads bear on: sunk flush."""
+        return self.boss_radius - RING_SCREW.head_height
 
     @property
     def shaft_bottom(self) -> float:

@@ -31,10 +31,10 @@ class BearingTower:
 def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
     """Parameters of the tower of one scanner."""
     printer = scanner.printer
-    foot = thread_in_part(FOOT_SCREW, printer)
+    foot = thread_in_part(FOOT_SCREW, printer, carries=True)
     free = math.sqrt(2) * FOOT_HOLE - printer.min_wall_mm - stack.chamber_radius
     if foot.trap is not None and foot.trap.corner > free:
-        foot = thread_in_part(FOOT_SCREW, printer, room_for_nut=False)
+        foot = thread_in_part(FOOT_SCREW, printer, room_for_nut=False, carries=True)
     return BearingTower(
         stack=stack,
         fit=printer.fit_clearance_mm,

@@ -86,10 +86,10 @@ def cage_of(scanner: Scanner, stack: DirectStack) -> BearingCage | None:
             f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two pairs of front "
             f"holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
-    thread = thread_in_part(CAGE_SCREW, printer)
+    thread = thread_in_part(CAGE_SCREW, printer, carries=True)
     front = stack.horn + servo.case_max_mm[2]
     if thread.trap is not None and not has_room(thread.trap, stack, front + SEAT_GAP, printer.min_wall_mm):
-        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False)
+        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
     return BearingCage(
         stack=stack,
         bearing=stack.bearing,

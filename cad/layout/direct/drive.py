@@ -53,15 +53,15 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
     stack, ring = direct_stack(scanner), scanner.slip_ring
     (x0, y0, z0), (x1, y1, z1) = scanner.servo.case_min_mm, scanner.servo.case_max_mm
     case = Cuboid((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1))
-    masses = [Mass(scanner.servo.mass_g, Cuboid(case.low, (x1, y1, stack.horn)))]  # with its horn
+    masses = [Mass(names.SERVO, scanner.servo.mass_g, Cuboid(case.low, (x1, y1, stack.horn)))]  # with its horn
     rods: list[Rod] = []
     if ring is not None:
         rods.append(Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
-        masses.append(Mass(ring.mass_g, rods[0].cuboid(), turning=0.5))
+        masses.append(Mass(names.RING, ring.mass_g, rods[0].cuboid(), turning=0.5))
     if stack.bearing is not None:
         top = stack.bearing_top
         bearing = Rod(stack.bearing.outer_mm / 2, top - stack.bearing.width_mm, top)
-        masses.append(Mass(stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
+        masses.append(Mass(names.BEARING, stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
     return DriveLayout(
         stack=stack,
         shaft=names.SERVO_SHAFT,

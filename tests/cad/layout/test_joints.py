@@ -87,13 +87,13 @@ def screw_for(hole, printer):
 
 def holding_holes(screw, printer):
     """Diameters of all holes in parts that a screw may hold on to."""
-    trap = trap_of(screw, printer)
-    return (thread_hole(screw, printer),) if trap is None else (screw.core, trap.hole)
+    trap = trap_of(screw, printer, carries=True)
+    return (screw.core, thread_hole(screw, printer)) if trap is None else (screw.core, trap.hole)
 
 
 def is_trap(hole, screw, printer):
     """Whether a hole leads a screw into a nut that the part carries."""
-    trap = trap_of(screw, printer)
+    trap = trap_of(screw, printer, carries=True)
     return trap is not None and abs(hole.diameter - trap.hole) < 0.01
 
 
@@ -117,11 +117,23 @@ def partner_of(part, hole, screw, rounds, printer):
             sizes = (screw.nominal, *holding_holes(screw, printer))
             threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
             fixing = "trap" if is_trap(other, screw, printer) else "thread" if threaded else "nut"
-            depth = CASE_EAR if fixing == "nut" and name == "servo_case" else other.length
+            depth = CASE_EAR if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
             order = (not threaded, round(abs(gap), 3))
             if best is None or order < best[0]:
                 best = order, Behind(name, fixing, depth, 1 if gaps[0] > gaps[1] else -1)
     return None if best is None else best[1]
+
+
+def free_length(hole, own, screw, towards):
+    """Of a hole from its end nearer to a point: all of it, or what is left before the screw of one that crosses it."""
+    direction, near = np.array(hole.direction), min(hole.low, hole.high, key=lambda end: np.linalg.norm(end - towards))
+    lengths = [hole.length]
+    for other in own:
+        if other is not hole and other.hole and other.diameter == hole.diameter:
+            line, between = np.array(other.direction), np.array(other.low) - near
+            if abs(float(line @ direction)) < 1e-5 and abs(float(between @ np.cross(direction, line))) < COAXIAL:
+                lengths.append(abs(float(between @ direction)) - screw.nominal / 2 - 0.2)
+    return min(lengths)
 
 
 def ends_in_bore(hole, own):

@@ -131,7 +131,7 @@ def test_wires_of_the_ring_pass_the_bearing(made):
     if name == "no_ring":
         pytest.skip("no ring, no wires")
     stack = assembly.layout.stack
-    azimuth = sum(assembly.layout.linkage.clamp_azimuths) / 2
+    azimuth = sum(assembly.layout.linkage.cross_azimuths) / 2
     out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     radius = stack.bearing.bore_mm / 2 - 2.5
     start = radius * out + [0, 0, stack.ring_top + 1]
@@ -181,7 +181,7 @@ def test_a_bearing_changes_the_stack_below_the_shoulder_only(alpha_rot, beta_rot
     scanner = scanner_for(alpha_rot, beta_rot, alpha, beta)
     stack = direct_stack(scanner)
     alone = direct_stack(replace(scanner, bearings=()))
-    above = [(each.h, each.shoulder, each.clamp, each.spigot_top) for each in (stack, alone)]
+    above = [(each.h, each.shoulder, each.cross, each.spigot_top) for each in (stack, alone)]
     # where its hub, as wide as the bearing, covers a screw, a plate is put between, which a narrow hub does without
     assert above[0] == above[1] or (stack.sub_plate is not None and alone.sub_plate is None and stack.h > alone.h)
     tilt = np.degrees(np.arccos(np.clip(scanner.angles.T_world_rot(0.0)[2, 2], -1, 1)))

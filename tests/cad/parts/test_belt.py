@@ -135,10 +135,10 @@ def test_what_it_is_made_of(made):
     assert (stack.tube_diameter - stack.shaft_bore) / 2 >= 4
     # the linkage sits on the same spigot as in direct drive
     direct = drive_of(scanner_for(ring="UH1256-02-0610-06S")).stack
-    assert (stack.shaft_diameter, stack.flat, stack.clamp - stack.shoulder) == (
+    assert (stack.shaft_diameter, stack.flat, stack.cross - stack.shoulder) == (
         direct.shaft_diameter,
         direct.flat,
-        direct.clamp - direct.shoulder,
+        direct.cross - direct.shoulder,
     )
 
 
@@ -317,7 +317,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     found = {(joint.part, joint.onto): (joint.screw.name, joint.count, joint.fixing) for joint in joints}
     assert found == {
         ("shaft_pulley", "main_shaft"): ("M3", 2, "grub"),
-        ("shaft_ring", "main_shaft"): ("M3", 2, "grub"),
+        ("shaft_ring", "main_shaft"): ("M3", 2, "thread"),
         ("bearing_tower", "slip_ring_adapter"): ("M3", 3, "thread"),
         ("slip_ring_adapter", "ring_stator"): ("M5", 3, "nut"),
         ("drive_plate", "servo_case"): ("M2.5", 4, "nut"),
@@ -325,8 +325,8 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         ("drive_pulley", "servo_output"): ("M2.5", 8, "thread"),
         ("alignment_linkage", "lidar_body"): ("M3", 4, "thread"),
         ("alignment_linkage", "counterweight"): ("M4", 2, "thread"),
-        ("alignment_linkage", "main_shaft"): ("M3", 2, "grub"),
-        ("base_mount", "bearing_tower"): ("M3", 4, "thread"),
+        ("alignment_linkage", "main_shaft"): ("M3", 2, "thread"),
+        ("base_mount", "bearing_tower"): ("M3", 4, "trap"),
         ("base_mount", "deck"): ("M4", 4, "deck"),
     }
     text = instructions_text(scanner, assembly, joints, "0" * 12)
@@ -347,7 +347,9 @@ def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     sheet = drawing_of("main_shaft", made.scanner, made.assembly, 80.0, "0" * 12)
     said = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
-    assert [text for text in said if text.startswith("Ø") and ":" not in text] == [
+    threads = [text for text in said if text.startswith("Ø2.5 THRU, RADIAL")]
+    assert len(threads) == 4 and any("M3 through the spigot" in text for text in said)
+    assert [text for text in said if text.startswith("Ø") and ":" not in text and text not in threads] == [
         "Ø24.96  +0.02/0",
         "Ø15 x 83.2 DEEP",
         "Ø27.9",

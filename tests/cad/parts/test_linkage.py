@@ -86,7 +86,7 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     assert draft.is_watertight and draft.volume == pytest.approx(body.volume, rel=1e-3)
     assert np.abs(draft.bounds - body.bounds).max() < 0.2
     # two radial screws reach the spigot: the body is open there
-    assert len(linkage_of(scanner, stack).clamp_azimuths) == 2
+    assert len(linkage_of(scanner, stack).cross_azimuths) == 2
 
 
 COVERED = [(25.5, -21.4, "UTM-30LX"), (-22.3, 22.2, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]

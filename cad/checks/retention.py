@@ -1,0 +1,147 @@
+"""What keeps every part on the next one from the lidar to the deck, with nothing but its joints. SI units.
+
+Every joint is taken out in turn: what then has no way to the deck hangs on it. That weighs five times its weight, in
+the direction that is worst for each screw; friction and preload hold nothing. Screws share a force equally and take a
+moment as a group of equal springs does; those that point at the axis from a hub or a boss take no moment, their fit
+does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cad.assembly.assembly import Assembly
+from cad.checks.check import Check, at_least, tidy
+from cad.geometry import inertia
+from cad.geometry.inertia import Inertial
+from cad.layout.all_joints import joints_of
+from cad.layout.joints import Joint
+from cad.layout.loads import STANDARD_GRAVITY
+from cad.layout.names import DECK, LIDAR
+from cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
+from design.arrays import Array
+from design.scanner import Scanner
+
+SHOCK_G = 5.0
+LEAST_MARGIN = 2.0
+AXIAL = 0.9  # cosine to the rotation axis above which a screw does not point at it
+
+
+def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Check]:
+    """For each joint what hangs on it and how often over it holds that, and how its screws are tightened."""
+    return [check for joint in joints_of(assembly.layout) for check in _of_joint(scanner, assembly, joint)]
+
+
+def material_of(assembly: Assembly, body: str) -> Material:
+    """What a made part or a bought body is of."""
+    if body not in assembly.parts:
+        return BOUGHT
+    process = assembly.parts[body].process
+    if process == "printed":
+        return PRINTED if assembly.layout.scanner.printer.plastic else ALUMINIUM
+    return STEEL if process == "sawn" else ALUMINIUM
+
+
+def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
+    """Parts and products that have no way to the deck but through a joint."""
+    layout = assembly.layout
+    ways = [(_node(assembly, other.part), _node(assembly, other.onto)) for other in joints_of(layout) if other != joint]
+    ways += layout.drive.borne
+    everything = {name for way in ways for name in way} | {_node(assembly, joint.part), _node(assembly, joint.onto)}
+    reached, fresh = {DECK}, {DECK}
+    while fresh:
+        fresh = {b for way in ways for a, b in (way, way[::-1]) if a in fresh} - reached
+        reached |= fresh
+    return frozenset(everything - reached)
+
+
+def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Check]:
+    where, hanging = f"{joint.part} on {joint.onto}", hanging_on(assembly, joint)
+    hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
+    carries = LIDAR in hanging
+    if hold is None:
+        message = f"{where}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
+        yield Check("retention", "error" if carries else "note", None, None, "", where, message)
+        return
+    bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic
+    if bare and carries:
+        message = f"{where}: the lidar hangs on threads in bare plastic, which creeps: nuts or inserts"
+        yield Check("retention", "error", None, None, "", where, message)
+    yield _margin(scanner, assembly, joint, hold, hanging)
+    yield _screws(joint, hold, where)
+
+
+def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Check:
+    body = together_of(scanner, assembly, hanging)
+    force = SHOCK_G * STANDARD_GRAVITY * body.mass_kg
+    pull, push = worst_shares(joint, body.centre_m)
+    margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
+    first = min(margins, key=margins.__getitem__)
+    nut = {"trap": " and nuts in it", "nut": " and nuts", "deck": " and nuts"}.get(joint.fixing, "")
+    what = (
+        f"{joint.count} x {joint.screw.name} into {joint.onto}{nut} hold {body.mass_kg:.2f} kg at {SHOCK_G:g} g "
+        f"({force:.0f} N, worst direction), friction none; first yields {first}: margin"
+    )
+    return at_least("retention", margins[first], LEAST_MARGIN, "times", joint.part, what)
+
+
+def _screws(joint: Joint, hold: Hold, where: str) -> Check:
+    said = f"{hold.engaged_mm:.1f} mm of thread" if hold.asked_mm else f"{hold.engaged_mm:.1f} mm of nut or insert"
+    message = (
+        f"{where}: {joint.count} x {joint.number}: {said}, {hold.asked_mm:.1f} asked, {hold.torque_nm:g} N m "
+        f"({hold.preload_n:.0f} N); what loosens it: {hold.loosens}"
+    )
+    held = hold.engaged_mm >= hold.asked_mm
+    value, limit = tidy(hold.engaged_mm), tidy(hold.asked_mm)
+    return Check("screw", "pass" if held else "error", value, limit, "mm", where, message)
+
+
+def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
+    """Parts and products as one body; the whole of what half turns counts with the shaft and with what holds it."""
+    bodies = [
+        inertia.of_solid(assembly.made[name], assembly.parts[name].density_g_cm3(scanner.printer))
+        for name in sorted(names & assembly.made.keys())
+    ]
+    for mass in assembly.layout.drive.masses:
+        if mass.product in names or (mass.turning > 0 and assembly.layout.drive.shaft in names):
+            bodies.append(inertia.of_box(mass.mass_g, mass.box.low, mass.box.high))
+    if LIDAR in names:
+        x, y, z = scanner.lidar.body_mm
+        base = -scanner.lidar.optical_height_mm
+        lidar = inertia.of_box(scanner.lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
+        bodies.append(lidar.moved(scanner.angles.T_rot_laser()))
+    return inertia.together(bodies)
+
+
+def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
+    """Largest pull along, and push across, any one screw by a force of 1 N at a point, shape (3,), in any direction."""
+    start = np.array([axis.start for axis in joint.axes]) / 1000
+    along = np.array([axis.along for axis in joint.axes])
+    shares = np.broadcast_to(np.eye(3) / joint.count, (joint.count, 3, 3)).copy()
+    if abs(along[0, 2]) > AXIAL or not _radial(joint):
+        arms = start - start.mean(axis=0)
+        stiffness = sum((arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
+        turned = np.linalg.pinv(stiffness, rcond=1e-9) @ _cross(centre_m - start.mean(axis=0))
+        shares += np.array([-_cross(arm) @ turned for arm in arms])
+    pulls = np.linalg.norm(np.einsum("ni,nij->nj", along, shares), axis=1)
+    across = shares - np.einsum("ni,nj,njk->nik", along, along, shares)
+    return float(pulls.max()), float(np.linalg.norm(across, ord=2, axis=(1, 2)).max())
+
+
+def _radial(joint: Joint) -> bool:
+    """Whether the screws point at the rotation axis, from around it."""
+    return all(
+        abs(axis.along[2]) < 1e-6 and abs(axis.start[0] * axis.along[1] - axis.start[1] * axis.along[0]) < 1e-6
+        for axis in joint.axes
+    )
+
+
+def _cross(v: Array) -> Array:
+    """Matrix of v x."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def _node(assembly: Assembly, body: str) -> str:
+    return assembly.bodies[body].product if body in assembly.bodies else body

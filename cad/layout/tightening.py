@@ -1,0 +1,142 @@
+"""What the screws of a joint can bear, how they are tightened, and what loosens them. No kernel: plain numbers.
+
+Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are of stainless steel A2-70 (ISO 3506-1), nuts as
+strong as they. Friction counts for nothing: what is here holds with every screw loose in its thread.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cad.layout.joints import Joint
+from cad.screws import INSERT_LENGTH, Screw
+
+PROOF_MPA = 450.0  # 0.2 % proof stress of A2-70, ISO 3506-1
+SHEARED = 0.577  # of a tension, von Mises
+PRELOAD = 0.5  # of the proof load, between metals
+NUT_FACTOR = 0.2  # torque over preload and diameter, dry: the usual estimate
+FLANKS = (
+    0.5  # of the cylinder at the nominal diameter that a thread shears off: cautious, makers' tables say 0.5 to 0.8
+)
+INSERT_N = 300.0  # pull-out of a heat-set insert: half of what its sellers measure for M3 in PLA, assumed
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """What a screw bears on, or holds on to.
+
+    Attributes:
+        name: in words.
+        strength_mpa: in tension, and under a head or behind a shank, for the moment of a shock.
+        pressure_mpa: under a head, that it keeps up for years.
+        plastic: whether it creeps.
+        source: of both numbers.
+    """
+
+    name: str
+    strength_mpa: float
+    pressure_mpa: float
+    plastic: bool
+    source: str
+
+
+PRINTED = Material("printed plastic", 40.0, 25.0, True, "PLA and PETG, makers' 45 to 60 MPa, half for years; assumed")
+ALUMINIUM = Material("aluminium 6082-T6", 290.0, 200.0, False, "EN 755-2; pressure under heads, VDI 2230")
+STEEL = Material("steel", 360.0, 235.0, False, "S235, EN 10025-2")
+BOUGHT = Material("metal of a bought device", 180.0, 120.0, False, "cast aluminium, the softest of its kind; assumed")
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """One screw of a joint: how it is tightened, and what it bears before anything yields.
+
+    Attributes:
+        engaged_mm: thread that holds.
+        asked_mm: thread that carries its preload one and a half times over; 0 where a nut or an insert holds it.
+        preload_n: that it is tightened to.
+        torque_nm: that tightens it.
+        pull_n: along its axis.
+        pull_by: what yields first.
+        push_n: across its axis.
+        push_by: what yields first.
+        loosens: what loosens it, and what to do about that.
+    """
+
+    engaged_mm: float
+    asked_mm: float
+    preload_n: float
+    torque_nm: float
+    pull_n: float
+    pull_by: str
+    push_n: float
+    push_by: str
+    loosens: str
+
+
+def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
+    """One of a joint's screws; None for grub screws, which hold by friction.
+
+    Args:
+        joint: the joint.
+        under: what its heads bear on.
+        into: what holds its threads; where that is a nut or an insert, what carries these.
+    """
+    if joint.fixing == "grub":
+        return None
+    screw, hole = joint.screw, joint.screw.nominal + 0.4
+    proof = PROOF_MPA * stress_area_mm2(screw)
+    head = math.pi / 4 * (screw.head_diameter**2 - hole**2)
+    in_nut = joint.fixing in ("nut", "trap", "deck")
+    engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
+    pulls = {"the screw": proof, f"{under.name} under the head": head * under.strength_mpa}
+    if joint.inserts:
+        engaged = min(engaged, INSERT_LENGTH)
+        pulls["the insert"] = INSERT_N
+    elif in_nut:
+        if joint.fixing == "trap":
+            pulls[f"{into.name} under the nut"] = math.pi / 4 * (screw.nut_across**2 - hole**2) * into.strength_mpa
+    else:
+        pulls[f"the thread in {into.name}"] = _strips(screw, engaged, into)
+    preload = min(PRELOAD * proof, head * under.pressure_mpa, min(pulls.values()) / 1.5)
+    asked = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
+    pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": _wall(joint, under)}
+    pull_by, push_by = min(pulls, key=pulls.__getitem__), min(pushes, key=pushes.__getitem__)
+    return Hold(
+        engaged_mm=engaged,
+        asked_mm=asked,
+        preload_n=preload,
+        torque_nm=_two_digits(NUT_FACTOR * preload * screw.nominal / 1000),
+        pull_n=pulls[pull_by],
+        pull_by=pull_by,
+        push_n=pushes[push_by],
+        push_by=push_by,
+        loosens=_loosens(joint, under, into),
+    )
+
+
+def stress_area_mm2(screw: Screw) -> float:
+    """Of its thread (ISO 898-1); the pitch of a coarse thread is what its core hole is smaller."""
+    return math.pi / 4 * (screw.nominal - 0.9382 * (screw.nominal - screw.core)) ** 2
+
+
+def _strips(screw: Screw, engaged: float, into: Material) -> float:
+    """Pull that shears the thread off what holds it."""
+    return FLANKS * math.pi * screw.nominal * engaged * SHEARED * into.strength_mpa
+
+
+def _wall(joint: Joint, under: Material) -> float:
+    return joint.screw.nominal * joint.grip_mm * under.strength_mpa
+
+
+def _loosens(joint: Joint, under: Material, into: Material) -> str:
+    creeps = "the plastic creeps: tighten once more after a day" if under.plastic or into.plastic else "vibration"
+    if joint.inserts:
+        return f"{creeps}; no threadlocker, it attacks plastics"
+    if joint.fixing in ("nut", "trap", "deck"):
+        return f"{creeps}; a drop of medium threadlocker in the nut"
+    return f"{creeps}; a drop of medium threadlocker in the thread of the metal"
+
+
+def _two_digits(value: float) -> float:
+    return float(f"{value:.2g}")

@@ -1,0 +1,142 @@
+"""What holds the lidar: geometry from the solids, forces from statics worked out in another way."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import cad.checks.retention as room
+from cad import solids
+from cad.assembly.make import make_parts
+from cad.checks.retention import hanging_on, retention_checks, worst_shares
+from cad.layout.all_joints import joints_of
+from cad.layout.joints import ScrewAxis
+from cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
+from cad.screws import SCREWS, thread_in_part
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+RINGS = {"direct": "UH1256-02-0610-06S", "belt": "SRC022A-6"}
+
+
+@pytest.fixture(scope="module", params=RINGS)
+def scanner_and_assembly(request):
+    angles = AngleSet(
+        task="hanging",
+        angles_deg=Angles(alpha_rot=0, beta_rot=-55, alpha_laser=-80, beta_laser=75),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring=RINGS[request.param],
+    )
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    return scanner, make_parts(scanner)
+
+
+def joint_of(assembly, part, onto):
+    return next(joint for joint in joints_of(assembly.layout) if (joint.part, joint.onto) == (part, onto))
+
+
+def test_a_hub_that_moves_takes_its_screws_into_the_metal_of_the_shaft(scanner_and_assembly):
+    """Loose by two turns, heads off their seats, the screws still stop it, up, down and around."""
+    _, assembly = scanner_and_assembly
+    shaft = assembly.made[assembly.layout.drive.shaft]
+    joint = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
+    for axis in joint.axes:
+        start, along = np.array(axis.start), np.array(axis.along)
+        core = solids.cylinder(joint.screw.core / 2 - 0.01, start - 1.0 * along, along, joint.length_mm)
+        assert core.intersect(shaft).Volume() < 1e-3  # the screw is in its thread
+        for way in ((0, 0, 1.0), (0, 0, -1.0)):
+            assert core.moved(solids.location(np.eye(3), way)).intersect(shaft).Volume() > 2.0
+        assert core.rotate(solids.vector((0, 0, 0)), solids.vector((0, 0, 1)), 12.0).intersect(shaft).Volume() > 2.0
+
+
+def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
+    _, assembly = scanner_and_assembly
+    above = {"lidar", "alignment_linkage", *({"counterweight"} & assembly.made.keys())}
+    shaft = assembly.layout.drive.shaft
+    assert hanging_on(assembly, joint_of(assembly, "alignment_linkage", shaft)) == above
+    assert hanging_on(assembly, joint_of(assembly, "alignment_linkage", "lidar_body")) == {"lidar"}
+    if shaft == "main_shaft":  # it rests on its lower ring where the axis hangs
+        assert hanging_on(assembly, joint_of(assembly, "shaft_ring", shaft)) == {*above, shaft, "shaft_pulley"}
+    deck = next(joint for joint in joints_of(assembly.layout) if joint.onto == "deck")
+    assert hanging_on(assembly, deck) >= {"lidar", "servo", "base_mount", *assembly.made}
+
+
+def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_assembly):
+    scanner, assembly = scanner_and_assembly
+    checks = retention_checks(scanner, assembly)
+    assert {check.severity for check in checks if "shaft_pulley" not in check.where} == {"pass"}
+    (friction,) = [check for check in checks if "friction: they" in check.message] or [None]
+    assert (friction is None) == (assembly.layout.drive.shaft == "servo_shaft")  # the pulley, which is set by turning
+    joints = [joint for joint in joints_of(assembly.layout) if joint.fixing != "grub"]
+    assert [
+        sum(check.kind == kind and check.value is not None for check in checks) for kind in ("retention", "screw")
+    ] == [len(joints)] * 2
+
+
+def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, monkeypatch):
+    scanner, assembly = scanner_and_assembly
+    joints = joints_of(assembly.layout)
+    hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
+    _instead(monkeypatch, joints, hub, replace(hub, fixing="grub"))
+    assert [check.where for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
+        f"{hub.part} on {hub.onto}"
+    ]
+    for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):
+        _instead(monkeypatch, joints, nuts, replace(nuts, fixing="thread", thread=None))
+        failed = [check.message for check in retention_checks(scanner, assembly) if check.severity == "error"]
+        assert any("threads in bare plastic" in message for message in failed)
+
+
+def _instead(monkeypatch, joints, joint, other):
+    changed = [other if each == joint else each for each in joints]
+    monkeypatch.setattr(room, "joints_of", lambda _: changed)
+
+
+def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
+    """The least sum of squares that is in equilibrium, found without a stiffness; and every direction tried."""
+    scanner, assembly = scanner_and_assembly
+    joint = joint_of(assembly, "alignment_linkage", "lidar_body")
+    centre = np.array([0.02, -0.03, 0.05])
+    start = np.array([axis.start for axis in joint.axes]) / 1000
+    along = np.array([axis.along for axis in joint.axes])
+    balance = np.zeros((6, 3 * joint.count))
+    for i, at in enumerate(start):
+        balance[:3, 3 * i : 3 * i + 3] = np.eye(3)
+        for k, unit in enumerate(np.eye(3)):
+            balance[3:, 3 * i + k] = np.cross(at, unit)
+    directions = np.random.default_rng(0).normal(size=(4000, 3))
+    pull = push = 0.0
+    for force in directions / np.linalg.norm(directions, axis=1)[:, None]:
+        shares = (np.linalg.pinv(balance) @ np.concatenate([force, np.cross(centre, force)])).reshape(-1, 3)
+        axial = (shares * along).sum(axis=1)
+        pull = max(pull, np.abs(axial).max())
+        push = max(push, np.linalg.norm(shares - axial[:, None] * along, axis=1).max())
+    assert worst_shares(joint, centre) == pytest.approx((pull, push), rel=5e-3)
+    assert scanner.lidar.mount_screw == joint.screw.name
+
+
+def test_torque_and_strength_against_hand_calculation():
+    assert stress_area_mm2(SCREWS["M3"]) == pytest.approx(5.03, abs=0.01)  # ISO 898-1
+    assert stress_area_mm2(SCREWS["M4"]) == pytest.approx(8.78, abs=0.02)
+    joint = room.Joint(
+        "alignment_linkage", "servo_shaft", "thread", SCREWS["M3"], (ScrewAxis((9, 0, 0), (-1, 0, 0)),), 8.4, 4.3
+    )
+    hold = hold_of(joint, PRINTED, ALUMINIUM)
+    head = math.pi / 4 * (5.5**2 - 3.4**2)  # mm2 of plastic under the head
+    assert hold.preload_n == pytest.approx(25 * head, rel=1e-6) and hold.torque_nm == 0.22  # 0.2 F d
+    assert hold.engaged_mm == pytest.approx(12 - 8.4) and hold.pull_n == pytest.approx(40 * head)
+    assert hold.push_n == pytest.approx(3 * 8.4 * 40) and "plastic" in hold.push_by
+    assert hold_of(replace(joint, fixing="grub"), PRINTED, ALUMINIUM) is None
+
+
+@pytest.mark.parametrize("profile", ["fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"])
+def test_no_profile_of_plastic_gives_a_carrying_screw_bare_threads(profile):
+    printer = load_catalogue().products[profile]
+    for size in ("M2.5", "M3", "M4"):
+        thread = thread_in_part(SCREWS[size], printer, carries=True)
+        assert (thread.trap is not None or thread.insert) == (profile != "cnc")
+    crowded = thread_in_part(SCREWS["M3"], printer, room_for_nut=False, carries=True)
+    assert crowded.insert == (profile != "cnc")
