@@ -7,11 +7,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from statistics import median
 
-from design.errors import DeviceError
-from firmware_io.servo.find import find_servo, open_bus
+from firmware_io.servo.find import find_servo, listen_first, open_bus
 from firmware_io.servo.fitness import Unfit, slow_adapter, unfit_settings
 
-_LISTEN_S = 0.3
 _READS = 100
 
 
@@ -58,11 +56,7 @@ def examine_servo(port: str, model: str | None, servo_id: int | None) -> ServoEx
         DeviceError: somebody else speaks on this port, no servo answers, several do, or it is another model.
     """
     with closing(open_bus(port)) as bus:
-        if heard := bus.listen(_LISTEN_S):
-            raise DeviceError(
-                f"{port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
-                "this bus, or something else hangs on this port; nothing was sent to it"
-            )
+        listen_first(bus)
         unit = find_servo(bus, model, servo_id)
         table = unit.table
         reports, has_torque = unit.told(unit.read(table.block)), bool(unit.count(table.torque))

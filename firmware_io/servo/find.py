@@ -14,6 +14,7 @@ from firmware_io.servo.bus.unit import PING_S, ServoUnit
 from firmware_io.servo.families import FAMILIES, all_tables
 
 _PATIENT_PING_S = 0.2
+_LISTEN_S = 0.3
 
 
 def open_bus(port: str) -> ServoBus:
@@ -81,6 +82,30 @@ def find_servo(
     who = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
     speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _ways(model, baud)))
     raise DeviceTimeoutError(f"{bus.port}: {who} at {speeds} baud: look at its power, its cable, its id")
+
+
+def listen_first(bus: ServoBus) -> None:
+    """Hear whether somebody speaks unasked, before anything is sent.
+
+    Raises:
+        DeviceError: somebody does.
+    """
+    if heard := bus.listen(_LISTEN_S):
+        raise DeviceError(
+            f"{bus.port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
+            "this bus, or something else hangs on this port; nothing was sent to it"
+        )
+
+
+def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
+    """Speed and number of every servo that answers a ping, at one speed or at all that are known."""
+    bus.find_echo()
+    found = set()
+    for speed, packets in _ways(None, baud):
+        bus.packets = packets
+        if bus.set_baud(speed):
+            found |= {(speed, number) for number in bus.ping(BROADCAST, PING_S)}
+    return sorted(found)
 
 
 class _StrangerError(DeviceError):

@@ -1,4 +1,4 @@
-"""Commands that talk to devices: emulate, scan, ros2, doctor."""
+"""Commands that talk to devices: emulate, scan, ros2, doctor, servo-setup."""
 
 from __future__ import annotations
 
@@ -209,3 +209,24 @@ def doctor(
         print(f"{finding.verdict:8} {finding.says}", flush=True)
         wrong |= finding.verdict == "wrong"
     raise typer.Exit(1 if wrong else 0)
+
+
+@app.command("servo-setup")
+def servo_setup(
+    port: Annotated[str, typer.Argument(metavar="PORT", help="Serial port of the servo.")],
+    new_id: Annotated[int | None, typer.Option("--id", metavar="N", help="Number that it gets, 0 to 252.")] = None,
+    new_baud: Annotated[
+        int | None, typer.Option("--baud", metavar="B", help="Speed that it gets, such as 1000000.")
+    ] = None,
+    from_id: Annotated[
+        int | None, typer.Option(min=0, max=252, metavar="N", help="Its number now; needed where several answer.")
+    ] = None,
+    from_baud: Annotated[
+        int | None, typer.Option(metavar="B", help="Its speed now; default is to look at all.")
+    ] = None,
+) -> None:
+    """Give a servo another number or speed; reads it back, and keeps what it had for `doctor --restore`."""
+    from firmware_io.servo.address import set_address
+
+    for line in set_address(port, new_id, new_baud, from_id, from_baud, Path()):
+        print(line, flush=True)

@@ -1,0 +1,92 @@
+"""`scanwright servo-setup`: another number or speed for a servo, with care: a mistake makes it hard to find again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from design.errors import DeviceError
+from firmware_io.servo.bus.bus import ServoBus
+from firmware_io.servo.bus.registers import Register
+from firmware_io.servo.bus.unit import PING_S, ServoUnit
+from firmware_io.servo.find import all_answering, find_servo, listen_first, open_bus
+from firmware_io.servo.settings import changed, check_torque, keep_settings
+
+_IDS = range(253)
+
+
+def set_address(
+    port: str, new_id: int | None, new_baud: int | None, from_id: int | None, from_baud: int | None, folder: Path
+) -> Iterator[str]:
+    """Set number and speed of a servo; each change in words, as it is made and read back.
+
+    Args:
+        port: of the servo.
+        new_id: the number that it gets; None to keep its own.
+        new_baud: bits per second that it gets; None to keep its own.
+        from_id: its number now; None if it is the only servo that answers, at whatever speed.
+        from_baud: its speed now; None to look at all that are known.
+        folder: gets the file with what it had, from which `doctor --restore` sets it back.
+
+    Raises:
+        DeviceError: nothing to do, not one servo but none or several could be meant, the number is taken, the servo
+            does not know the speed or the adapter cannot have it, it holds its torque, or keeps what it has; or the
+            file cannot be written. But for the last two nothing was changed.
+    """
+    if new_id is None and new_baud is None:
+        raise DeviceError(f"{port}: nothing to set: give --id, --baud or both")
+    if new_id is not None and new_id not in _IDS:
+        raise DeviceError(f"--id = {new_id}: servos have numbers from 0 to {_IDS[-1]}")
+    with closing(open_bus(port)) as bus:
+        unit = _only(bus, from_id, from_baud)
+        table = unit.table
+        yield f"{unit} ({table.model}), protocol {table.protocol} at {bus.baud} baud"
+        wanted = {
+            table.id: unit.id if new_id is None else new_id,
+            table.baud: table.baud_count(bus.baud if new_baud is None else new_baud),
+        }
+        changes = [(one, was, count) for one, count in wanted.items() if (was := unit.count(one)) != count]
+        if not changes:
+            yield f"{unit}: it has that number and speed already"
+            return
+        check_torque(unit)
+        _refuse_collision(unit, wanted)
+        yield keep_settings(folder, unit, changes)
+        for register, was, count in changes:
+            unit, said = changed(unit, register, was, count)
+            yield said
+
+
+def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUnit:
+    """The servo that is meant.
+
+    Raises:
+        DeviceError: it does not answer, or several do and no number was given.
+    """
+    listen_first(bus)
+    if from_id is None:
+        there = all_answering(bus, from_baud)
+        if len(there) > 1:
+            seen = ", ".join(f"{number} at {baud} baud" for baud, number in there)
+            raise DeviceError(
+                f"{bus.port}: several servos answer ({seen}): leave one on the cable, or say which with --from-id "
+                "and --from-baud; nothing was changed"
+            )
+    return find_servo(bus, None, from_id, baud=from_baud)
+
+
+def _refuse_collision(unit: ServoUnit, wanted: dict[Register, int]) -> None:
+    """See that nobody else has the new number at the new speed, and that the adapter can have it.
+
+    Raises:
+        DeviceError: somebody has, or it cannot.
+    """
+    bus, table, before = unit.bus, unit.table, unit.bus.baud
+    new_id, new_baud = wanted[table.id], table.bauds[wanted[table.baud]]
+    if not bus.set_baud(new_baud):
+        raise DeviceError(f"{bus.port}: this adapter cannot do {new_baud} baud; nothing was changed")
+    taken = bus.ping(new_id, PING_S)  # it is not the servo itself: number or speed are others
+    bus.set_baud(before)
+    if taken:
+        raise DeviceError(f"{bus.port}: a servo {new_id} answers at {new_baud} baud already; nothing was changed")
