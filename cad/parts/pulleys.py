@@ -19,7 +19,7 @@ import numpy as np
 from cad import solids
 from cad.layout.belt.loads import PRELOAD_N, press_newton
 from cad.layout.belt.plate import pulley_foot_radius
-from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, RIM, TRAVEL, BeltStack
+from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet, no_wider
 from cad.layout.joints import horn_centres, screws
 from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
@@ -114,7 +114,7 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
             cuts.append(solids.upright(screw.head_room, stack.pulley_seat, top, x, y))
         if boss > 0:
             radius = boss + printer.fit_clearance_mm / 4
-            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
+            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_ROOM))
         made = checked(body.cut(*cuts).clean())
     return made.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
 

@@ -9,6 +9,7 @@ from cad.layout.belt.stack import (
     CASE_ROOM,
     FOOT_HOLE,
     FOOT_SCREW,
+    HORN_BOSS_ROOM,
     PULLEY_GAP,
     RING_ROOM,
     TRAVEL,
@@ -123,7 +124,7 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
 
 
 def _check_heads(stack: BeltStack, printer: Printer) -> None:
-    """The heads of the horn's screws leave a wall below the teeth, and around the horn's boss."""
+    """The heads of the horn's screws leave a wall below the teeth, and around the horn's boss where they reach it."""
     servo = stack.servo
     screw = SCREWS[servo.horn_screw]
     place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
@@ -134,7 +135,8 @@ def _check_heads(stack: BeltStack, printer: Printer) -> None:
             f"{place}: {heads} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
         )
     boss = servo.horn_boss_diameter_mm
-    if middle - beside < boss / 2:
+    over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_ROOM
+    if over_boss < printer.min_wall_mm and middle - beside < boss / 2:
         raise BuildError(f"{place}: {heads} leave no wall around its boss of {boss:g} mm")
 
 

@@ -47,6 +47,7 @@ RIM_ABOVE_BELT = 0.5
 BELT_ROOM = 0.5  # on each side of the belt
 PULLEY_GAP = 2.0  # between plate and pulleys
 PLATE = 5.0  # of the servo
+HORN_BOSS_ROOM = 0.5  # over the boss of the horn, in the foot of the drive pulley
 UNDER_HORN_HEAD = 4.0  # of the drive pulley: at least
 SEAT_GAP = 0.2  # the feet carry, not the plate
 INNER_RING = 1.45  # how far a shoulder may touch a bearing's inner ring, on the radius
