@@ -1,6 +1,6 @@
 """Damaged replies through both codecs: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED]`.
 
-STREAMS (default 1,000,000) dialogues of a lidar, and a third as many answers of a servo in both protocols, each with a
+STREAMS (default 1,000,000) dialogues of a lidar, and as many answers of a servo in each of its protocols, each with a
 few flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed errors, whatever
 is accepted must have right sums, told by loops of this file, and nothing may hang. Anything else ends the run.
 """
@@ -10,15 +10,18 @@ from __future__ import annotations
 import random
 import sys
 import time
+from collections.abc import Callable
 from unittest.mock import patch
 
 from design.errors import DeviceError, ProtocolError
 from firmware_io.lidar.scip import parameters, protocol
 from firmware_io.servo.bus import bus, serial_line
 from firmware_io.servo.bus.bus import ServoBus
+from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import Register
 from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
-from firmware_io.twins.servo.dynamixel_packets import status
+from firmware_io.servo.feetech.packets import STS
+from firmware_io.twins.servo import dynamixel_packets, feetech_packets
 
 _SCIP_SCRAPS = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
@@ -131,7 +134,7 @@ def lidar(streams: int, seed: int) -> None:
     )
 
 
-def servo(answers: int, seed: int) -> None:
+def servo(answers: int, seed: int, packets: PacketFormat, status: Callable[[int, bytes], bytes]) -> None:
     """Damage answers to one read of a block, and print what became of them."""
     rng, wire = random.Random(seed), Wire()
     with (
@@ -139,36 +142,37 @@ def servo(answers: int, seed: int) -> None:
         patch.object(serial_line.SerialLine, "wait_s", 0.0002),
         patch.object(bus, "_TRIES", 1),
     ):
-        buses = {packets.protocol: ServoBus("wire", packets) for packets in (PROTOCOL_1, PROTOCOL_2)}
-        accepted, slowest_s, began_s = 0, 0.0, time.perf_counter()
+        servo_bus, accepted, slowest_s, began_s = ServoBus("wire", packets), 0, 0.0, time.perf_counter()
         for k in range(answers):
-            protocol = rng.choice(("1.0", "2.0"))
             data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(_BLOCK.size))
-            wire.answer = damaged(rng, status(protocol, 1, 0, data), _SERVO_SCRAPS, 2, 4)
+            wire.answer = damaged(rng, status(0, data), _SERVO_SCRAPS, 2, 4)
             asked_s = time.perf_counter()
             try:
-                answer = buses[protocol].read(1, _BLOCK)
+                answer = servo_bus.read(1, _BLOCK)
                 accepted += 1
-                whole = (status(protocol, 1, error, answer.data) for error in range(256))
+                whole = (status(error, answer.data) for error in range(256))
                 assert any(packet in wire.answer for packet in whole), "accepted with a wrong sum"
             except DeviceError:
                 pass
             except BaseException:
-                print(f"servo answer {k} of seed {seed}: {wire.answer!r}")
+                print(f"servo answer {k} of seed {seed}, protocol {packets.protocol}: {wire.answer!r}")
                 raise
             slowest_s = max(slowest_s, time.perf_counter() - asked_s)
     print(
-        f"{answers:,} damaged answers of a servo: {accepted:,} accepted, all with right sums; {answers - accepted:,} "
+        f"{answers:,} damaged answers of a servo, protocol {packets.protocol}: "
+        f"{accepted:,} accepted, all with right sums; {answers - accepted:,} "
         f"refused with a typed error; slowest {1e3 * slowest_s:.0f} ms; {time.perf_counter() - began_s:.0f} s"
     )
 
 
 def main() -> None:
-    """Both."""
+    """All of them."""
     streams = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     lidar(streams, seed)
-    servo(streams // 3, seed)
+    servo(streams, seed, PROTOCOL_1, lambda error, data: dynamixel_packets.status("1.0", 1, error, data))
+    servo(streams, seed, PROTOCOL_2, lambda error, data: dynamixel_packets.status("2.0", 1, error, data))
+    servo(streams, seed, STS, lambda error, data: feetech_packets.status(1, error, data))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ that it could not be stopped.
 `read` it at least every two seconds: turns are counted from what is read, and a servo that nobody listens to is
 stopped (by the guard process, and by the bus watchdog where the servo has one).
 
-What nobody can help: a servo of protocol 1.0 in wheel mode goes on turning when its bus is cut.
+What nobody can help: a servo without a watchdog (protocol 1.0, STS) that spins goes on when its bus is cut.
 """
 
 from __future__ import annotations
