@@ -223,7 +223,7 @@ def live(seconds: float, rate_hz: float) -> None:
     receiving, sending = multiprocessing.Pipe(duplex=False)
     finished: list[float] = []
     with guarded_server("a page") as (server, gate):
-        view = CloudView(server)
+        view = CloudView(server, "scan", np.zeros(3))
 
         def watch() -> None:
             for more in growing(receiving, Placing(angles, None)):

@@ -1,22 +1,27 @@
-"""The cloud while it grows: what a scan has measured so far, coloured by height, intensity or time."""
+"""The cloud while it grows: what a scan has measured so far, coloured by height, range, intensity or time."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal, get_args
 
 import numpy as np
 import viser
 
-from design.arrays import Float32s
+from design.arrays import Float32s, Vector
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.clouds.formats import write_clouds
 from firmware_io.scan.live_feed import CloudGrowth
+from scanwright.live.ruler import Ruler
 from scanwright.serving.style import Colours, note_html, ramp
 
-ColourBy = Literal["height", "intensity", "time"]
-COLOUR_BY: tuple[ColourBy, ...] = ("height", "intensity", "time")
+ColourBy = Literal["height", "range", "intensity", "time"]
+COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
-MOST_POINTS = 3_000_000  # the page drops the oldest beyond, and says so
+MOST_POINTS = 5_000_000  # the page drops the oldest beyond, and says so
 POINT_M = 0.012
 
 
@@ -32,8 +37,9 @@ class _Chunk:
 class CloudView:
     """The page of one scan."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
+    def __init__(self, server: viser.ViserServer, name: str, centre_m: Vector) -> None:
+        """`name` is that of files that are saved, `centre_m` the optical centre, from which ranges are told."""
+        self._server, self._name, self._centre_m = server, name, centre_m
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
         self._spans: dict[ColourBy, tuple[float, float]] = {}
@@ -47,12 +53,16 @@ class CloudView:
         self._size = server.gui.add_slider("point size [mm]", 2.0, 50.0, 1.0, 1000 * POINT_M)
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
+        self.ruler = Ruler(server, lambda: [chunk.points_m for chunk in list(self.chunks)])
+        save = server.gui.add_button("Save what is seen", hint="As a PLY file, where your browser puts downloads")
+        save.on_click(self._save)
 
     def add(self, growth: CloudGrowth) -> None:
         """Show what is new, and say what the scan said."""
         if len(growth.points_m):
             values: dict[ColourBy, Float32s] = {
                 "height": growth.points_m[:, 2],
+                "range": np.linalg.norm(growth.points_m - self._centre_m, axis=1).astype(np.float32),
                 "intensity": growth.intensity,
                 "time": growth.time_s,
             }
@@ -72,6 +82,25 @@ class CloudView:
     def tell(self, line: str) -> None:
         """Speed, rates, dropped and bad packets, as the scan says them."""
         self._line.content = note_html(line)
+
+    def cloud(self) -> Cloud:
+        """All that is shown."""
+        chunks = list(self.chunks)
+        points = np.concatenate([np.empty((0, 3), np.float32), *(chunk.points_m for chunk in chunks)])
+        kept: tuple[tuple[ColourBy, str, str], ...] = (("intensity", "intensity", "<f4"), ("time", "time_s", "<f8"))
+        columns = {
+            name: np.concatenate([np.empty(0, np.float32), *(chunk.values[by] for chunk in chunks)]).astype(kind)
+            for by, name, kind in kept
+        }
+        return Cloud(points, columns)
+
+    def _save(self, event: viser.GuiEvent) -> None:
+        if event.client is None:
+            return
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"{self._name}.ply"
+            write_clouds(path, [self.cloud()])
+            event.client.send_file_download(path.name, path.read_bytes())
 
     def _append(self, points_m: Float32s, values: dict[ColourBy, Float32s]) -> None:
         if self.chunks and len(self.chunks[-1].points_m) < CHUNK_POINTS:

@@ -1,41 +1,74 @@
-"""The page of a scan in a process of its own, and the way to feed it: the scan must never wait for a browser."""
+"""The page of a scan in a process of its own, and the way to feed it: the scan must never wait for a browser.
+
+The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
+seconds, so that the first scan is already seen.
+"""
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+import sys
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Thread
 
 from design.angles import angles_in_use
+from design.errors import DeviceError
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Watch, growing
 
 ALONE_S = 10.0
+SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
+OPENED_S = 15.0  # at most until the browser has it
 
 
 @contextmanager
-def live_page(folder: Path, *, wanted: bool) -> Iterator[Watch]:
+def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | None = None) -> Iterator[Watch]:
     """What `acquire` tells of a scan: the page of a build folder's scanner, or nobody where it is not wanted.
 
     When the body has ended well, this waits until nobody looks any more.
+
+    Args:
+        folder: of the build.
+        wanted: whether there is a page.
+        browse: opens an address; None for the person's browser where this runs on a terminal.
+
+    Raises:
+        DeviceError: the page cannot be served.
     """
     if not wanted:
         yield NOBODY
         return
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)
-    page = spawn.Process(target=_show, args=(receiving, folder), daemon=True)
+    hearing, telling = spawn.Pipe(duplex=False)
+    page = spawn.Process(target=_show, args=(receiving, telling, folder), daemon=True)
     page.start()
     receiving.close()
+    telling.close()
+    try:
+        if not hearing.poll(SERVED_S):
+            raise EOFError
+        address = hearing.recv()
+    except EOFError:
+        page.terminate()
+        raise DeviceError("--live: the page could not be served; scan without it") from None
+    print(f"open {address}", flush=True)
+    if browse is None and sys.stdout.isatty():
+        browse = webbrowser.open
+    if browse is not None and browse(address):
+        hearing.poll(OPENED_S)
     yield Feed(sending)
     with suppress(KeyboardInterrupt):
         page.join()
 
 
-def _show(receiving: Connection, folder: Path) -> None:
+def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
     """What the page's process does: show the cloud, and once it is full, wait until nobody looks at it."""
     from scanwright.live.cloud_view import CloudView
     from scanwright.serving.page_server import guarded_server, wait_until_alone
@@ -44,8 +77,15 @@ def _show(receiving: Connection, folder: Path) -> None:
     in_use = angles_in_use(folder)
     placing = Placing(in_use.angles, own_body_beside(in_use.path))
     with guarded_server(f"Scanwright: scan of {folder.name}") as (server, gate):
-        view = CloudView(server)
-        print(f"open {gate.address}", flush=True)
+        view = CloudView(server, folder.name, in_use.angles.T_world_rot(0.0)[:3, 3])
+        telling.send(gate.address)
+
+        def tell_of_visitor() -> None:
+            while not gate.visitors:
+                time.sleep(0.05)
+            telling.send("seen")
+
+        Thread(target=tell_of_visitor, name="visitor", daemon=True).start()
         for growth in growing(receiving, placing):
             view.add(growth)
         view.tell("the scan is done; this page ends when you close it")

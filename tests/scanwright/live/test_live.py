@@ -6,13 +6,17 @@ from multiprocessing import Pipe
 import numpy as np
 import pytest
 from patience import until
+from websockets.sync.client import connect
 
 from design.angles import Angles, AngleSet
+from design.errors import DeviceError
 from firmware_io.assembly.deskew import deskew
 from firmware_io.samples import JointLog, Scan
 from firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
 from scanwright.live import cloud_view
 from scanwright.live.cloud_view import CloudView
+from scanwright.live.ruler import Ruler, nearest_to_ray
+from scanwright.live.scan_page import live_page
 from scanwright.serving.page_server import guarded_server
 
 ANGLES = AngleSet(
@@ -103,7 +107,7 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
     monkeypatch.setattr(cloud_view, "MOST_POINTS", 2000)
     rng = np.random.default_rng(0)
     with guarded_server("a page") as (server, _):
-        view = CloudView(server)
+        view = CloudView(server, "scan", np.zeros(3))
         for index in range(30):
             points = rng.normal(0, 1 + index, (100, 3)).astype(np.float32)
             view.add(CloudGrowth(points, np.zeros(100, np.float32), np.full(100, index, np.float32), (), 0))
@@ -115,3 +119,57 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])
         assert len(colours) == shown and len(np.unique(colours, axis=0)) > 10
         assert "left out 7 scans" in view.facts.content
+        kept = view.cloud()
+        assert len(kept.points_m) == shown and set(kept.columns["time_s"]) == set(range(30 - shown // 100, 30))
+        ranges = np.concatenate([chunk.values["range"] for chunk in view.chunks])
+        np.testing.assert_allclose(ranges, np.linalg.norm(kept.points_m, axis=1), rtol=1e-6)
+
+
+def test_the_address_is_said_and_the_page_seen_before_the_scan_begins(tmp_path, capsys):
+    (tmp_path / "angles.json").write_text(ANGLES.to_json())
+    opened = []
+
+    def browse(address):
+        opened.append(address)
+        path = address.removeprefix("http://127.0.0.1:").split("/", 1)
+        port, token = int(path[0]), path[1]
+        headers = {"Cookie": f"scanwright-{port}={token.removeprefix('?token=')}"}
+        origin = f"http://127.0.0.1:{port}"
+        looking.append(connect(f"ws://127.0.0.1:{port}/", origin=origin, additional_headers=headers))
+        return True
+
+    looking = []
+    with live_page(tmp_path, wanted=True, browse=browse) as watch:
+        assert capsys.readouterr().out == f"open {opened[0]}\n" and looking
+        watch.scan(scan_at(0))
+        watch.close()
+        looking[0].close()
+
+
+def test_a_page_that_cannot_be_served_is_one_line(tmp_path):
+    with pytest.raises(DeviceError, match="the page could not be served"), live_page(tmp_path, wanted=True):
+        pytest.fail("there are no angles in that folder")
+
+
+def test_the_ruler_takes_the_point_that_is_meant():
+    rng = np.random.default_rng(0)
+    wall = np.stack([np.full(5000, 4.0), *rng.uniform(-2, 2, (2, 5000))], axis=1).astype(np.float32)
+    behind = wall + np.float32([2.0, 0, 0])
+    for aim in ([4.0, 0.3, 0.2], [4.0, -1.5, 1.0]):
+        found = nearest_to_ray([behind, wall], np.zeros(3), np.array(aim) * 3)
+        assert found[0] == 4.0 and np.linalg.norm(found - aim) < 0.08
+    assert nearest_to_ray([wall], np.zeros(3), np.array([-1.0, 0, 0])) is None
+    assert nearest_to_ray([], np.zeros(3), np.array([1.0, 0, 0])) is None
+
+
+def test_two_clicks_are_a_length_and_a_third_begins_anew():
+    points = np.array([[4, 0, 0], [4, 3, 0], [4, 0, 1]], np.float32)
+    with guarded_server("a page") as (server, _):
+        ruler = Ruler(server, lambda: [points])
+        ruler.click(np.zeros(3), np.array([1.0, 0, 0]))
+        assert ruler.said == ""
+        ruler.click(np.zeros(3), np.array([0.0, 0, -1]))  # at nothing
+        ruler.click(np.zeros(3), np.array([4.0, 3, 0]))
+        assert ruler.said == "3.000 m"
+        ruler.click(np.zeros(3), np.array([4.0, 0, 1]))
+        assert ruler.said == ""

@@ -1,0 +1,87 @@
+"""A ruler on a cloud that grows: two points are clicked, the distance between them is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import viser
+from jaxtyping import Float
+from numpy import ndarray
+
+from design.arrays import Float32s, Vector
+
+REACH_RAD = np.radians(1.0)  # of a click about its ray
+COLOUR = (224, 49, 49)
+
+
+def nearest_to_ray(
+    clouds: Sequence[Float[ndarray, "n 3"]], origin_m: Vector, direction: Vector
+) -> Float[ndarray, " 3"] | None:
+    """The point that a click means: of those within its reach of the ray the nearest one to the eye; None of none.
+
+    Args:
+        clouds: points [m].
+        origin_m: the eye.
+        direction: of the ray, of any length but 0.
+    """
+    along = np.asarray(direction, float) / np.linalg.norm(direction)
+    best, best_m = None, np.inf
+    for points in clouds:
+        to = np.asarray(points, float) - origin_m
+        ahead_m = to @ along
+        beside_m = np.sqrt(np.maximum((to**2).sum(axis=1) - ahead_m**2, 0.0))
+        hit = (ahead_m > 0) & (beside_m < np.tan(REACH_RAD) * ahead_m)
+        # of a wall seen at a low angle the middle of the click, not its near edge
+        cost_m = np.where(hit, ahead_m + beside_m / np.tan(REACH_RAD), np.inf)
+        first = int(np.argmin(cost_m)) if len(cost_m) else 0
+        if len(cost_m) and cost_m[first] < best_m:
+            best, best_m = np.asarray(points[first], float), float(cost_m[first])
+    return best
+
+
+class Ruler:
+    """Button, clicks, line and words. `points` gives what is shown."""
+
+    def __init__(self, server: viser.ViserServer, points: Callable[[], Sequence[Float32s]]) -> None:
+        self._scene, self._points = server.scene, points
+        self._ends: list[Vector] = []
+        self.on = server.gui.add_checkbox("measure", initial_value=False, hint="Click two points of the cloud")
+        self.said = ""
+        self.on.on_update(lambda _: self._arm())
+
+    def click(self, origin_m: Vector, direction: Vector) -> None:
+        """Take the point that is meant as the next end; a third one begins anew."""
+        end = nearest_to_ray(self._points(), np.asarray(origin_m, float), np.asarray(direction, float))
+        if end is None:
+            return
+        self._ends = [*self._ends, end] if len(self._ends) == 1 else [end]
+        self._draw()
+
+    def _arm(self) -> None:
+        self._scene.remove_click_callback()
+        if not self.on.value:
+            self._ends = []
+            self._draw()
+            return
+
+        @self._scene.on_click()
+        def _(event: viser.SceneClickEvent) -> None:
+            self.click(np.array(event.ray_origin), np.array(event.ray_direction))
+
+    def _draw(self) -> None:
+        self.said = ""
+        for name in ("/ruler/ends", "/ruler/line", "/ruler/length"):
+            self._scene.remove_by_name(name)
+        if self._ends:
+            ends = np.array(self._ends, np.float32)
+            self._scene.add_point_cloud(
+                "/ruler/ends", ends, COLOUR, point_size=0.04, point_shape="circle", precision="float32"
+            )
+        if len(self._ends) == 2:
+            first, last = self._ends
+            self.said = f"{np.linalg.norm(last - first):.3f} m"
+            self._scene.add_line_segments(
+                "/ruler/line", ends[None], colors=COLOUR, thickness=3.0, thickness_units="screen"
+            )
+            self._scene.add_label("/ruler/length", self.said, position=tuple(((first + last) / 2).tolist()))
