@@ -100,7 +100,7 @@ class CloudView:
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{self._name}.ply"
             write_clouds(path, [self.cloud()])
-            event.client.send_file_download(path.name, path.read_bytes())
+            event.client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
 
     def _append(self, points_m: Float32s, values: dict[ColourBy, Float32s]) -> None:
         if self.chunks and len(self.chunks[-1].points_m) < CHUNK_POINTS:

@@ -1,5 +1,6 @@
 """The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
 
+import re
 import threading
 from multiprocessing import Pipe
 
@@ -11,6 +12,7 @@ from websockets.sync.client import connect
 from design.angles import Angles, AngleSet
 from design.errors import DeviceError
 from firmware_io.assembly.deskew import deskew
+from firmware_io.clouds.formats import read_clouds
 from firmware_io.samples import JointLog, Scan
 from firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
 from scanwright.live import cloud_view
@@ -19,6 +21,7 @@ from scanwright.live.ruler import Ruler, nearest_to_ray
 from scanwright.live.scan_page import live_page
 from scanwright.serving.page_server import guarded_server
 
+HARMLESS = ("THREE.Clock", "GPU stall", "GL Driver Message", "inside passive event listener")  # without a graphics card
 ANGLES = AngleSet(
     task="live",
     angles_deg=Angles(alpha_rot=10, beta_rot=-55, alpha_laser=-80, beta_laser=75),
@@ -173,3 +176,31 @@ def test_two_clicks_are_a_length_and_a_third_begins_anew():
         assert ruler.said == "3.000 m"
         ruler.click(np.zeros(3), np.array([4.0, 0, 1]))
         assert ruler.said == ""
+
+
+def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_path):
+    rng = np.random.default_rng(0)
+    floor = np.column_stack([rng.uniform(-3, 3, (20_000, 2)), np.full(20_000, -1.0)]).astype(np.float32)
+    with guarded_server("a page") as (server, gate):
+        view = CloudView(server, "hall", np.zeros(3))
+        nothing = np.zeros(len(floor), np.float32)
+        view.add(CloudGrowth(floor, nothing, nothing, (), 0))
+        page = browser.open(gate.address, width=900, height=600)
+        assert page.title() == "a page"
+        page.get_by_text("20,000 points").wait_for()
+        page.get_by_label("measure").check()
+        until(lambda: view.ruler.on.value)
+        for across in (350, 550):
+            page.mouse.move(across, 380)
+            page.mouse.down()
+            page.wait_for_timeout(50)
+            page.mouse.up()
+            page.wait_for_timeout(500)
+        page.get_by_text(re.compile(r"^\d\.\d{3} m$")).wait_for()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save what is seen").click()
+        assert download.value.suggested_filename == "hall.ply"
+        download.value.save_as(tmp_path / "hall.ply")
+        (cloud,), _ = read_clouds(tmp_path / "hall.ply")
+        np.testing.assert_array_equal(cloud.points_m, floor)
+    browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
