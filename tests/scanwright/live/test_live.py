@@ -196,7 +196,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
             page.wait_for_timeout(50)
             page.mouse.up()
             page.wait_for_timeout(500)
-        page.get_by_text(re.compile(r"^\d\.\d{3} m$")).wait_for()
+        until(lambda: re.fullmatch(r"\d\.\d{3} m", view.ruler.said))
         with page.expect_download() as download:
             page.get_by_role("button", name="Save what is seen").click()
         assert download.value.suggested_filename == "hall.ply"
