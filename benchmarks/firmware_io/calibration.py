@@ -167,7 +167,7 @@ def designed(setup: Setup) -> AngleSet:
     """The angle set that a simulated scanner was built from."""
     (alpha_rot, beta_rot), (alpha_laser, beta_laser) = setup.rot_deg, setup.laser_deg
     angles = Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha_laser, beta_laser=beta_laser)
-    return AngleSet(task="simulated", angles_deg=angles, sensor="any", servo="any")
+    return AngleSet(task="simulated", angles_deg=angles, sensor="any", servo="MX-64R")
 
 
 if __name__ == "__main__":

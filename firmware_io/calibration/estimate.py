@@ -16,7 +16,6 @@ from firmware_io.calibration.model import (
     COUNT,
     LAG,
     MOUNT,
-    WIDEST_BACKLASH_RAD,
     Mount,
     ReturnedBeams,
     beam_rays,
@@ -81,12 +80,12 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
     for near_m, turn_deg in _WIDE:
         x, grouping, normal = _coarse(tiles, mount, x, free, near_m, turn_deg)
     x, grouping, normal = _coarse(tiles, mount, x, np.union1d(free, MOUNT), *_WIDE[-1])
-    choice = choose_observable(beams, tiles, grouping, normal)
+    choice = choose_observable(beams, tiles, grouping, normal, mount.play_rad)
     for near_m, turn_deg in _NARROW:
         x, grouping, normal = _coarse(tiles, mount, x, choice.free, near_m, turn_deg)
     last_m = max(_LAST_NOISES * tiles.noise_m, _LAST_M)
     for _ in range(_ROUNDS):
-        choice = choose_observable(beams, tiles, grouping, normal)
+        choice = choose_observable(beams, tiles, grouping, normal, mount.play_rad)
         held = np.setdiff1d(np.arange(COUNT), choice.free)
         x[held] = start[held]
         grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
@@ -99,7 +98,8 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
     return Estimate(
         x=x,
         choice=choice,
-        covariance=scale * covariance(part) + _of_held_backlash(normal, grouping, choice.free, last.bulge_m),
+        covariance=scale * covariance(part)
+        + _of_held_backlash(normal, grouping, choice.free, last.bulge_m, mount.play_rad),
         spectrum=spectrum(part, choice.free),
         tiles=tiles,
         grouping=grouping,
@@ -110,11 +110,11 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
     )
 
 
-def _of_held_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float) -> Floats:
-    """Covariance that a backlash brings which is held at 0 and may be as wide as any is, shape (k, k)."""
+def _of_held_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float, play_rad: float) -> Floats:
+    """Covariance that a backlash brings which is held at 0 and may be as wide as the gear's play, shape (k, k)."""
     if BACKLASH[0] in free:
         return np.zeros((free.size, free.size))
-    moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * WIDEST_BACKLASH_RAD
+    moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * play_rad
     return np.outer(moved, moved)
 
 

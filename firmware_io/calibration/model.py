@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from design import frames
 from design.angles import AngleSet
 from design.arrays import Floats, Rotation
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
 from design.errors import RecordingError
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
@@ -70,7 +72,6 @@ PARAMETERS = (
 COUNT = len(PARAMETERS)
 MOUNT = (0, 1, 2, 3)
 BIAS, HARMONIC_1, HARMONIC_2, LAG, BACKLASH = (4,), (5, 6), (7, 8), (9,), (10,)
-WIDEST_BACKLASH_RAD = np.radians(20 / 60)  # the most that a maker in the catalogue tells of a servo's gear
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,6 +186,13 @@ def start_vector(angles: AngleSet) -> Float64[ndarray, " parameters"]:
     return x
 
 
+def play_rad(servo: str) -> float:
+    """Full play of the gear of a servo; the most of any in the catalogue where that does not tell it."""
+    servos = [product for product in load_catalogue() if isinstance(product, Servo)]
+    known = {product.name: product.backlash_deg for product in servos if product.backlash_deg is not None}
+    return float(np.radians(known.get(servo, max(known.values()))))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Mount:
     """The laser's scan plane in the rotation frame, for one vector of parameters.
@@ -192,16 +200,18 @@ class Mount:
     Attributes:
         designed: rotation of the angle set without its delta, shape (3, 3).
         along_m: translation along the axis, which no calibration changes.
+        play_rad: of the servo's gear, as wide as a backlash can be that is not found.
     """
 
     designed: Rotation
     along_m: float
+    play_rad: float
 
     @staticmethod
     def of(angles: AngleSet) -> Mount:
         """The mount of an angle set, its delta taken off."""
         bare = angles.model_copy(update={"delta_rotvec_rot_deg": (0.0, 0.0)})
-        return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000)
+        return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000, play_rad(angles.servo))
 
     def plane(self, x: Float64[ndarray, " parameters"]) -> Floats:
         """First two columns of `exp(delta) R_designed`, and what 1 rad of each delta adds to them, shape (3, 3, 2)."""

@@ -15,7 +15,7 @@ from numpy import ndarray
 from design.arrays import Floats, Ints
 from design.errors import RecordingError
 from firmware_io.calibration import model
-from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, WIDEST_BACKLASH_RAD, Mount, ReturnedBeams
+from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
 from firmware_io.calibration.surfaces import seen_twice
 from firmware_io.calibration.tiles import FlatTiles
@@ -23,10 +23,6 @@ from firmware_io.calibration.tiles import FlatTiles
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
 FLATTEST_FAN_RAD = np.radians(3.0)
 _TWICE = 0.05  # share of the beams
-_INSIDE = (
-    "half of it, divided by the speed, is inside the time offset, whose stated error allows for "
-    f"{np.degrees(WIDEST_BACKLASH_RAD):.2f} deg of it"
-)
 _ONE_LINE = 0.01  # share of the surface that faces across it
 
 
@@ -81,9 +77,13 @@ def stood_still(beams: ReturnedBeams) -> bool:
 
 
 def choose_observable(
-    beams: ReturnedBeams, tiles: FlatTiles, grouping: Grouping, normal: Float64[ndarray, "tiles width width"]
+    beams: ReturnedBeams,
+    tiles: FlatTiles,
+    grouping: Grouping,
+    normal: Float64[ndarray, "tiles width width"],
+    play_rad: float,
 ) -> Choice:
-    """Decide which parameters the recordings (all their `beams`) show.
+    """Decide which parameters the recordings (all their `beams`) show, with a gear of that play.
 
     Raises:
         RecordingError: they do not show one of the mounting errors. The message says which, and why.
@@ -104,7 +104,7 @@ def choose_observable(
         raise RecordingError(f"the scene does not show {named}: {_geometry(tiles, grouping)}")
     held: list[Held] = []
     for group in (model.BIAS, model.HARMONIC_1, model.LAG, model.BACKLASH, model.HARMONIC_2):
-        why = _motion(beams, group)
+        why = _motion(beams, group, play_rad)
         if not why:
             tried = np.sort(np.append(free, group))
             sd = _sd(reduced(normal, grouping, tried, BUILDERS_BULGE_M), tried)
@@ -117,7 +117,7 @@ def choose_observable(
                 f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
             )
             if group == model.BACKLASH and model.LAG[0] in free:
-                why += f"; {_INSIDE}"
+                why += f"; {_inside(play_rad)}"
         held.append(Held(tuple(PARAMETERS[k].name for k in group), _words(group), why))
     share = _facing(tiles, grouping)[0]
     notes = []
@@ -140,7 +140,14 @@ def _sd(part: Reduced, free: Ints) -> dict[int, float]:
     return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
 
 
-def _motion(beams: ReturnedBeams, group: tuple[int, ...]) -> str:
+def _inside(play_rad: float) -> str:
+    return (
+        "half of it, divided by the speed, is inside the time offset, whose stated error allows for "
+        f"{np.degrees(play_rad):.2f} deg of it"
+    )
+
+
+def _motion(beams: ReturnedBeams, group: tuple[int, ...], play_rad: float) -> str:
     """Why the motion of the axis cannot show a parameter, "" where it can."""
     if group not in (model.LAG, model.BACKLASH):
         return ""
@@ -154,7 +161,7 @@ def _motion(beams: ReturnedBeams, group: tuple[int, ...]) -> str:
     moving = np.abs(beams.speed_rad_s[beams.way != 0])
     slow, fast = np.percentile(moving, [5, 95])
     if group == model.BACKLASH and fast < 1.2 * slow:
-        return f"both ways at one speed: {_INSIDE}"
+        return f"both ways at one speed: {_inside(play_rad)}"
     return ""
 
 

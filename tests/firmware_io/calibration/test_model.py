@@ -20,6 +20,7 @@ from firmware_io.calibration.model import (
     ReturnedBeams,
     beam_rays,
     gather,
+    play_rad,
     start_vector,
 )
 from firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
@@ -249,3 +250,10 @@ def test_tiles_hold_flat_looks_of_one_pass():
 
 def test_every_parameter_is_named_once():
     assert len({p.name for p in PARAMETERS}) == COUNT == BACKLASH[0] + 1
+
+
+def test_the_play_that_may_hide_in_a_lag_is_that_of_the_servo():
+    plays = {servo: np.degrees(play_rad(servo)) for servo in ("MX-64R", "STS3215", "XL330-M288", "home-made")}
+    assert plays["MX-64R"] == pytest.approx(0.333)
+    assert plays["STS3215"] == pytest.approx(0.9)
+    assert plays["XL330-M288"] == plays["home-made"] == pytest.approx(0.9)  # nobody tells it: the most of any
