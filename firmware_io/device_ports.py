@@ -80,7 +80,7 @@ def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
     if twins is not None and lidar is None and servo is None:
         return twins
     return Ports(
-        lidar=lidar or _only("--lidar", "Hokuyo sensor", lidar_ports()),
+        lidar=lidar or _only("--lidar", "lidar", lidar_ports()),
         servo=servo or _only("--servo", "serial adapter of a servo", servo_ports()),
     )
 

@@ -24,12 +24,16 @@ _SCAN_BOUNDS = (
     ("range_min_m", -math.inf, math.inf),
     ("range_max_m", -math.inf, math.inf),
 )
+_LONGEST_TURN_NS = 1000 * 10**9
 _MOST_RAD = 1e9  # of a joint that counts turns: years of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scan:
     """One turn of the 2D lidar, as a LaserScan holds it.
+
+    A sensor whose speed wanders has beams of its own in each turn: `beam_bearing_rad` and `beam_offset_ns`, both or
+    none. What a LaserScan would hold then is the even grid that is nearest to them.
 
     Attributes:
         stamp_ns: time of the first beam.
@@ -41,6 +45,8 @@ class Scan:
         range_max_m: longest range the sensor can mean.
         range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.
         intensity: shape (n,), or (0,) from a sensor that measures none.
+        beam_bearing_rad: bearing of each beam, shape (n,); None on the even grid.
+        beam_offset_ns: time of each beam after the stamp, not decreasing, shape (n,); None on the even grid.
 
     Raises:
         RecordingError: bearings, times between beams or limits of the range are no numbers of a lidar.
@@ -55,20 +61,38 @@ class Scan:
     range_max_m: float
     range_m: Float32[ndarray, " n"]
     intensity: Float32[ndarray, " m"]
+    beam_bearing_rad: Float64[ndarray, " k"] | None = None
+    beam_offset_ns: Int64[ndarray, " k"] | None = None
 
     def __post_init__(self) -> None:
         for name, low, high in _SCAN_BOUNDS:
             if not low <= (value := getattr(self, name)) <= high:
                 raise RecordingError(f"scan: {name} = {value}: {low:g} to {high:g}")
+        if self.beam_bearing_rad is not None or self.beam_offset_ns is not None:
+            self._check_beams(self.beam_bearing_rad, self.beam_offset_ns)
+
+    def _check_beams(self, bearing_rad: Float64[ndarray, " k"] | None, offset_ns: Int64[ndarray, " k"] | None) -> None:
+        if bearing_rad is None or offset_ns is None or not bearing_rad.shape == offset_ns.shape == self.range_m.shape:
+            raise RecordingError(f"scan: {self.range_m.size} ranges, and not as many bearings and times of beams")
+        if not (np.abs(bearing_rad) <= _TURNS_RAD).all():
+            raise RecordingError(f"scan: the bearing of a beam is no number, or beyond {_TURNS_RAD:g} rad")
+        if offset_ns.size and not (offset_ns[0] >= 0 and (np.diff(offset_ns) >= 0).all()):
+            raise RecordingError("scan: the time of a beam is before that of the one before it")
+        if offset_ns.size and offset_ns[-1] > _LONGEST_TURN_NS:
+            raise RecordingError(f"scan: a turn of {offset_ns[-1] / 1e9:.1f} s: at most {_LONGEST_TURN_NS / 1e9:g}")
 
     @property
     def bearing_rad(self) -> Float64[ndarray, " beams"]:
         """Bearing of each beam in the scan plane, shape (n,)."""
+        if self.beam_bearing_rad is not None:
+            return self.beam_bearing_rad
         return self.angle_min_rad + self.angle_increment_rad * np.arange(self.range_m.size, dtype=np.float64)
 
     @property
     def time_ns(self) -> Int64[ndarray, " beams"]:
         """Time of each beam, shape (n,)."""
+        if self.beam_offset_ns is not None:
+            return self.stamp_ns + self.beam_offset_ns
         offset_ns = np.rint(np.arange(self.range_m.size) * (self.time_increment_s * 1e9))
         return self.stamp_ns + offset_ns.astype(np.int64)
 
@@ -91,7 +115,7 @@ class Block:
 
 
 def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
-    """Scans in their order, up to `most` of them at once."""
+    """Scans in their order, up to `most` of them at once; one with beams of its own is a block of its own."""
     waiting: list[Scan] = []
     for scan in scans:
         if waiting and (len(waiting) == most or _shape(scan) != _shape(waiting[0])):
@@ -104,6 +128,7 @@ def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
 
 def _shape(scan: Scan) -> tuple[float, ...]:
     return (
+        0 if scan.beam_bearing_rad is None else id(scan),
         scan.range_m.size,
         scan.intensity.size,
         scan.angle_min_rad,

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from design.search.optimum import Optimum
     from firmware_io.assembly.assemble import AssembleSummary
     from firmware_io.calibration.calibrate import Calibration
-    from firmware_io.lidar.scip.driver import ScipLidar
+    from firmware_io.lidar.lidar import LidarDriver
     from firmware_io.recording.arrays import RecordingArrays
     from firmware_io.recording.importer import ImportSummary
     from firmware_io.recording.recording import Recording
@@ -231,15 +231,19 @@ def open_servo(port: str, model: str | None = None, servo_id: int | None = None)
     return open_servo(port, model, servo_id)
 
 
-def open_lidar(address: str) -> ScipLidar:
+def open_lidar(address: str, model: str | None = None) -> LidarDriver:
     """Open a lidar at a serial port or HOST:PORT, whatever it is doing. Use it with `with`.
+
+    Args:
+        address: where it is.
+        model: name in the catalogue, for sensors that do not tell theirs; None asks one family after the other.
 
     Raises:
         DeviceError: no such port, it is in use, or what answers is no sensor that is known.
     """
-    from firmware_io.lidar.scip.driver import open_lidar
+    from firmware_io.lidar.families import open_lidar
 
-    return open_lidar(address)
+    return open_lidar(address, model)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,6 +35,8 @@ from design.errors import TaskError, suggest
 from design.record import Fault, faults_of, read_toml, tell
 
 SHIPPED = Path(__file__).parent
+LIDAR_GROUP = "scanwright.lidars"
+"""Entry points of installed packages that add a family of lidars; the products stand beside the module they name."""
 
 P = TypeVar("P", bound=Product)
 KINDS: dict[str, type[Product]] = {
@@ -148,5 +152,13 @@ def load_product(path: Path) -> Product:
 
 @cache
 def _shipped() -> dict[str, Product]:
-    products = [load_product(path) for path in sorted(SHIPPED.glob("*.toml"))]
+    folders = [SHIPPED, *_installed()]
+    products = [load_product(path) for folder in folders for path in sorted(folder.glob("*.toml"))]
     return {product.name: product for product in products}
+
+
+def _installed() -> list[Path]:
+    """Folders of the modules that installed packages name in `LIDAR_GROUP`; the modules themselves stay unloaded."""
+    modules = {entry.module for entry in entry_points(group=LIDAR_GROUP)}
+    found = [find_spec(module) for module in sorted(modules)]
+    return [Path(spec.origin).parent for spec in found if spec is not None and spec.origin is not None]

@@ -88,6 +88,7 @@ class Lidar(Product):
     usb_ids: tuple[UsbId, ...] | None = Field(
         default=None, exclude=True, description="vendor:product of its port; shapes no part"
     )
+    family: str | None = Field(default=None, exclude=True, description="who drives it; shapes no part")
 
     @model_validator(mode="after")
     def _steps_are_ordered(self) -> Lidar:

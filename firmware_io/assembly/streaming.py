@@ -184,6 +184,8 @@ class Assembler:
 
 def _end_ns(scan: Scan) -> int:
     """Time of the last beam, as `Scan.time_ns` has it."""
+    if scan.beam_offset_ns is not None:
+        return scan.stamp_ns + (int(scan.beam_offset_ns[-1]) if scan.beam_offset_ns.size else 0)
     return scan.stamp_ns + round(max(scan.range_m.size - 1, 0) * (scan.time_increment_s * 1e9))
 
 

@@ -24,9 +24,8 @@ import numpy as np
 from design.angles import AngleSet
 from design.errors import DeviceError
 from design.motion import Motion, Spin, StopAndGo
-from firmware_io.lidar.scip.driver import ScipLidar, new_clock, open_lidar
-from firmware_io.lidar.scip.parameters import StampAt
-from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
+from firmware_io.lidar.families import open_lidar
+from firmware_io.lidar.lidar import LidarDriver, TimedScan
 from firmware_io.recording import ros_messages
 from firmware_io.samples import Scan
 from firmware_io.scan.axis_thread import AxisThread, turning_servo
@@ -107,14 +106,14 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
         ros_messages.LASER_SCAN
     )  # loads the message types: half a second that must not fall into the recording
     with _unturned_until_opened() as opened, ExitStack() as stack:
-        lidar = stack.enter_context(open_lidar(plan.ports.lidar))
+        lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
         servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id))
         opened.set()
         check_model(plan.angles, lidar)
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
             tell(f"warning: {servo.model}: {warning}")
-        scans = _Scans(lidar, plan.stamp_at, tell)
+        scans = _Scans(lidar, tell)
         lidar.start(intensity=plan.intensity, cluster=plan.cluster, skip=plan.every - 1)
         _settle_clock(scans, tell)
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
@@ -135,7 +134,7 @@ def _unturned_until_opened() -> Iterator[Event]:
         raise
 
 
-def check_model(angles: AngleSet, lidar: ScipLidar) -> None:
+def check_model(angles: AngleSet, lidar: LidarDriver) -> None:
     """Refuse a lidar that is not the one of the angle set.
 
     Raises:
@@ -154,18 +153,16 @@ class _Scans:
         away: how often the sensor was.
     """
 
-    def __init__(self, lidar: ScipLidar, stamp_at: StampAt, say: Say) -> None:
+    def __init__(self, lidar: LidarDriver, say: Say) -> None:
         self.lidar = lidar
         self.axis: AxisThread | None = None
         self.clock_ns = 0
         self.away = 0
-        self._stamp_at = stamp_at
-        self._clock = new_clock(lidar, stamp_at)
         self._say = say
 
     def next(self) -> Scan:
         try:
-            raw = self.lidar.read()
+            timed = self.lidar.read()
         except DeviceError as error:
             stands = ""
             if self.axis is not None:
@@ -173,18 +170,16 @@ class _Scans:
                 stands = "the servo has answered that it holds, " if held else f"{_UNHEARD}, "
             self._say(f"{error}; {stands}waiting {_AWAY_S:g} s for the lidar to come back")
             self.away += 1
-            raw = self._found_again()
+            timed = self._found_again()
             if self.axis is not None:
                 self.axis.go()
-        moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
-        self.clock_ns = moment.uncertainty_ns
-        return to_laser_scan(raw, self.lidar.parameters, moment.time_ns)
+        self.clock_ns = timed.uncertainty_ns
+        return timed.scan
 
-    def _found_again(self) -> RawScan:
+    def _found_again(self) -> TimedScan:
         deadline_s = time.monotonic() + _AWAY_S
         while True:
             self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
-            self._clock = new_clock(self.lidar, self._stamp_at)
             try:
                 return self.lidar.read()
             except DeviceError:  # a sensor that just got its power answers before it measures

@@ -18,7 +18,7 @@ import numpy as np
 from design.angles import AngleSet, load_angles
 from design.errors import DeviceError
 from firmware_io.device_ports import emulated, lidar_ports, servo_ports
-from firmware_io.lidar.scip.driver import new_clock, open_lidar
+from firmware_io.lidar.families import open_lidar
 from firmware_io.scan.acquire import CLOCK_GOOD_NS, check_model
 from firmware_io.scan.axis_thread import SERVO_HZ
 from firmware_io.serial_port import latency_timer
@@ -60,7 +60,8 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
     if not lidars:
         yield DeviceFinding(
             "wrong",
-            "no Hokuyo sensor on USB: plug it in (12 V and USB), or give an Ethernet one as --lidar 192.168.0.10:10940",
+            "no lidar that is known by its USB ids: plug it in, give it power, or name it: --lidar /dev/ttyUSB0 or "
+            "--lidar 192.168.0.10:10940",
         )
     if not servos:
         yield DeviceFinding(
@@ -105,27 +106,25 @@ def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
 
 
 def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding]:
-    with open_lidar(port) as lidar:
+    with open_lidar(port, angles.sensor if angles else None) as lidar:
         yield DeviceFinding(
             "ok", f"{port}: {lidar.model}, serial number {lidar.serial_number}, firmware {lidar.firmware}"
         )
         if angles is not None:
             check_model(angles, lidar)
-        clock, expected_hz = new_clock(lidar), 1 / lidar.parameters.scan_period_s
         lidar.start()
         began_ns = lidar.read().arrival_ns
         late_ns: list[int] = []
         while True:
-            raw = lidar.read()
-            moment = clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
-            late_ns.append(raw.arrival_ns - moment.time_ns)
-            if raw.arrival_ns - began_ns > _LOOK_S * 1e9:
+            timed = lidar.read()
+            late_ns.append(timed.arrival_ns - timed.scan.stamp_ns)
+            if timed.arrival_ns - began_ns > _LOOK_S * 1e9:
                 break
-        rate_hz = len(late_ns) / ((raw.arrival_ns - began_ns) / 1e9)
+        rate_hz = len(late_ns) / ((timed.arrival_ns - began_ns) / 1e9)
         lidar.stop()
     yield _judged(
-        abs(rate_hz / expected_hz - 1) < 0.02,
-        f"{port}: {rate_hz:.1f} scans/s of {expected_hz:.1f}",
+        abs(rate_hz / lidar.scan_rate_hz - 1) < 0.02,
+        f"{port}: {rate_hz:.1f} scans/s of {lidar.scan_rate_hz:.1f}",
         "scans are lost: try another cable or USB port, no hub, and look at the slip ring",
     )
     yield _judged(
@@ -135,11 +134,11 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
     )
     jitter_ms = (max(late_ns) - min(late_ns)) / 1e6
     yield _judged(
-        moment.uncertainty_ns < CLOCK_GOOD_NS,
-        f"{port}: its clock is known to {moment.uncertainty_ns / 1e6:.2f} ms, scans come up to {jitter_ms:.1f} ms late",
+        timed.uncertainty_ns < CLOCK_GOOD_NS,
+        f"{port}: its clock is known to {timed.uncertainty_ns / 1e6:.2f} ms, scans come up to {jitter_ms:.1f} ms late",
         "this computer is busy: end other programs, or take another USB port",
     )
-    share = float(np.isfinite(raw.range_m).mean())
+    share = float(np.isfinite(timed.scan.range_m).mean())
     yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
 
 

@@ -12,7 +12,7 @@ from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
 from design.motion import Motion, Spin
 from firmware_io.device_ports import Ports, find_ports
-from firmware_io.lidar.scip.parameters import StampAt
+from firmware_io.lidar.lidar import StampAt
 
 _LONGEST_S = 7 * 24 * 3600.0
 

@@ -1,50 +1,26 @@
-"""A Hokuyo lidar in software, on a pseudo-terminal and over TCP, with the timing and the faults of a real one."""
+"""A Hokuyo lidar in software, with the timing and the faults of a real one."""
 
 from __future__ import annotations
 
-import contextlib
-import os
-import select
-import socket
-import tempfile
-import threading
 import time
-import tty
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
-from types import TracebackType
 
-import numpy as np
-
+from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
 from firmware_io.lidar.scip import protocol
+from firmware_io.twins.lidar_line import LidarLine, Sight
 from firmware_io.twins.lidar_machine import IDENTITIES, LidarMachine, Look, Quartz
 
-_AHEAD_NS = 8_000_000  # measuring takes a computer a while: begun before the turn ends, it makes no scan late
-_BACKLOG = 1 << 15  # bytes that wait for a slow reader before whole scans are dropped, as in a sensor's buffer
-_LAG_NS = 500_000_000  # where this computer sees more slowly than a sensor turns, scans are left out, not piled up
+_HEAD = 32  # bytes of a scan before its ranges: echo, status, stamp
 
 
-@dataclass(slots=True)
-class _Channel:
-    """One client's way to the sensor: what came and is no whole request yet, and what waits to be sent."""
-
-    fd: int
-    close: Callable[[], None]
-    received: bytes = b""
-    waiting: bytearray = field(default_factory=bytearray)
-
-
-class LidarTwin:
-    """A lidar on a pseudo-terminal (`port`, a name that lasts) and over TCP (`address`); whoever asked gets the scans.
+class LidarTwin(LidarLine):
+    """A lidar that answers SCIP.
 
     Attributes:
-        port: like "/dev/serial/by-id/...": it stays the same over a re-plug.
-        address: "127.0.0.1:PORT".
         smallest_delay_ns: from the start of a turn (step 0) to the arrival of an undelayed scan.
     """
+
+    machine: LidarMachine
 
     def __init__(
         self,
@@ -78,185 +54,19 @@ class LidarTwin:
         """
         if model not in IDENTITIES:
             raise DeviceError(f"no twin of the lidar '{model}'{suggest(model, IDENTITIES)}")
-        self._rng = np.random.default_rng(seed)
-        self._jitter_ns = round(jitter_s * 1e9)
         quartz = Quartz(time.monotonic_ns(), clock_ms, rate_error)
-        self.machine = LidarMachine(IDENTITIES[model], look, quartz, motor_error=motor_error, scip_1=scip_1)
-        self.smallest_delay_ns = self.machine.arc_ns
+        machine = LidarMachine(IDENTITIES[model], look, quartz, motor_error=motor_error, scip_1=scip_1)
+        super().__init__(model, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
+        self.smallest_delay_ns = machine.arc_ns
         if scanning:
-            self.machine.answer(protocol.continuous(self.machine.identity.parameters.window), time.monotonic_ns())
-        self._lock = threading.RLock()
-        self._faults: deque[Callable[[bytes], bytes]] = deque()
-        self._sent: deque[tuple[int, bytes]] = deque()  # scans under way: when they arrive
-        self._channels: dict[int, _Channel] = {}
-        self._scans_to = -1
-        self._tcp_port = 0
-        self._error: BaseException | None = None
+            machine.answer(protocol.continuous(machine.identity.parameters.window), time.monotonic_ns())
 
-    def __enter__(self) -> LidarTwin:
-        self._folder = tempfile.TemporaryDirectory(prefix="lidar-twin-")
-        self.port = str(Path(self._folder.name, "lidar"))
-        self._wake, self._woken = os.pipe()[::-1]
-        self._running = True
-        self.plug()
-        self._thread = threading.Thread(target=self._run, name=f"{self.machine.identity.parameters.model} twin")
-        self._thread.start()
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._running = False
-        os.write(self._wake, b"x")
-        self._thread.join()
-        self.unplug()
-        os.close(self._wake)
-        os.close(self._woken)
-        self._folder.cleanup()
-        if self._error is not None:
-            raise self._error
+def scip_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LidarTwin:
+    """The twin of a sensor of the catalogue.
 
-    def plug(self) -> None:
-        """The cable is in: the port is there, and somebody listens on the network."""
-        with self._lock:
-            master, slave = os.openpty()  # as long as the slave is open here, clients may come and go
-            tty.setraw(slave)
-            Path(self.port).unlink(missing_ok=True)
-            Path(self.port).symlink_to(os.ttyname(slave))
-
-            def close() -> None:
-                os.close(master)
-                os.close(slave)
-
-            self._add(master, close)
-            self._scans_to = master
-            self._server = socket.create_server(("127.0.0.1", self._tcp_port))
-            self._server.setblocking(False)  # who was about to connect may be gone again
-            self._tcp_port = self._server.getsockname()[1]
-            self.address = f"127.0.0.1:{self._tcp_port}"
-        os.write(self._wake, b"x")
-
-    def unplug(self) -> None:
-        """The cable is out: the port is gone, connections break; the sensor keeps its power and turns on."""
-        with self._lock:
-            for fd in list(self._channels):
-                self._channels.pop(fd).close()
-            Path(self.port).unlink(missing_ok=True)
-            self._server.close()
-            self._sent.clear()
-
-    def power_cycle(self) -> None:
-        """Brown-out: the sensor starts anew, its clock at 0 and its laser off; the cable stays in."""
-        with self._lock:
-            self.machine.power_cycle(time.monotonic_ns())
-            self._sent.clear()
-
-    def garble(self, replies: int = 1) -> None:
-        """Flip one bit of the measured numbers in each of the next scans."""
-
-        def flip(scan: bytes) -> bytes:
-            at, bit = int(self._rng.integers(32, len(scan) - 3)), 1 << int(self._rng.integers(6))
-            return scan[:at] + bytes([scan[at] ^ bit]) + scan[at + 1 :]
-
-        with self._lock:
-            self._faults.extend([flip] * replies)
-
-    def cut(self, replies: int = 1) -> None:
-        """Lose a run of bytes, line ends among them, in each of the next scans: lines are cut and merged."""
-
-        def lose(scan: bytes) -> bytes:
-            at = int(self._rng.integers(len(scan) - 1))
-            return scan[:at] + scan[at + int(self._rng.integers(1, 200)) :]
-
-        with self._lock:
-            self._faults.extend([lose] * replies)
-
-    def _run(self) -> None:
-        try:
-            while self._running:
-                self._serve()
-        except Exception as error:  # a look that fails: __exit__ raises it where somebody sees it
-            self._error = error
-
-    def _serve(self) -> None:
-        with self._lock:
-            due_ns = self.machine.next_ns() - _AHEAD_NS
-            due_ns = min(due_ns, self._sent[0][0]) if self._sent else due_ns
-            listening = self._server.fileno()
-            readers = [self._woken, *self._channels, *([listening] if listening >= 0 else [])]
-            writers = [fd for fd, channel in self._channels.items() if channel.waiting]
-        wait_s = min(max(due_ns - time.monotonic_ns(), 0) / 1e9, 0.1)
-        try:
-            readable = select.select(readers, writers, [], wait_s)[0]
-        except (OSError, ValueError):  # unplugged meanwhile
-            return
-        with self._lock:
-            for ready in readable:
-                if ready == listening:
-                    self._accept()
-                elif ready == self._woken:
-                    os.read(self._woken, 16)
-                elif ready in self._channels:
-                    self._receive(self._channels[ready])
-            self._turn()
-            for channel in list(self._channels.values()):
-                self._flush(channel)
-
-    def _accept(self) -> None:
-        with contextlib.suppress(OSError):
-            connection, _ = self._server.accept()
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._add(connection.fileno(), connection.close)
-
-    def _add(self, fd: int, close: Callable[[], None]) -> None:
-        os.set_blocking(fd, False)
-        self._channels[fd] = _Channel(fd, close)
-
-    def _drop(self, channel: _Channel) -> None:
-        self._channels.pop(channel.fd).close()
-        if self._scans_to == channel.fd:
-            self._scans_to = -1
-
-    def _receive(self, channel: _Channel) -> None:
-        try:
-            received = os.read(channel.fd, 4096)
-        except BlockingIOError:
-            return
-        except OSError:
-            received = b""
-        if not received:
-            self._drop(channel)
-            return
-        *requests, channel.received = (channel.received + received).replace(b"\r", b"\n").split(b"\n")
-        for request in requests:
-            scanning = self.machine.scanning
-            channel.waiting += self.machine.answer(request, time.monotonic_ns())
-            if self.machine.scanning is not scanning:  # began or ended
-                self._scans_to = channel.fd
-                self._sent.clear()
-
-    def _turn(self) -> None:
-        """Measure the turn that is about to be over, and hand out the scans that have arrived."""
-        self.machine.leave_out(time.monotonic_ns() - _LAG_NS)
-        over_ns = self.machine.next_ns()
-        if over_ns - _AHEAD_NS <= time.monotonic_ns():
-            scan = self.machine.next_scan()
-            if scan and self._faults:
-                scan = self._faults.popleft()(scan)
-            late_ns = round(self._rng.uniform(0, self._jitter_ns)) if self._jitter_ns else 0
-            if scan:
-                self._sent.append((max(over_ns + late_ns, self._sent[-1][0] if self._sent else 0), scan))
-        while self._sent and self._sent[0][0] <= time.monotonic_ns():
-            scan = self._sent.popleft()[1]
-            channel = self._channels.get(self._scans_to)
-            if channel is not None and len(channel.waiting) < _BACKLOG:
-                channel.waiting += scan
-
-    def _flush(self, channel: _Channel) -> None:
-        try:
-            while channel.waiting:
-                del channel.waiting[: os.write(channel.fd, channel.waiting)]
-        except BlockingIOError:
-            return
-        except OSError:
-            self._drop(channel)
+    Raises:
+        DeviceError: there is no twin of this model.
+    """
+    bearing_rad = lidar.bearings_rad()
+    return LidarTwin(lidar.name, lambda time_ns: sight(time_ns, bearing_rad), seed=seed)

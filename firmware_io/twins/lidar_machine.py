@@ -13,8 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from design.arrays import Floats, Times
+from firmware_io.lidar.lidar import StampAt
 from firmware_io.lidar.scip import protocol
-from firmware_io.lidar.scip.parameters import Parameters, StampAt
+from firmware_io.lidar.scip.parameters import Parameters
 
 Look = Callable[[Times], tuple[Floats, Floats]]
 
@@ -177,6 +178,17 @@ class LidarMachine:
     def turn_ns(self, turn: int) -> int:
         """True time at which a turn passes step 0."""
         return self._zero_ns + round(turn * self.period_ns)
+
+    def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
+        """Replies to whole requests, and what is none yet."""
+        *requests, rest = received.replace(b"\r", b"\n").split(b"\n")
+        return b"".join(self.answer(request, now_ns) for request in requests), rest
+
+    def next_packets(self) -> list[tuple[int, bytes]]:
+        """The scan of the turn that is over next; none where nobody asked for it."""
+        over_ns = self.next_ns()
+        scan = self.next_scan()
+        return [(over_ns, scan)] if scan else []
 
     def next_ns(self) -> int:
         """When the next turn is measured to its end; never where nobody waits for one."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 
@@ -17,8 +18,9 @@ from design.catalogue.products import Lidar
 from design.errors import SceneError
 from design.scene.ray_caster import Scene, build_scene, cast, load_scene
 from firmware_io.device_ports import Ports
+from firmware_io.lidar.families import family_of
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.lidar import LidarTwin
+from firmware_io.twins.lidar_line import LidarLine
 from firmware_io.twins.servo.twin import ServoTwin
 from firmware_io.twins.world import furnished_room, looking, range_model, rays
 
@@ -28,7 +30,7 @@ class EmulatedScanner:
     """A scanner that runs; `ports` is where programs find it."""
 
     ports: Ports
-    lidar: LidarTwin
+    lidar: LidarLine
     servo: ServoTwin
 
 
@@ -66,8 +68,10 @@ def emulated_scanner(
     Raises:
         SceneError: the sensor would see nothing there.
         TaskError: sensor or servo are not in the catalogue.
+        DeviceError: there is no twin of one of them.
     """
     lidar = load_catalogue().get(angles.sensor, Lidar)
+    twin_of = resolve_name(family_of(lidar.name).twin)
     model, bearing_rad = range_model(lidar, sigma_mm), lidar.bearings_rad()
     for turn_rad in np.linspace(0, 2 * np.pi, 12, endpoint=False):
         hits = cast(scene, *rays(angles, bearing_rad, np.full(bearing_rad.size, turn_rad)))
@@ -80,6 +84,6 @@ def emulated_scanner(
         )
     with ExitStack() as stack:
         servo = stack.enter_context(ServoTwin(angles.servo, protocol, load=load, seed=seed))
-        look = looking(scene, angles, bearing_rad, servo.axis.angle_rad, model, seed)
-        twin = stack.enter_context(LidarTwin(angles.sensor, look))
+        sight = looking(scene, angles, servo.axis.angle_rad, model, seed)
+        twin = stack.enter_context(twin_of(lidar, sight, seed))
         yield EmulatedScanner(Ports(twin.port, servo.port, os.getpid()), twin, servo)

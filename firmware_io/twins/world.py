@@ -107,18 +107,17 @@ def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> M
 def looking(
     scene: Scene,
     angles: AngleSet,
-    bearing_rad: Float64[ndarray, " n"],
     angle_at: Callable[[Times], Floats],
     model: RangeModel,
     seed: int = 0,
-) -> Callable[[Times], tuple[Floats, Floats]]:
-    """What a lidar twin asks for each scan: the true times of its beams -> range [m] and intensity.
+) -> Callable[[Times, Floats], tuple[Floats, Floats]]:
+    """What a lidar twin asks: the true times and bearings of beams -> range [m] and intensity.
 
     `angle_at` is the true angle of the axis at given times.
     """
     rng = np.random.default_rng(seed)
 
-    def look(time_ns: Times) -> tuple[Floats, Floats]:
+    def look(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
         measured = measure_ranges(see(scene, angles, bearing_rad, angle_at(time_ns)), model, rng)
         return measured.range_m, measured.intensity
 

@@ -1,11 +1,8 @@
 """A Hokuyo lidar on a serial port, USB or Ethernet: it scans on, and says what it saw and when that arrived.
 
-with open_lidar("/dev/ttyACM0") as lidar:
-    clock = DeviceClock(lidar.parameters.scan_period_s, smallest_delay_ns=lidar.smallest_delay_ns("step_0"))
-    clock.synchronise(lidar.synchronise())      # before the laser lights: TM puts it out
+with open_scip("/dev/ttyACM0") as lidar:
     lidar.start(intensity=True)
-    raw = lidar.read()
-    moment = clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
+    scan = lidar.read().scan    # its times are the host's
 """
 
 from __future__ import annotations
@@ -19,10 +16,10 @@ from types import TracebackType
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.device_ports import lidar_ports
 from firmware_io.lidar.byte_stream import FIRST_BAUD, Gone, SerialStream, open_stream
+from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.scip import parameters, protocol
 from firmware_io.lidar.scip.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
-from firmware_io.lidar.scip.parameters import StampAt
-from firmware_io.lidar.scip.raw_scan import RawScan
+from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
 _SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
@@ -45,8 +42,15 @@ class ScipLidar:
         dropped: scans that are missing between those that were read, by their stamps.
     """
 
-    def __init__(self, address: str, search: Callable[[], Iterable[str]] = lidar_ports) -> None:
-        """Open it; `search` names the ports where it may turn up after a re-plug, besides its own address.
+    def __init__(
+        self, address: str, search: Callable[[], Iterable[str]] = lidar_ports, *, stamp_at: StampAt = "step_0"
+    ) -> None:
+        """Open it.
+
+        Args:
+            address: where it is.
+            search: the ports where it may turn up after a re-plug, besides its own address.
+            stamp_at: which moment of a turn its stamps mean.
 
         Raises:
             DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
@@ -54,6 +58,7 @@ class ScipLidar:
         self.address = address
         self.dropped = 0
         self._search = search
+        self._stamp_at: StampAt = stamp_at
         self._bad_before = 0
         self._splitter = protocol.Splitter()
         self._counter = StampCounter()
@@ -68,6 +73,7 @@ class ScipLidar:
             self.serial_number = version.get("SERI", "")
             self.firmware = version.get("FIRM", "")
             self.sync = self._synchronise()
+            self._clock = self._new_clock()
         except BaseException:
             self._stream.close()
             raise
@@ -93,6 +99,11 @@ class ScipLidar:
         return self.parameters.model
 
     @property
+    def scan_rate_hz(self) -> float:
+        """Turns per second, as it says."""
+        return 1 / self.parameters.scan_period_s
+
+    @property
     def bad_packets(self) -> int:
         """Replies that were thrown away: wrong sums, cut or merged lines."""
         return self._bad_before + self._splitter.bad
@@ -100,13 +111,6 @@ class ScipLidar:
     def information(self, command: str) -> dict[str, str]:
         """Keys and texts of VV (version), PP (parameters) or II (state). While it scans, scans are lost meanwhile."""
         return protocol.information(self._ask(command.encode()))
-
-    def smallest_delay_ns(self, stamp_at: StampAt) -> int:
-        """From the moment that a stamp means to the end of the last step: nothing can arrive earlier.
-
-        A scan that goes over a real serial line takes longer by its bytes' time on the line.
-        """
-        return round(self.parameters.since_stamp_s(self.parameters.last_step + 1, stamp_at) * 1e9)
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; the laser lights by itself.
@@ -126,13 +130,20 @@ class ScipLidar:
         self._stamp_ms = -1
         self._accepted(self._ask(self._request), "00")
 
-    def read(self, timeout_s: float | None = None) -> RawScan:
-        """The next scan; it is waited for for a second if nothing else is said.
+    def read(self, timeout_s: float | None = None) -> TimedScan:
+        """The next scan on the host's clock; it is waited for for a second if nothing else is said.
 
         Raises:
             DeviceTimeoutError: none came in time: switched off, or reset; `reconnect` helps where it is back.
             DeviceError: it was unplugged, or reports a fault.
         """
+        raw = self.read_raw(timeout_s)
+        moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
+        scan = to_laser_scan(raw, self.parameters, moment.time_ns)
+        return TimedScan(scan, raw.arrival_ns, moment.uncertainty_ns)
+
+    def read_raw(self, timeout_s: float | None = None) -> RawScan:
+        """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
         deadline = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
         while True:
             told, arrival_ns = self._next(deadline)
@@ -172,6 +183,7 @@ class ScipLidar:
                         self.address = address
                         self._counter.restart()  # a sensor that takes its power from the port has begun anew
                         self.sync = self._synchronise()
+                        self._clock = self._new_clock()
                         self._request = request
                         if request:
                             self._stamp_ms = -1
@@ -253,6 +265,25 @@ class ScipLidar:
             self._accepted(self._ask(b"TM2"), "00", "03")
         return synchronised(exchanges)
 
+    def _new_clock(self) -> DeviceClock:
+        """A fresh clock, which gives the times of the first beams.
+
+        Nothing can arrive earlier than the end of the last step; a real serial line takes longer by its bytes' time,
+        which nobody declares here: all times are late by it.
+        """
+
+        def since_stamp_ns(step: int) -> int:
+            return round(self.parameters.since_stamp_s(step, self._stamp_at) * 1e9)
+
+        clock = DeviceClock(
+            self.parameters.scan_period_s,
+            smallest_delay_ns=since_stamp_ns(self.parameters.last_step + 1),
+            first_beam_ns=since_stamp_ns(self.parameters.first_step),
+        )
+        if self.sync is not None:
+            clock.synchronise(self.sync)
+        return clock
+
     def _raw(self, taken: protocol.Measurement, arrival_ns: int) -> RawScan:
         range_m, codes = parameters.ranges_m(taken.value, self.parameters)
         stamp_ms = self._counter.unwrap(taken.stamp_ms, arrival_ns)
@@ -306,29 +337,10 @@ class ScipLidar:
         return f"{self.address}: lidar"
 
 
-def open_lidar(address: str) -> ScipLidar:
-    """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing.
+def open_scip(address: str, _model: str | None = None, stamp_at: StampAt = "step_0") -> ScipLidar:
+    """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing; it says itself which model it is.
 
     Raises:
         DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
     """
-    return ScipLidar(address)
-
-
-def new_clock(lidar: ScipLidar, stamp_at: StampAt = "step_0", transport_s: float = 0.0) -> DeviceClock:
-    """A fresh clock for the scans of a lidar, which gives the times of their first beams.
-
-    Args:
-        lidar: opened; whether it scans already does not matter.
-        stamp_at: which moment of a turn its stamps mean.
-        transport_s: what a scan takes from its last step to us at the least; undeclared, all times are late by it.
-    """
-    first_beam_s = lidar.parameters.since_stamp_s(lidar.parameters.first_step, stamp_at)
-    clock = DeviceClock(
-        lidar.parameters.scan_period_s,
-        smallest_delay_ns=lidar.smallest_delay_ns(stamp_at) + round(transport_s * 1e9),
-        first_beam_ns=round(first_beam_s * 1e9),
-    )
-    if lidar.sync is not None:
-        clock.synchronise(lidar.sync)
-    return clock
+    return ScipLidar(address, stamp_at=stamp_at)

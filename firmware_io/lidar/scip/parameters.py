@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from design.arrays import Float32s
 from design.errors import ProtocolError
+from firmware_io.lidar.lidar import StampAt
 from firmware_io.lidar.scip.protocol import Integers, Window
-
-StampAt = Literal["step_0", "rear"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.lidar import byte_stream
 from firmware_io.lidar.scip import driver as driver
 from firmware_io.lidar.scip import protocol
-from firmware_io.lidar.scip.driver import ScipLidar, new_clock, open_lidar
+from firmware_io.lidar.scip.driver import ScipLidar, open_scip
 from firmware_io.lidar.scip.raw_scan import to_laser_scan
 from firmware_io.twins import lidar_machine
 from firmware_io.twins.lidar import LidarTwin
@@ -35,13 +35,13 @@ def check(raw, count):
 @pytest.mark.parametrize("way", ["port", "address"])
 @pytest.mark.parametrize(("model", "beams", "code"), [("UTM-30LX", 1081, 1), ("URG-04LX", 682, 0)])
 def test_scans_come_as_they_were_seen(way, model, beams, code):
-    with LidarTwin(model, look) as twin, open_lidar(getattr(twin, way)) as lidar:
+    with LidarTwin(model, look) as twin, open_scip(getattr(twin, way)) as lidar:
         assert (lidar.model, lidar.firmware) == (model, twin.machine.identity.firmware)
         assert lidar.serial_number == twin.machine.identity.serial_number
         assert lidar.parameters == twin.machine.identity.parameters
         intensity = twin.machine.identity.intensity
         lidar.start(intensity=intensity)
-        scans = [lidar.read() for _ in range(4)]
+        scans = [lidar.read_raw() for _ in range(4)]
         for raw in scans:
             check(raw, beams)
             assert raw.codes == {code: 2}
@@ -61,16 +61,16 @@ def test_the_sensor_may_be_in_any_state(state):
             twin.machine.answer(b"TM0", time.monotonic_ns())
         if state == "half a request":
             Path(twin.port).write_bytes(b"MD0000")
-        with open_lidar(twin.port) as lidar:
+        with open_scip(twin.port) as lidar:
             lidar.start()
-            check(lidar.read(), 1081)
+            check(lidar.read_raw(), 1081)
             assert lidar.bad_packets == 0
 
 
 def test_clusters_and_skips():
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
         lidar.start(cluster=5, skip=1)
-        first, second = lidar.read(), lidar.read()
+        first, second = lidar.read_raw(), lidar.read_raw()
         assert second.stamp_ms - first.stamp_ms in (50, 51)
         assert lidar.dropped == 0
         valid = np.where(np.isinf(look(SEEN_M)[0]), 99, look(SEEN_M)[0])
@@ -93,16 +93,14 @@ def test_first_beams_get_their_true_times(model, intensity):
         true_ns.append(int(time_ns[0]))
         return look(time_ns)
 
-    with LidarTwin(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as twin, open_scip(twin.port) as lidar:
         assert lidar.sync is not None
-        clock = new_clock(lidar)
         lidar.start(intensity=intensity)
         true_ns.clear()
         errors_ns, wrapped = [], False
         for _ in range(12):
-            raw = lidar.read()
-            wrapped |= raw.stamp_ms >= 1 << 24
-            told_ns = clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts).time_ns
+            told_ns = lidar.read().scan.stamp_ns
+            wrapped |= lidar.read_raw().stamp_ms >= 1 << 24
             errors_ns.append(min(abs(told_ns - time_ns) for time_ns in true_ns))  # a busy twin leaves turns out
         assert wrapped
         # Within what the synchronisation allows: a busy machine answers late, and no scan here comes early.
@@ -110,35 +108,35 @@ def test_first_beams_get_their_true_times(model, intensity):
 
 
 def test_bad_packets_are_counted_and_never_handed_out():
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
         lidar.start(intensity=True)
-        lidar.read()
+        lidar.read_raw()
         twin.garble(3)
         twin.cut(3)
         for _ in range(8):
-            check(lidar.read(), 1081)
+            check(lidar.read_raw(), 1081)
         assert 6 <= lidar.bad_packets <= 9  # a lost end takes the next one with it
         assert lidar.dropped >= 3  # on a busy computer the twin leaves out some more
 
 
 @pytest.mark.parametrize("way", ["port", "address"])
 def test_an_unplugged_sensor_is_told_and_comes_back(way):
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(getattr(twin, way)) as lidar:
+    with LidarTwin("UTM-30LX", look) as twin, open_scip(getattr(twin, way)) as lidar:
         lidar.start(intensity=True)
-        lidar.read()
+        lidar.read_raw()
         twin.unplug()
         with pytest.raises(DeviceError, match="plug") as told:
             for _ in range(10):
-                lidar.read()
+                lidar.read_raw()
         assert str(told.value).count("\n") == 0
         assert not isinstance(told.value, DeviceTimeoutError)
         with pytest.raises(DeviceError, match=r"00903971 did not come back in 0\.1 s"):
             lidar.reconnect(0.1)
         with pytest.raises(DeviceError, match="plug it in again"):
-            lidar.read()
+            lidar.read_raw()
         twin.plug()
         lidar.reconnect(30.0)
-        raw = lidar.read()
+        raw = lidar.read_raw()
         check(raw, 1081)
         assert (raw.restarts, raw.intensity.size) == (1, 1081)
 
@@ -153,46 +151,46 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
             ours.unplug()
             with pytest.raises(DeviceError):
                 for _ in range(10):
-                    lidar.read()
+                    lidar.read_raw()
             name.unlink()
             name.symlink_to(other.port)  # another sensor took its place
             ours.plug()
             lidar.reconnect(30.0)
-            check(lidar.read(), 1081)
+            check(lidar.read_raw(), 1081)
             assert (lidar.address, lidar.serial_number) == (ours.port, "00903971")
             assert not other.machine.laser
 
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
-    with LidarTwin("UTM-30LX", look, clock_ms=1_000_000) as twin, open_lidar(twin.port) as lidar:
-        clock = new_clock(lidar)
+    with LidarTwin("UTM-30LX", look, clock_ms=1_000_000) as twin, open_scip(twin.port) as lidar:
         lidar.start()
-        before = lidar.read()
-        clock.update(before.stamp_ms, before.arrival_ns, before.restarts)
+        lidar.read()
+        before = lidar.read_raw()
         twin.power_cycle()
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
             for _ in range(5):
-                lidar.read(0.1)
+                lidar.read_raw(0.1)
         lidar.reconnect(30.0)
-        raw = lidar.read()
+        raw = lidar.read_raw()
         assert raw.stamp_ms < 60_000 < before.stamp_ms
         assert raw.restarts == before.restarts + 1
-        late_ns = raw.arrival_ns - clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts).time_ns
+        timed = lidar.read()
+        late_ns = timed.arrival_ns - timed.scan.stamp_ns
         assert 0 < late_ns < 5_000_000_000
 
 
 def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
     with LidarTwin("UTM-30LX", look) as twin:
-        with pytest.raises(DeviceError, match="hardware fault"), open_lidar(twin.port) as lidar:
+        with pytest.raises(DeviceError, match="hardware fault"), open_scip(twin.port) as lidar:
             lidar.start()
             answer = twin.machine.next_scan
             twin.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
-            lidar.read()
+            lidar.read_raw()
         assert not twin.machine.laser
 
 
 def test_what_a_sensor_cannot_do_is_told():
-    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
         with pytest.raises(DeviceError, match="ME0044072501000: status 0E"):
             lidar.start(intensity=True)
         with pytest.raises(DeviceError, match="cluster = 0"):
@@ -201,17 +199,17 @@ def test_what_a_sensor_cannot_do_is_told():
 
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
     with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
-        open_lidar(str(tmp_path / "ttyACM7"))
+        open_scip(str(tmp_path / "ttyACM7"))
     with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: look at address"):
-        open_lidar("127.0.0.1:1")
+        open_scip("127.0.0.1:1")
     with pytest.raises(DeviceError, match="this is no serial port"):
-        open_lidar("/dev/null")
+        open_scip("/dev/null")
     with (
         LidarTwin("UTM-30LX", look) as twin,
-        open_lidar(twin.port),
+        open_scip(twin.port),
         pytest.raises(DeviceError, match="another program has it open"),
     ):
-        open_lidar(twin.port)
+        open_scip(twin.port)
 
 
 def test_a_port_where_no_lidar_answers(monkeypatch):
@@ -219,7 +217,7 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
     master, slave = os.openpty()
     try:
         with pytest.raises(DeviceTimeoutError, match="no SCIP sensor answers"):
-            open_lidar(os.ttyname(slave))
+            open_scip(os.ttyname(slave))
     finally:
         os.close(master)
         os.close(slave)
@@ -248,11 +246,11 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     monkeypatch.setattr(driver, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.4)
-    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
         assert lidar._stream.listens == lidar._stream.baud == 115_200
         lidar.start()
         assert lidar._stream.listens == lidar._stream.baud == (250_000 if fastest == 750_000 else 115_200)
-        check(lidar.read(), 682)
+        check(lidar.read_raw(), 682)
 
 
 class BadLine(byte_stream.SerialStream):
@@ -267,10 +265,10 @@ def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
     monkeypatch.setattr(driver, "SerialStream", BadLine)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
-    with LidarTwin("URG-04LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
         lidar.start()
         assert lidar._stream.baud == 115_200
-        check(lidar.read(), 682)
+        check(lidar.read_raw(), 682)
 
 
 def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypatch):
@@ -283,10 +281,10 @@ def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypa
         return answer(self, request, now_ns)
 
     monkeypatch.setattr(lidar_machine.LidarMachine, "answer", listening)
-    with LidarTwin("UTM-30LX", look) as twin, open_lidar(twin.port) as lidar:
+    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
         assert lidar.sync is None
         lidar.start()
-        check(lidar.read(), 1081)
+        check(lidar.read_raw(), 1081)
     assert b"PP" in asked and b"TM0" not in asked
 
 
@@ -335,6 +333,6 @@ def test_endless_garbage_ends_in_a_timeout(monkeypatch):
     monkeypatch.setattr(driver, "open_stream", lambda _: port)
     monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
     with pytest.raises(DeviceTimeoutError):
-        open_lidar("somewhere")
+        open_scip("somewhere")
     assert port.closed
     assert set(port.written.split()) == {b"QT"}

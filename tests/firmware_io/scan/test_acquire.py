@@ -180,7 +180,7 @@ BLIND = angle_set(servo="AX-12A")
         (NO_MOTION, (), "motion = null"),
         (BLIND, (), "AX-12A measures its angle in 300 of 360 deg only"),
         (angle_set(), ("--turns", "0"), "--turns = 0"),
-        (angle_set(), (), "--lidar: which Hokuyo sensor"),
+        (angle_set(), (), "--lidar: which lidar"),
         (angle_set(), ("--lidar", "x", "--servo", "y", "-o", "cloud.ply"), "name it cloud.mcap"),
         (angle_set(), ("--lidar", "x", "--servo", "y", "-o", "nowhere/r.mcap"), "nowhere does not exist"),
         (angle_set(), ("--lidar", "no-such-port", "--servo", "y"), "no-such-port"),

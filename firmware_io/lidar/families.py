@@ -1,0 +1,83 @@
+"""The families of lidars that can be driven. One line here makes a family known to every command.
+
+An installed package adds one without a line here: an entry point of the group `scanwright.lidars` that names a
+`LidarFamily`; the TOML files beside its module are products of the catalogue (docs/how-to/new-lidar.md).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+
+from design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
+from design.catalogue.products import Lidar
+from design.errors import DeviceError, suggest
+from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
+from firmware_io.lidar.scip.driver import open_scip
+
+FAMILIES = (
+    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
+)
+
+
+@cache
+def all_families() -> dict[str, LidarFamily]:
+    """The shipped families and those of installed packages, by name.
+
+    Raises:
+        DeviceError: an installed package names something else, or a family that there is already.
+    """
+    known = {family.name: family for family in FAMILIES}
+    for entry in sorted(entry_points(group=LIDAR_GROUP), key=lambda entry: entry.name):
+        try:
+            family = entry.load()
+        except Exception as error:  # of somebody else's code: whatever it raises
+            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: {error}") from error
+        if not isinstance(family, LidarFamily):
+            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: it names no LidarFamily")
+        if family.name in known:
+            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: there is a family '{family.name}' already")
+        known[family.name] = family
+    return known
+
+
+def family_of(model: str) -> LidarFamily:
+    """The family of a lidar of the catalogue.
+
+    Raises:
+        TaskError: it is not in the catalogue.
+        DeviceError: nothing drives it.
+    """
+    name = load_catalogue().get(model, Lidar).family
+    if name is None:
+        driven = [product.name for product in load_catalogue() if isinstance(product, Lidar) and product.family]
+        raise DeviceError(f"{model}: no driver: its catalogue file names no family{suggest(model, driven)}")
+    if name not in all_families():
+        raise DeviceError(f"{model}: family = '{name}': not a family of lidars{suggest(name, all_families())}")
+    return all_families()[name]
+
+
+def open_lidar(address: str, model: str | None = None, stamp_at: StampAt = "step_0") -> LidarDriver:
+    """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing.
+
+    Args:
+        address: where it is.
+        model: name in the catalogue of what it should be; None asks one family after the other.
+        stamp_at: which moment of a turn its stamps mean, where documents differ.
+
+    Raises:
+        DeviceError: no such port, it is in use, or what answers is no sensor that is known.
+        TaskError: the model is not in the catalogue.
+    """
+    if model is not None:
+        family = family_of(model)
+        if stamp_at != "step_0" and not family.stamp_choice:
+            raise DeviceError(f"stamp_at = '{stamp_at}': the stamps of a {model} ({family.title}) mean one thing only")
+        return family.open(address, model, stamp_at)
+    heard = []
+    for family in all_families().values():
+        try:
+            return family.open(address, None, stamp_at)
+        except DeviceError as error:
+            heard.append(str(error))
+    raise DeviceError("; ".join(dict.fromkeys(heard)))

@@ -1,0 +1,124 @@
+"""What every command asks of a lidar, whatever it says on its line; `families` is the list of who answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Literal, Protocol, Self
+
+from firmware_io.samples import Scan
+
+StampAt = Literal["step_0", "rear"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimedScan:
+    """One turn as it was measured, on the host's clock.
+
+    Attributes:
+        scan: its times are those of `time.monotonic_ns`; bearings and times of its own beams where the sensor's speed
+            wanders.
+        arrival_ns: `time.monotonic_ns` when its last byte came.
+        uncertainty_ns: standard uncertainty of its time.
+    """
+
+    scan: Scan
+    arrival_ns: int
+    uncertainty_ns: int
+
+
+class LidarDriver(Protocol):
+    """A lidar, opened, its laser off if it can be put out. `with` leaves it stopped and its port closed.
+
+    Whatever goes wrong is a DeviceError: DeviceTimeoutError where nothing came in time. A broken packet is counted and
+    passed over, never raised. After an error of `read`, `reconnect` is what may help.
+
+    Attributes:
+        address: where it was found last: a serial port, or HOST:PORT.
+        model: name of its type, as in the catalogue. A sensor that does not tell is what it was opened as.
+        serial_number: by which it is found again; empty where the sensor tells none.
+        firmware: version, as the sensor writes it; empty where it tells none.
+        scan_rate_hz: turns per second that it should make.
+        dropped: turns that are missing between those that were read.
+        bad_packets: packets that were thrown away.
+    """
+
+    address: str
+    serial_number: str
+    firmware: str
+    dropped: int
+
+    @property
+    def model(self) -> str: ...  # noqa: D102
+
+    @property
+    def scan_rate_hz(self) -> float: ...  # noqa: D102
+
+    @property
+    def bad_packets(self) -> int: ...  # noqa: D102
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
+        """Scan until `stop`.
+
+        Args:
+            intensity: measure it too.
+            cluster: beams that share one value, the least range among them.
+            skip: turns to leave out between two.
+
+        Raises:
+            DeviceError: the sensor refuses, cannot do that, or is gone.
+        """
+        ...
+
+    def read(self, timeout_s: float | None = None) -> TimedScan:
+        """The next turn; None waits as long as this sensor may take.
+
+        Raises:
+            DeviceTimeoutError: none came in time.
+            DeviceError: it was unplugged, or reports a fault.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Laser off, or where a sensor cannot: listen no more.
+
+        Raises:
+            DeviceError: the sensor is gone.
+        """
+        ...
+
+    def reconnect(self, timeout_s: float = 3.0) -> None:
+        """Find the sensor again after an unplug or a reset, and scan on if it did; its clock is learnt anew.
+
+        Raises:
+            DeviceError: it did not turn up in time.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LidarFamily:
+    """Lidars that speak one protocol. A product of the catalogue says `family` to be driven by one.
+
+    Attributes:
+        name: as in the catalogue's `family`.
+        title: maker and protocol, in words.
+        open: address, name of the model (None: whatever answers) and which moment its stamps mean -> the lidar;
+            DeviceError if none of this family answers there.
+        twin: "package.module:function" of its twin: (catalogue record, `twins.lidar_line.Sight`, seed) -> a
+            `twins.lidar_line.LidarLine`; a text, since twins live a storey above drivers.
+        stamp_choice: whether `stamp_at` changes anything: what the maker's documents say of the stamps differs.
+    """
+
+    name: str
+    title: str
+    open: Callable[[str, str | None, StampAt], LidarDriver]
+    twin: str
+    stamp_choice: bool = False
