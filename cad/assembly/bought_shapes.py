@@ -20,6 +20,7 @@ from cad.solids import building
 from design.catalogue.products import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5
+CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide
 EAR_ROOM = 3.6  # radius of the recess around a case hole
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
 STUB = 0.4  # between the stub of a capsule's rotor and its body
@@ -95,7 +96,7 @@ def _split(stack: DirectStack) -> float:
 def bearing_inner(bearing: Bearing, high: float) -> cq.Solid:
     """Inner ring, its upper face at a height."""
     inner = bearing.bore_mm / 2
-    return _tube(inner, inner + _race(bearing), high - bearing.width_mm, high)
+    return _tube(inner + CHORDS, inner + _race(bearing), high - bearing.width_mm, high)
 
 
 def bearing_outer(bearing: Bearing, high: float) -> cq.Solid:

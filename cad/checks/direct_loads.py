@@ -10,9 +10,10 @@ import math
 
 from cad.checks.check import Check, at_most, horn_check, rated
 from cad.layout.direct.cage import share_weight
-from cad.layout.direct.loads import Supported
+from cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
+from cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
 from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import FAR_MM, Weight, noise_deg
+from cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
 from cad.layout.names import BEARING, SERVO, SERVO_SHAFT
 from design.scanner import Scanner
 
@@ -20,13 +21,13 @@ from design.scanner import Scanner
 def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Check]:
     """What horn and bearing carry of the weight of all that turns."""
     shared = share_weight(scanner, stack, weight)
-    return [*_forces(scanner, stack, weight, shared), _slope(scanner, shared)]
+    return [*_forces(scanner, stack, weight, shared), *_yields(scanner, stack), _slope(scanner, shared)]
 
 
 def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Check]:
     servo, axial = scanner.servo, f"load along the axis of {scanner.servo.name}"
     checks = [
-        horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}"),
+        _horn(scanner, stack, weight, shared),
         rated("axial_load", weight.along_n, servo.axial_load_n, "N", SERVO, axial),
     ]
     if stack.bearing is not None:
@@ -34,6 +35,43 @@ def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Suppor
         limit = stack.bearing.static_load_n
         checks.append(at_most("bearing_load", shared.bearing_force_n, limit, "N", BEARING, what))
     return checks
+
+
+def _horn(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> Check:
+    """Weight alone without a bearing; with one, all that may be out of line too, in the metal that is worse."""
+    servo, rating = scanner.servo, rated_moment_nm(scanner)
+    if stack.bearing is None:
+        return horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}")
+    sums = worst_moment_nm(scanner, stack, weight)
+    parts = ", ".join(
+        f"{each.what} {'' if each.off_mm is None else f'({each.off_mm:.3f} mm) '}{each.moment_nm:.3f}"
+        for each in contributions(scanner, stack, weight)
+    )
+    both = ", ".join(f"{total:.3g} in {name}" for name, total in sums.items())
+    what = f"worst tilt moment on the horn of {servo.name}, {both}; in aluminium {parts}"
+    by = "" if rating is None else f"; half of its rating of {rating:g} N m allowed"
+    return rated("tilt_moment", max(sums.values()), None if rating is None else SHARE * rating, "N m", SERVO, what, by)
+
+
+def _yields(scanner: Scanner, stack: DirectStack) -> list[Check]:
+    """The waist must outlast a servo that is stopped by force."""
+    stall, what = (
+        scanner.servo.stall_torque_nm,
+        f"stall torque of {scanner.servo.name} against the yield of the waist in",
+    )
+    if stack.bearing is None:
+        return []
+    return [
+        at_most(
+            "waist_torque",
+            stall,
+            metal.yields_pa * math.pi * (metal.waist_mm / 1000) ** 3 / 16,
+            "N m",
+            SERVO_SHAFT,
+            f"{what} {metal.name}",
+        )
+        for metal in (ALUMINIUM, STEEL)
+    ]
 
 
 def _slope(scanner: Scanner, shared: Supported) -> Check:

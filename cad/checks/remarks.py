@@ -9,6 +9,7 @@ from cad.findings import PartFinding
 from cad.geometry.inertia import Inertial
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.cage import share_weight
+from cad.layout.direct.misalignment import SHARE, worst_moment_nm
 from cad.layout.direct.stack import DirectStack
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.joints import Joint
@@ -88,16 +89,18 @@ def _turn_from_metal(part: str, why: str) -> PartFinding:
 
 def _tilt_moment(scanner: Scanner, stack: DirectStack, bodies: dict[str, Inertial]) -> list[PartFinding]:
     """What the weight of all that turns puts on a horn that carries it, against its rating."""
-    rated, servo = rated_moment_nm(scanner), scanner.servo
-    moment = share_weight(scanner, stack, rotor_weight(scanner, stack, bodies)).horn_moment_nm
+    rated, servo, weight = rated_moment_nm(scanner), scanner.servo, rotor_weight(scanner, stack, bodies)
+    moment = share_weight(scanner, stack, weight).horn_moment_nm
+    if rated is not None and stack.bearing is not None:
+        rated, moment = SHARE * rated, max(worst_moment_nm(scanner, stack, weight).values())
     if rated is None or moment <= rated:
         return []
     help_ = "lighten what turns, or raise the axis"
     if stack.bearing is None:
         help_ = "support the shaft with a bearing near the hub; none of the catalogue fits it"
     message = (
-        f"{SERVO_SHAFT}: the tilted axis puts {moment:.2f} N m on the horn of {servo.name}, rated {rated:.2f} N m "
-        f"({servo.radial_load_n:g} N at {RATED_AT_MM:g} mm): {help_}"
+        f"{SERVO_SHAFT}: the tilted axis puts {moment:.2f} N m on the horn of {servo.name}, allowed {rated:.2f} N m "
+        f"(rated {servo.radial_load_n:g} N at {RATED_AT_MM:g} mm): {help_}"
     )
     return [PartFinding("tilt_moment", "warning", SERVO_SHAFT, message)]
 

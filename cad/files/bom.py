@@ -185,10 +185,10 @@ def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
             continue
         for part, quantity, source in needs:
             yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
+    for part, source in drive.needs:
+        yield BomItem("wiring", part, quantity=1, source=source, note="price unknown")
     if scanner.slip_ring is not None:
         circuits = scanner.slip_ring.circuits
-        for part, source in drive.ring_needs:
-            yield BomItem("wiring", part, quantity=1, source=source, note="price unknown")
         part = "plug, socket and heat shrink for the leads of the slip ring"
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"

@@ -89,8 +89,8 @@ class DriveLayout:
         built: parts and products in the order in which they are put in.
         stacked: parts and products from the deck to the linkage, in which the exploded view lifts them.
         left_out: parts that this scanner does not need.
-        borne: parts that a bearing keeps on another one along the axis.
-        ring_needs: small things that the ring asks for, each with its source.
+        borne: parts that another one keeps along the axis without a screw, by a bearing or a retaining ring.
+        needs: small things that it asks for, each with its source.
     """
 
     stack: Stack
@@ -102,5 +102,5 @@ class DriveLayout:
     built: tuple[str, ...]
     stacked: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    ring_needs: tuple[tuple[str, str], ...]
+    needs: tuple[tuple[str, str], ...]
     borne: tuple[tuple[str, str], ...] = ()

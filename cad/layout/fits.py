@@ -45,12 +45,6 @@ def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:
     return ToleratedDiameter(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
 
 
-def printed_journal(bearing: Bearing, fit: float) -> ToleratedDiameter:
-    """Of a printed part in a bearing's inner ring, which is drawn half of the sliding fit thinner."""
-    why = f"journal of {bearing.name}, from size for size to a sliding fit"
-    return ToleratedDiameter(bearing.bore_mm - fit / 2, False, f"±{_g(fit / 2)}", why)
-
-
 def no_wider(diameter: float, fit: float, why: str) -> ToleratedDiameter:
     """A printed hole that is drawn with half of the sliding fit, and what goes wrong where it has more."""
     return ToleratedDiameter(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)

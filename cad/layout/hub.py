@@ -20,7 +20,7 @@ HUB_GAP = 10.0  # the rotor's wires leave here
 SPIGOT = 11.0  # length of the shaft inside the hub
 CROSS_ABOVE_BOTTOM = 5.0  # of the cross screws, from the hub's lower face
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
-JOURNAL_END = 1.0  # of the journal below the bearing
+JOURNAL_END = 1.0  # of the sleeve below the bearing
 
 Axis = Literal["x", "y"]
 
@@ -38,7 +38,7 @@ class Hub:
     ring_length: float
     ring_radius: float
     shaft_diameter: float
-    bearing: Bearing | None  # on a journal of the hub
+    bearing: Bearing | None  # on a sleeve of the shaft, below the hub
     sub_plate: Axis | None  # of the laser frame, along which its ears stick out
 
     @property
@@ -48,17 +48,17 @@ class Hub:
 
     @property
     def shoulder(self) -> float:
-        """Height of the plane that parts what turns from what stands still, but for journal and shaft."""
+        """Height of the hub's lower face, which parts what turns from what stands still, but for sleeve and shaft."""
         return -self.h - HUB_HEIGHT
 
     @property
     def journal(self) -> float:
-        """Length of the hub below its shoulder."""
+        """Length of the bearing's sleeve, and of what it is free of the hub."""
         return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
 
     @property
     def hub_bottom(self) -> float:
-        """Height of the hub's lower face."""
+        """Height of the lower end of hub, or of the sleeve below it."""
         return self.shoulder - self.journal
 
     @property
@@ -69,16 +69,16 @@ class Hub:
     @property
     def spigot(self) -> float:
         """Length of the shaft inside the hub."""
-        return SPIGOT + self.journal
+        return SPIGOT
 
     @property
     def spigot_top(self) -> float:
         """Height of the shaft's upper end, which is the floor of the hub's bore."""
-        return self.hub_bottom + self.spigot
+        return self.shoulder + self.spigot
 
     @property
     def bearing_top(self) -> float:
-        """Height of the upper face of the journal's bearing."""
+        """Height of the upper face of the sleeve's bearing."""
         return self.shoulder - BEARING_STEP
 
     @property

@@ -26,6 +26,7 @@ from design.errors import BuildError
 from design.scanner import Scanner
 
 CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
+CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 HEEL = 8.0  # how far the neck reaches below a lying plate
@@ -179,8 +180,8 @@ def _cross_azimuths(normal: Array) -> tuple[float, ...]:
 
 
 def cross_seat_mm(stack: Stack) -> float:
-    """Distance from the axis of the faces that the heads of the cross screws bear on: sunk flush into the hub."""
-    return stack.hub_radius - CROSS_SCREW.head_height
+    """Distance from the axis of the faces that the heads of the cross screws bear on."""
+    return stack.hub_radius - CROSS_SUNK
 
 
 def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:

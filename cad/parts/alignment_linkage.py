@@ -1,12 +1,12 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore
-with a flat at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all
-that must stay free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the
-lidar's +x (FRONT), a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds
-the hub, its lower end is the journal of the bearing, and the wires of the ring's rotor pass the bearing in a channel
-along the journal. Under a sub-plate (`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the
-heads of its screws. Where a counterweight balances the rotor, an ear of the hub carries it.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore with a flat
+at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all that must stay
+free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT),
+a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the shaft, the wires
+of the ring's rotor leave its sleeve through a channel of the hub. Under a sub-plate (`sub_plate.py`) the plate lies
+lower, with nuts for its ears and pockets for the heads of its screws. Where a counterweight balances the rotor, an ear
+of the hub carries it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from cad import outlines, solids
 from cad.geometry.mesh import checked_mesh
 from cad.layout.belt.stack import BeltStack
 from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS
-from cad.layout.fits import OnSheet, printed_journal
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.linkage import AlignmentLinkage, neck_corners
@@ -71,7 +70,6 @@ def linkage_spec(layout: Layout) -> PartSpec:
         turns=True,
         make=partial(alignment_linkage, p),
         step=step,
-        sheet=OnSheet(() if stack.bearing is None else (printed_journal(stack.bearing, p.fit),)),
         shaped_by=OF_LIDAR,
         shapes={"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"},
         angles="laser",
@@ -147,7 +145,7 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
         linkage = checked(body.cut(*shapes.holes).clean())
     bottom = linkage.BoundingBox().zmin
-    if abs(bottom - stack.hub_bottom) > 1e-3:
+    if abs(bottom - stack.shoulder) > 1e-3:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub"
         )

@@ -11,6 +11,7 @@ from cad.parts.bearing_tower import tower_spec
 from cad.parts.capsule_holder import holder_spec
 from cad.parts.counterweight import counterweight_spec
 from cad.parts.drive_plate import plate_spec
+from cad.parts.journal_sleeve import sleeve_spec
 from cad.parts.main_shaft import main_shaft_spec
 from cad.parts.part_spec import PartSpec
 from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
@@ -29,7 +30,7 @@ OF_BELT = (
     plate_spec,
     drive_pulley_spec,
 )
-OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec)
+OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec)
 
 
 def parts_of(layout: Layout) -> list[PartSpec]:

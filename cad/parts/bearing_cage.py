@@ -1,4 +1,4 @@
-"""Bearing cage: holds a thin-section bearing around the hub's journal where the axis is tilted too far for the horn.
+"""Bearing cage: holds a thin-section bearing around the shaft's sleeve where the axis is tilted too far for the horn.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts, since the cage must come down over
 the ring:
@@ -7,8 +7,9 @@ the ring:
                   the plate of `slip_ring_adapter`
     bearing_cage  a bell around ring and adapter: legs between windows, a roof of 45 deg, the bearing's seat
 
-Put together: shaft, base, ring and its tie, bell with the bearing, linkage; the four radial screws of the bell last, so
-that the bearing finds the journal. The bearing floats between lip and hub: along the axis the horn carries alone.
+Put together: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the
+bearing has found the sleeve, and the bond in its seat when all of that is in line. The sleeve slides in the bearing:
+along the axis the horn carries alone.
 """
 
 from __future__ import annotations
@@ -49,9 +50,10 @@ def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     if p is None:
         return None
     words = (
-        f"Put the bearing into its seat and lower the cage onto its base. Put the screws of the cage in loosely: "
-        f"{ALL_SCREWS} Tighten them last, when the linkage is on and turns freely, so that the bearing finds the "
-        "journal."
+        "With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, and lower the cage over "
+        f"the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once around, so "
+        "that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the epoxy set before "
+        "anything hangs on the shaft: it fills what the print leaves, and the bearing stands where the shaft runs."
     )
     return PartSpec(
         name=BEARING_CAGE,

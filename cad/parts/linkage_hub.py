@@ -1,4 +1,4 @@
-"""The hub of the alignment linkage: seat of the shaft, journal of the bearing, way of the wires, ear of the bar.
+"""The hub of the alignment linkage: seat of the shaft, way of the wires, ear of the bar.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
 """
@@ -14,22 +14,18 @@ from cad import outlines, solids
 from cad.layout.direct.loads import JOURNAL_WALL
 from cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
 
-INNER_RING = 1.2  # how far the hub's face may touch the bearing's inner ring, on the radius
 WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
 EAR_CORNER = 0.3  # of its half width
 
 
 def hub(p: AlignmentLinkage) -> cq.Shape:
-    """The hub, and below its shoulder the journal of the bearing with a step that only the inner ring touches."""
+    """The hub with the ear of a counterweight."""
     stack = p.stack
     hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
     if p.ear is not None:
         hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
-    if stack.bearing is None:
-        return hub
-    step = solids.upright(stack.bearing.bore_mm / 2 + INNER_RING, stack.bearing_top, stack.shoulder + 1.0)
-    return hub.fuse(step, solids.upright(_journal_radius(p), stack.hub_bottom, stack.shoulder + 1.0))
+    return hub
 
 
 def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
@@ -53,19 +49,13 @@ def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
     return [slot.moved(solids.about_axis(ear.azimuth)) for slot in slots]
 
 
-def _journal_radius(p: AlignmentLinkage) -> float:
-    """A light press in the bearing: half of the sliding fit."""
-    bearing = p.stack.bearing
-    return 0.0 if bearing is None else bearing.bore_mm / 2 - p.fit / 4
-
-
 def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
-    """Channel between the two cross screws: along the journal, inside the bearing, then out over the cage."""
+    """Channel between the two cross screws: from that of the bearing's sleeve out over the cage."""
     stack = p.stack
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    low = (inner, -WIRES_HALF_WIDTH, stack.hub_bottom - 1.0)
+    low = (inner, -WIRES_HALF_WIDTH, stack.shoulder - 1.0)
     channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
     return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
 
@@ -88,8 +78,8 @@ def _bore(p: AlignmentLinkage) -> cq.Shape:
     """Room of the spigot: a cylinder with a flat at +y."""
     stack = p.stack
     radius = (stack.shaft_diameter + p.fit) / 2
-    round_bore = solids.upright(radius, stack.hub_bottom - 1.0, stack.spigot_top)
-    low = (-2 * radius, -2 * radius, stack.hub_bottom - 2.0)
+    round_bore = solids.upright(radius, stack.shoulder - 1.0, stack.spigot_top)
+    low = (-2 * radius, -2 * radius, stack.shoulder - 2.0)
     return round_bore.intersect(solids.box(low, (2 * radius, stack.flat + p.fit / 2, stack.spigot_top + 1.0)))
 
 

@@ -2,7 +2,7 @@
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Horn flange with the horn's holes and a pocket
 for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends
-could not pass the ring. Where a bearing holds the hub, the shaft is longer and has a waist above the collar: horn and
+could not pass the ring. Where a bearing holds the shaft, that is longer and has a waist above the collar: horn and
 bearing are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do
 not depend on the scan plane: one shaft serves every linkage.
 """
@@ -14,8 +14,9 @@ from functools import partial
 import cadquery as cq
 
 from cad import outlines, solids
-from cad.layout.direct.stack import WAIST, DirectStack
-from cad.layout.fits import OnSheet, turned_spigot
+from cad.layout.direct.loads import ALUMINIUM, STEEL
+from cad.layout.direct.stack import GROOVES, WAIST, DirectStack
+from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
 from cad.layout.hub import Hub
 from cad.layout.joints import horn_centres, screws
 from cad.layout.linkage import CROSS_AT, CROSS_SCREW
@@ -30,6 +31,8 @@ from design.scanner import Scanner
 def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
     """The shaft of one scanner."""
     fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
+    if stack.bearing is not None:
+        fits = (ToleratedDiameter(stack.shaft_diameter, False, "0/-0.011", "h6, the bearing's sleeve is bonded to it"),)
     words = (
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
@@ -43,7 +46,7 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
         process="turned",
         material=TURNED_FROM,
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
-        sheet=OnSheet(fits, cross_words(stack)),
+        sheet=OnSheet(fits, (*cross_words(stack), *_waist_words(stack))),
         shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
     )
 
@@ -62,16 +65,14 @@ def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
         body = checked(body.fuse(solids.upright(radius, horn, stack.spigot_top)))
     with building(SERVO_SHAFT, "holes, flat and marks", "horn_circle_mm", servo.horn_circle_mm) as checked:
         hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
-        cuts = [
-            solids.box((-2 * radius, stack.flat, stack.hub_bottom), (2 * radius, 2 * radius, stack.spigot_top + 1.0))
-        ]
+        cuts = [solids.box((-2 * radius, stack.flat, stack.shoulder), (2 * radius, 2 * radius, stack.spigot_top + 1.0))]
         cuts += [solids.upright(hole, horn - 1.0, flange + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
         cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, flange + 1.0))  # index groove
         cuts += cross_holes(stack)
         if boss > 0:
             cuts.append(solids.upright(boss + 0.2, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
         if stack.bearing is not None:
-            cuts.append(_waist(stack))
+            cuts += [_waist(stack), _groove(stack)]
         return checked(body.cut(*cuts).clean())
 
 
@@ -98,3 +99,25 @@ def _waist(stack: DirectStack) -> cq.Solid:
     high = low + WAIST + slope
     outer = radius + 1.0
     return solids.lathe([[outer, low], [waist, low], [waist, low + WAIST], [outer, high + 1.0]])
+
+
+def _groove(stack: DirectStack) -> cq.Solid:
+    """Of the retaining ring under the bearing's sleeve."""
+    bottom, width = GROOVES[stack.retaining_ring]
+    high, outer = stack.hub_bottom, stack.shaft_diameter
+    return solids.lathe(
+        [[outer, high - width], [bottom / 2, high - width], [bottom / 2, high], [outer, high]],
+    )
+
+
+def _waist_words(stack: DirectStack) -> tuple[str, ...]:
+    """What the sheet says of waist and groove."""
+    if stack.bearing is None:
+        return ()
+    bottom, width = GROOVES[stack.retaining_ring]
+    return (
+        f"Waist {WAIST:g} long: as drawn in {ALUMINIUM.name}; in {STEEL.name} \u00d8{STEEL.waist_mm:g}, nothing else "
+        "bends enough and yields late enough. No other metal.",
+        f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
+        "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
+    )

@@ -123,7 +123,7 @@ def _spigot(stack: Hub) -> tuple[Array, float]:
     """Points all around the shaft in the hub, and the area, rotation frame."""
     radius, length = stack.shaft_diameter / 2, stack.spigot
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
-    z = stack.hub_bottom + (np.arange(rows) + 0.5) / rows * length
+    z = stack.shoulder + (np.arange(rows) + 0.5) / rows * length
     angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, z)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=2)
     return points.reshape(-1, 3), 2 * np.pi * radius * length

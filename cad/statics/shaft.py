@@ -1,8 +1,8 @@
 """How far the shaft bends and twists at the hub. SI units.
 
-On the servo's axis it is a beam of round sections (Timoshenko), clamped in the horn; where a bearing holds the hub, a
-spring holds the hub's journal sideways. Beside the servo it is a tube on two supports that are taken for stiff, its hub
-beyond the upper one, and the belt is two springs.
+On the servo's axis it is a beam of round sections (Timoshenko), clamped in the horn; where a bearing holds it, a
+spring holds the bearing's sleeve sideways. Beside the servo it is a tube on two supports that are taken for stiff, its
+hub beyond the upper one, and the belt is two springs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from cad.layout.belt.loads import belt_nm_per_rad
 from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.stack import WAIST, DirectStack
+from cad.layout.direct.stack import DirectStack
 from cad.layout.loads import ALUMINIUM_PA
 from design.arrays import Array
 
@@ -61,7 +61,7 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
     length = (stack.hub_bottom - stack.horn) / 1000
     z = (np.arange(SLICES) + 0.5) / SLICES * length
     dz = length / SLICES
-    radius = _radius_mm(stack, 1000 * z) / 1000
+    radius = stack.radius_at(1000 * z, 2 * stack.waist_radius) / 1000
     area, second_moment = math.pi * radius**2, math.pi / 4 * radius**4
     shear_pa = modulus_pa / (2 + 2 * POISSON)
     lever = length - z
@@ -77,19 +77,6 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
         twist_rad_per_nm=float((dz / (shear_pa * 2 * second_moment)).sum()),
         stretch_m_per_n=float((dz / (modulus_pa * area)).sum()),
     )
-
-
-def _radius_mm(stack: DirectStack, above_horn_mm: Array) -> Array:
-    """Radius of the shaft; the pocket of the horn's boss lies within the flange and is left out."""
-    shaft = stack.shaft_diameter / 2
-    z = above_horn_mm
-    radius = np.full_like(z, shaft)
-    if stack.bearing is not None:
-        waist = stack.waist_radius
-        above = z - stack.collar_height - WAIST
-        radius = np.where(above < 0, waist, np.minimum(shaft, waist + np.maximum(above, 0.0)))
-    radius = np.where(z < stack.collar_height, max(stack.collar_radius, shaft), radius)
-    return np.where(z < stack.flange_thickness, np.maximum(stack.flange_radius, radius), radius)
 
 
 def belt_shaft_bend(stack: BeltStack) -> ShaftBend:

@@ -75,7 +75,7 @@ def belt_drive(scanner: Scanner) -> DriveLayout:
         stacked=STACKED,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
         borne=((names.SHAFT_RING, names.BEARING_TOWER),),
-        ring_needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
+        needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
     )
 
 

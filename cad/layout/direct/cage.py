@@ -16,7 +16,7 @@ from design.catalogue.products import Bearing, Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 
-BASE_HEIGHT = 12.0
+BASE_HEIGHT = 20.0
 RING_ABOVE_BASE = 1.5
 SEAT_GAP = 0.2  # the feet carry, not the plate
 FOOT_RADIUS = 3.0

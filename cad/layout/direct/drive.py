@@ -23,6 +23,7 @@ BUILT = (
     names.SLIP_RING_ADAPTER,
     names.CAGE_BASE,
     names.RING,
+    names.JOURNAL_SLEEVE,
     names.BEARING_CAGE,
     names.LIDAR,
     names.SUB_PLATE,
@@ -38,6 +39,7 @@ STACKED = (
     names.RING,
     names.BEARING_CAGE,
     names.BEARING,
+    names.JOURNAL_SLEEVE,
     names.ALIGNMENT_LINKAGE,
 )
 ADAPTER_ARMS = 8.0  # beyond the ring
@@ -72,8 +74,18 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
         built=BUILT,
         stacked=STACKED,
         left_out=tuple(_left_out(scanner, stack)),
-        ring_needs=() if ring is None else (("cable tie around the ring's stator", "groove of the adapter"),),
+        borne=() if stack.bearing is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
+        needs=tuple(_needs(scanner, stack)),
     )
+
+
+def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
+    if scanner.slip_ring is not None:
+        yield "cable tie around the ring's stator", "groove of the adapter"
+    if stack.bearing is not None:
+        yield f"retaining ring DIN 471 - {stack.retaining_ring}", "groove of the shaft, under the bearing's sleeve"
+        yield "retaining compound for metal, medium strength", "sleeve on the shaft"
+        yield "two-component epoxy, slow", "bearing in its printed seat"
 
 
 def _mounted(servo: Servo, stack: DirectStack) -> Mounted:

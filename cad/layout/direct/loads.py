@@ -1,8 +1,8 @@
 """What the rotor's weight does to the horn, and the bearing that a tilted axis needs. No kernel: plain numpy.
 
 Without a bearing the horn carries the whole tilt moment. With one the shaft is a beam, clamped in the horn and held at
-the height of the bearing by the cage, a spring; its waist is a hinge of known stiffness. SI units; lengths of the
-stack are millimetres.
+the height of the bearing by the cage, a spring; its waist is the thinnest piece of that beam. SI units; lengths of
+the stack are millimetres.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout.direct.stack import WAIST, DirectStack
+import numpy as np
+
+from cad.layout.direct.stack import WAIST_MM, DirectStack
 from cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
@@ -26,9 +28,34 @@ from design.scanner import Scanner
 UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
 LINKAGE_OFF_AXIS_MM = 20.0
-JOURNAL_WALL = 1.8  # between bore and wires
+JOURNAL_WALL = 1.8  # of the bearing's sleeve between bore and wires
 WIRE_DEPTH = 6.0  # least depth of the channel for the ring's wires
-HUB_STEP = 1.0  # by which the hub is wider than the journal
+HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
+SLICES = 1000  # of the shaft's length: shares within 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftMetal:
+    """What a shaft may be turned from.
+
+    Attributes:
+        name: as it is ordered.
+        modulus_pa: of elasticity.
+        waist_mm: diameter of the waist in this metal.
+        yields_pa: shear stress at which it yields.
+        grows_per_k: thermal expansion.
+    """
+
+    name: str
+    modulus_pa: float
+    waist_mm: float
+    yields_pa: float
+    grows_per_k: float
+
+
+# 0.2 % proof stress of 430 MPa (EN 755-2, bars) and 900 MPa (EN ISO 683-2, to 16 mm), by von Mises
+ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, WAIST_MM["aluminium"], 0.577 * 430e6, 23e-6)
+STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, WAIST_MM["steel"], 0.577 * 900e6, 12e-6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +65,7 @@ class Supported:
     horn_moment_nm: float
     bearing_force_n: float
     slope_rad: float  # of the shaft at the hub
+    misaligned_nm_per_m: float = 0.0  # moment on the horn for each metre that the bearing is out of its line
 
 
 def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
@@ -71,24 +99,28 @@ def _is_rated(scanner: Scanner, moment_nm: float) -> bool:
     return moment_nm <= (UNRATED_NM if rated is None else rated)
 
 
-def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float) -> Supported:
+def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: ShaftMetal = ALUMINIUM) -> Supported:
     """Share the weight between horn and bearing: the deflections of shaft and cage are equal at the bearing.
 
     Args:
         weight: of all that turns.
         stack: with a bearing.
         cage_n_per_m: sideways stiffness of the cage at the bearing.
+        metal: what the shaft is of.
     """
     b = (stack.bearing_middle - stack.horn) / 1000
-    F, L = weight.across_n, weight.lever_m
-    moment = weight.along_n * weight.off_axis_m
-    waist = 1 / waist_nm_per_rad(stack)
-    EI = ALUMINIUM_PA * _second_moment(stack.shaft_diameter)
-    pushed = F * b**2 * (3 * L - b) / (6 * EI) + moment * b**2 / (2 * EI) + waist * b * (F * L + moment)
-    held = b**3 / (3 * EI) + waist * b**2 + 1 / cage_n_per_m
-    R = pushed / held
-    slope = (F * (2 * L * b - b**2) - R * b**2) / (2 * EI) + moment * b / EI + waist * (F * L + moment - R * b)
-    return Supported(horn_moment_nm=abs(F * L + moment - R * b), bearing_force_n=R, slope_rad=abs(slope))
+    z = (np.arange(SLICES) + 0.5) / SLICES * b
+    EI = metal.modulus_pa * math.pi / 4 * (stack.radius_at(1000 * z, metal.waist_mm) / 1000) ** 4
+    moment = weight.across_n * (weight.lever_m - z) + weight.along_n * weight.off_axis_m
+    bend, reach = b / SLICES / EI, b - z
+    give = float((bend * reach**2).sum()) + 1 / cage_n_per_m
+    R = float((bend * reach * moment).sum()) / give
+    over = (stack.hub_bottom - stack.bearing_middle) / 1000
+    beyond = weight.across_n * (weight.lever_m - b - over / 2) + weight.along_n * weight.off_axis_m
+    shaft = metal.modulus_pa * _second_moment(stack.shaft_diameter)
+    slope = float((bend * (moment - R * reach)).sum()) + over * beyond / shaft
+    foot = weight.across_n * weight.lever_m + weight.along_n * weight.off_axis_m
+    return Supported(abs(foot - R * b), R, abs(slope), b / give)
 
 
 def hanging(weight: Weight, stack: DirectStack) -> Supported:
@@ -98,11 +130,6 @@ def hanging(weight: Weight, stack: DirectStack) -> Supported:
     across, moment = weight.across_n, weight.along_n * weight.off_axis_m
     slope = (across * (weight.lever_m * free - free**2 / 2) + moment * free) / EI
     return Supported(weight.moment_nm, 0.0, slope)
-
-
-def waist_nm_per_rad(stack: DirectStack) -> float:
-    """Bending stiffness of the waist of an aluminium shaft."""
-    return ALUMINIUM_PA * _second_moment(2 * stack.waist_radius) / (WAIST / 1000)
 
 
 def _second_moment(diameter_mm: float) -> float:

@@ -7,13 +7,14 @@ ring's top, everything that stands still beside the shaft stays below it: cleara
     z = 0             optical centre
     -h                top of the linkage's hub
     shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
-    hub_bottom        bottom of the hub: the shoulder, or below it the journal that sits in a bearing
+    hub_bottom        the shoulder, or below it the lower end of the sleeve that sits in a bearing
     ring_top          HUB_GAP below: the rotor's wires leave here
     ring_bottom       the ring's length below
                       RING_GAP, or the shaft's waist, below: top of the shaft's collar
     horn              the servo's horn face
 
-A tilted axis whose rotor is too heavy for the horn alone gets a bearing on the journal (`cad/layout/direct/loads.py`).
+A tilted axis whose rotor is too heavy for the horn alone gets a bearing on a sleeve of the shaft
+(`cad/layout/direct/loads.py`).
 """
 
 from __future__ import annotations
@@ -21,14 +22,38 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from cad.layout.hub import HUB_GAP, Hub
+from design.arrays import Array
 
 RING_GAP = 3.0
-WAIST = 10.0  # length of the shaft's waist: it bends where horn and bearing are not quite in line
+WAIST = 32.0  # length of the shaft's waist: it bends where horn and bearing are not quite in line
+APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
+WAIST_MM = {"aluminium": 5.0, "steel": 4.0}  # its diameter by what the shaft is of; the first is what is drawn
+# DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
+GROOVES = {
+    8: (7.6, 0.9),
+    9: (8.6, 1.1),
+    10: (9.6, 1.1),
+    11: (10.5, 1.1),
+    12: (11.5, 1.1),
+    13: (12.4, 1.1),
+    14: (13.4, 1.1),
+    15: (14.3, 1.1),
+    16: (15.2, 1.1),
+    17: (16.2, 1.1),
+    18: (17.0, 1.3),
+    19: (18.0, 1.3),
+    20: (19.0, 1.3),
+    21: (20.0, 1.3),
+    22: (21.0, 1.3),
+    24: (22.9, 1.3),
+}
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
-BEARING_PLAY = 0.3  # along the axis: the horn alone carries along it
+BEARING_PLAY = 0.3  # along the axis: room for what bonds the bearing
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
@@ -91,12 +116,34 @@ class DirectStack(Hub):
     @property
     def horn(self) -> float:
         """Height of the servo's horn face."""
-        return self.ring_bottom - (RING_GAP if self.bearing is None else WAIST) - self.collar_height
+        if self.bearing is None:
+            return self.ring_bottom - RING_GAP - self.collar_height
+        return self.ring_bottom - max(0.0, APART - self.ring_length) - WAIST - self.collar_height
 
     @property
     def waist_radius(self) -> float:
-        """Of the shaft's waist."""
-        return self.shaft_diameter / 4
+        """Of the shaft's waist, in aluminium."""
+        return WAIST_MM["aluminium"] / 2
+
+    @property
+    def retaining_ring(self) -> int:
+        """Size of the ring that keeps the bearing's sleeve up: the shaft's, or the next smaller one."""
+        return max(size for size in GROOVES if size <= self.shaft_diameter)
+
+    def radius_at(self, above_horn: Array, waist_mm: float) -> Array:
+        """Radius of the shaft at heights above the horn; the pocket of the horn's boss is left out.
+
+        Args:
+            above_horn: heights, any shape.
+            waist_mm: diameter of its waist.
+        """
+        z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
+        radius = np.full(z.shape, shaft)
+        if self.bearing is not None:
+            above = z - self.collar_height - WAIST
+            radius = np.minimum(shaft, waist_mm / 2 + np.maximum(above, 0.0))
+        radius = np.where(z < self.collar_height, max(self.collar_radius, shaft), radius)
+        return np.where(z < self.flange_thickness, np.maximum(self.flange_radius, radius), radius)
 
     @property
     def shadow_half_angle(self) -> float:

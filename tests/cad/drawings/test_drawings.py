@@ -103,7 +103,7 @@ def test_shaft_circle_of_holes_and_diameters(sheets):
     np.testing.assert_allclose(2 * np.linalg.norm(np.array(holes)[:, :2], axis=1), float(circle), atol=0.01)
     top = sheet.mesh.bounds[1, 2]
     outer = max(diameter for diameter, _ in circles_in(sheet.mesh, [0, 0, top - 25.0], Z))
-    assert f"Ø{number(round(outer, 1))}  0/-0.1" in sheet.said  # turned, half of the fit of fdm-0.4
+    assert f"Ø{number(round(outer, 1))}  0/-0.011" in sheet.said  # h6 below the bearing's sleeve
     assert any(abs(value - (top - low)) < 0.01 for value in ordinates(sheet))
 
 
@@ -156,9 +156,9 @@ def test_every_screw_hole_of_the_adapter_has_its_place(sheets):
 
 
 def test_the_bearing_has_a_fit_on_both_of_its_sheets(sheets):
-    # 61806 is 30 x 42: the prints are drawn half of the sliding fit of 0.2 away from it
+    # 61806 is 30 x 42: the print is drawn half of the sliding fit of 0.2 away from it, the turned sleeve is g6
     assert "Ø42.1  ±0.1" in sheets["bearing_cage"].said
-    assert "Ø29.9  ±0.1" in sheets["alignment_linkage"].said
+    assert "Ø29.98  +0.013/0" in sheets["journal_sleeve"].said
 
 
 def test_every_dimension_measures_what_it_says(sheets):

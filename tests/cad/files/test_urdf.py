@@ -84,6 +84,7 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(made):
     own = {part.name: part.mass_g / 1000 for part in result.parts}
     bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
     turning = own["servo_shaft"] + own["alignment_linkage"] + own.get("counterweight", 0.0) + 0.1 + bearing / 2
+    turning += own.get("journal_sleeve", 0.0)
     standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
     assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
     assert mass["servo"] == pytest.approx(standing + 0.126, abs=5e-4)

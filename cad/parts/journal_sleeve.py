@@ -1,0 +1,78 @@
+"""Sleeve of the shaft that the bearing of a tilted axis runs on: turned, since a bearing wants a round journal.
+
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. It slides over the spigot when the ring is on,
+down to a retaining ring, is bonded there, and the hub above keeps it down: no play and no way out. The wires of the
+ring's rotor pass in a channel along it, inside the bearing, under the way out that the hub leaves them.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import cadquery as cq
+
+from cad import solids
+from cad.layout.direct.loads import JOURNAL_WALL
+from cad.layout.direct.misalignment import TRUED_MM
+from cad.layout.direct.stack import DirectStack
+from cad.layout.fits import OnSheet, ToleratedDiameter
+from cad.layout.hub import BEARING_STEP
+from cad.layout.layout import Layout
+from cad.layout.linkage import AlignmentLinkage
+from cad.layout.names import JOURNAL_SLEEVE
+from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from cad.solids import building
+
+SLIDES = 0.02  # in the inner ring: the lower end of g6
+BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
+UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
+WIRES_HALF_WIDTH = 5.0
+
+
+def sleeve_spec(layout: Layout) -> PartSpec | None:
+    """The sleeve of one scanner; None where no bearing carries its axis."""
+    stack = layout.stack
+    if not isinstance(stack, DirectStack) or stack.bearing is None:
+        return None
+    words = (
+        f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
+        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's way "
+        "out for the wires; pull the rotor's leads up through the channel. When it has set, loosen the screws of the "
+        "flange by a quarter turn, put an indicator on the sleeve and turn the servo: tap the flange until the sleeve "
+        f"runs true within {TRUED_MM:g} mm over the turn, then tighten them."
+    )
+    seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
+    bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
+    return PartSpec(
+        name=JOURNAL_SLEEVE,
+        turns=True,
+        make=partial(journal_sleeve, layout.linkage, stack),
+        step=Step("Sleeve of the bearing, and the shaft trued", words),
+        process="turned",
+        material=TURNED_FROM,
+        why_metal=f"{stack.bearing.name} wants a round seat to g6",
+        sheet=OnSheet((seat, bore), ("Bore and outside in one setting: runout 0.01.",)),
+        shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
+    )
+
+
+def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
+    """Make the sleeve.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    assert stack.bearing is not None
+    low, high = stack.hub_bottom, stack.shoulder - UNDER_HUB
+    assert high > stack.bearing_top > stack.shoulder - BEARING_STEP - 1e-9
+    bore = (stack.shaft_diameter + BOND) / 2
+    with building(JOURNAL_SLEEVE, "sleeve", "bore_mm", f"{stack.bearing.bore_mm:g}") as checked:
+        body: cq.Shape = solids.upright((stack.bearing.bore_mm - SLIDES) / 2, low, high)
+        cuts: list[cq.Shape] = [solids.upright(bore, low - 1.0, high + 1.0)]
+        if stack.ring_length > 0:
+            corner = (stack.shaft_diameter / 2 + JOURNAL_WALL, -WIRES_HALF_WIDTH, low - 1.0)
+            channel = solids.box(corner, (stack.bearing.bore_mm, WIRES_HALF_WIDTH, high + 1.0))
+            turn = math.degrees(sum(p.cross_azimuths) / 2)
+            cuts.append(channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), turn))
+        return checked(body.cut(*cuts).clean())
