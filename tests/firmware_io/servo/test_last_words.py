@@ -131,7 +131,7 @@ def test_ctrl_c_waits_for_the_thread_that_could_turn_the_servo_again():
 @pytest.mark.parametrize(
     ("interrupt", "says"),
     [
-        (lambda _: (_ for _ in ()).throw(KeyboardInterrupt), "the servo had not been told to turn"),
+        (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo had not been told to turn"),
         (None, "what the servo does was not heard: look, and cut its power if it turns"),
     ],
 )
