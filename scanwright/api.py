@@ -313,7 +313,7 @@ def import_bag(
     *,
     scan: str,
     angle: str,
-    angle_unit: Literal["deg", "rad"],
+    angle_unit: Literal["deg", "rad"] | None = None,
     hold: bool = False,
 ) -> ImportSummary:
     """Bring somebody's ROS 1 or ROS 2 bag into the project's own form: MCAP, /scan and /joint_states.
@@ -322,8 +322,9 @@ def import_bag(
         bag: the bag.
         out: recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of the LaserScan.
-        angle: TOPIC[:FIELD] of the servo's angle.
-        angle_unit: of that angle.
+        angle: where the servo's angle is: TOPIC[:FIELD], TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of
+            transforms, or FILE.csv[:COLUMN].
+        angle_unit: of that angle; transforms have none.
         hold: the motor stood still during each scan.
 
     Raises:

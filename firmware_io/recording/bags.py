@@ -81,9 +81,10 @@ class Bag:
         Raises:
             RecordingError: a topic is missing, its type unknown, or the bag damaged.
         """
+        missing = [f"no topic '{name}'{suggest(name, self.topics)}" for name in sorted(topics - self.topics.keys())]
+        if missing:
+            raise RecordingError(f"{self.path}: {'; '.join(missing)}")
         for topic in sorted(topics):
-            if topic not in self.topics:
-                raise RecordingError(f"{self.path}: no topic '{topic}'{suggest(topic, self.topics)}")
             if self.topics[topic] not in self._reader.typestore.types:
                 raise RecordingError(
                     f"{self.path}: {topic}: the bag does not hold the definition of {self.topics[topic]}, and ROS 2 "
@@ -170,7 +171,8 @@ def laser_scan_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
 def number_at(body: Any, source: Source, bag: Path) -> tuple[float, int]:
     """The number that `source` names, and its stamp [ns] (0: none).
 
-    Without a field: `position[0]` of a JointState, `data` of a std_msgs message.
+    Without a field: `position[0]` of a JointState, `data` of a std_msgs message. Of a JointState a field may also be
+    the name of a joint.
 
     Raises:
         RecordingError: it is not a number; the line says what it is, and what is there instead.
@@ -180,12 +182,21 @@ def number_at(body: Any, source: Source, bag: Path) -> tuple[float, int]:
             "position[0]" if _kind(body) == ros_messages.JOINT_STATE else "data" if "data" in _fields(body) else ""
         )
         source = Source(source.topic, default)
+    elif _kind(body) == ros_messages.JOINT_STATE and _joint(source.field, body):
+        if source.field not in body.name:
+            raise RecordingError(f"{bag}: {source.topic}: no joint '{source.field}'{suggest(source.field, body.name)}")
+        source = Source(source.topic, f"position[{list(body.name).index(source.field)}]")
     value, stamp_ns = value_at(body, source, bag)
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         numbers = [f"{source.topic}:{name}" for name in _fields(value) if isinstance(getattr(value, name), int | float)]
         hint = f"; did you mean '{numbers[0]}'?" if numbers else "; name one number in it, for example position[0]"
         raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a number{hint}")
     return float(value), stamp_ns
+
+
+def _joint(field: str, body: Any) -> bool:
+    """Whether a path of one step names no field of a JointState, and so one of its joints."""
+    return field in body.name or ("[" not in field and "." not in field and field not in _fields(body))
 
 
 def _fields(value: Any) -> list[str]:

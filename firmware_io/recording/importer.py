@@ -18,8 +18,16 @@ from numpy.typing import NDArray
 from design.arrays import Floats, Times
 from design.errors import RecordingError
 from firmware_io.recording import ros_messages
+from firmware_io.recording.angle_sources import (
+    FrameSource,
+    angles_in,
+    is_table,
+    parse_frames,
+    read_table,
+    turned_rad,
+)
 from firmware_io.recording.bag_clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
-from firmware_io.recording.bags import Bag, Source, laser_scan_at, number_at, open_bag, parse_source
+from firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source
 from firmware_io.recording.metadata import held_by, note_in
 from firmware_io.recording.recording import MessageWriter, RecordingWriter
 from firmware_io.samples import JointLog
@@ -77,18 +85,22 @@ class _Survey:
     endless: int
     angle_stamps: Stamps
     angle: Floats
+    angle_said: str
     left_out: Counter[str]
 
 
-def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: AngleUnit, hold: bool) -> ImportSummary:
+def import_bag(
+    bag: Path, out: Path, *, scan: str, angle: str, angle_unit: AngleUnit | None, hold: bool
+) -> ImportSummary:
     """Write the scans and angles of a bag as a recording.
 
     Args:
         bag: ROS 1 or ROS 2 bag.
         out: the recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of a LaserScan.
-        angle: TOPIC[:FIELD] of the axis angle; it may lie in the same message as the scan.
-        angle_unit: unit of the angle in the bag.
+        angle: where the axis angle stands: TOPIC[:FIELD] of a number, which may lie in the same message as the scan,
+            TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
+        angle_unit: unit of the angle; None for transforms, which have none.
         hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
             the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
             so itself, and its log stays as it is.
@@ -99,13 +111,19 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
     """
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
-    if angle_unit not in ("deg", "rad"):
+    if angle_unit not in ("deg", "rad", None):
         raise RecordingError(f"angle unit '{angle_unit}': write deg or rad")
     if out.resolve() == bag.resolve():
         raise RecordingError(f"{out}: this is the bag itself; name another file")
-    scan_source, angle_source = parse_source(scan), parse_source(angle)
+    scan_source = parse_source(scan)
+    angle_source = None if is_table(angle) else parse_frames(angle) or parse_source(angle)
+    if isinstance(angle_source, FrameSource):
+        angle_unit = "rad"
+    if angle_unit is None:
+        raise RecordingError("angle unit: write deg or rad, as the bag has it")
+    table = read_table(angle) if angle_source is None else None
     with open_bag(bag) as opened:
-        survey = _survey(opened, scan_source, angle_source)
+        survey = _survey(opened, scan_source, angle_source, table)
         clock = one_clock(survey.scan_stamps, survey.angle_stamps)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
         if not in_time.any():
@@ -114,7 +132,7 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
         log = unwrapped_log(clock.angle_ns, np.radians(survey.angle) if angle_unit == "deg" else survey.angle)
         doubled = clock.angle_ns.size - log.time_ns.size
         left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
-        warnings = [clock.said] if clock.said else []
+        warnings = [said for said in (clock.said, survey.angle_said) if said]
         warnings += [*_unit_warnings(clock.angle_ns, survey.angle, log, angle_unit)]
         warnings += [*_angle_warnings(survey, angle_unit), *_scan_warnings(survey, clock)]
         if not in_time.all():
@@ -132,7 +150,7 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
             "schema": "scanwright/recording/1",
             "source": bag.name,
             "scan": str(scan_source),
-            "angle": str(angle_source),
+            "angle": str(angle_source or angle),
             "angle_unit": angle_unit,
             "hold": str(still).lower(),
             "warnings": "\n".join(warnings),
@@ -151,11 +169,16 @@ def import_bag(bag: Path, out: Path, *, scan: str, angle: str, angle_unit: Angle
     )
 
 
-def _survey(bag: Bag, scan_source: Source, angle_source: Source) -> _Survey:
+def _survey(
+    bag: Bag, scan_source: Source, angle_source: Source | FrameSource | None, table: tuple[Times, Floats] | None
+) -> _Survey:
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, int, int, bool]] = []
-    angles: list[tuple[int, int, float]] = []
-    for message in bag.messages({scan_source.topic, angle_source.topic}):
+    angles: list[tuple[int, int, tuple[float, ...]]] = []
+    if table is not None:
+        angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
+    topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
+    for message in bag.messages(topics):
         scan_stamp_ns = 0
         if message.topic == scan_source.topic:
             laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path)
@@ -166,25 +189,31 @@ def _survey(bag: Bag, scan_source: Source, angle_source: Source) -> _Survey:
                 arc_ns = round(1e9 * float(laser_scan.time_increment) * (len(laser_scan.ranges) - 1))
                 beams = len(laser_scan.ranges)
                 scans.append((scan_stamp_ns, message.receive_ns, arc_ns, beams, _endless(laser_scan)))
-        if message.topic == angle_source.topic:
-            angle, angle_stamp_ns = number_at(message.body, angle_source, bag.path)
-            if math.isfinite(angle):
-                angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, angle))
-            else:
-                left_out["angle_not_a_number"] += 1
+        if angle_source is not None and message.topic == angle_source.topic:
+            for value, angle_stamp_ns in angles_in(message.body, angle_source, bag.path):
+                if all(map(math.isfinite, value)):
+                    angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, value))
+                else:
+                    left_out["angle_not_a_number"] += 1
     for source, found in ((scan_source, scans), (angle_source, angles)):
         if not found:
-            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "the topic has no message"
+            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it has no such message"
             raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
     stamps, receives, arcs, widths, endless = zip(*scans, strict=True)
     angle_stamps, angle_receives, values = zip(*angles, strict=True)
+    numbers, said = np.array(values, dtype=float), ""
+    if isinstance(angle_source, FrameSource):
+        angle, said = turned_rad(numbers, angle_source)
+    else:
+        angle = numbers[:, 0]
     return _Survey(
         scan_stamps=Stamps(times(stamps), times(receives)),
         arc_ns=times(arcs),
         beams=np.array(widths),
         endless=sum(endless),
         angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
-        angle=np.array(values),
+        angle=angle,
+        angle_said=said,
         left_out=left_out,
     )
 

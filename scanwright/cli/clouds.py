@@ -38,15 +38,21 @@ class Per(Enum):
 def import_(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],
     scan: Annotated[str, typer.Option(metavar="TOPIC[:FIELD]", help="Where the LaserScan is.")],
-    angle: Annotated[str, typer.Option(metavar="TOPIC[:FIELD]", help="Where the servo angle is.")],
-    angle_unit: Annotated[AngleUnit, typer.Option(help="Unit of the angle in the bag.")],
+    angle: Annotated[
+        str,
+        typer.Option(
+            metavar="TOPIC[:FIELD]",
+            help="Where the servo angle is; also TOPIC:JOINT, TOPIC:PARENT:CHILD of /tf, or FILE.csv[:COLUMN].",
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
+    angle_unit: Annotated[AngleUnit | None, typer.Option(help="Unit of the angle; transforms have none.")] = None,
     hold: Annotated[bool, typer.Option("--hold", help="The motor stood still during each scan.")] = False,
 ) -> None:
     """Bring somebody's ROS recording into the project's own: MCAP, /scan and /joint_states."""
     from scanwright import api
 
-    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit.value, hold=hold)
+    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit and angle_unit.value, hold=hold)
     show(summary.lines())
 
 

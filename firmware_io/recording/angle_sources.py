@@ -1,0 +1,147 @@
+"""Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.spatial.transform import Rotation
+
+from design.arrays import Floats, Times
+from design.errors import RecordingError, suggest
+from firmware_io.foreign import foreign
+from firmware_io.recording import ros_messages
+from firmware_io.recording.bags import Source, number_at
+
+TF = "tf2_msgs/msg/TFMessage"
+SECONDS, NANOSECONDS = ("time_s", "time", "t"), ("time_ns",)
+ANGLES = ("angle", "angle_deg", "angle_rad", "position", "position_rad")
+ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning about one
+STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
+
+
+@dataclass(frozen=True, slots=True)
+class FrameSource:
+    """The angle between two frames of a topic of transforms."""
+
+    topic: str
+    parent: str
+    child: str
+
+    def __str__(self) -> str:
+        return f"{self.topic}:{self.parent}:{self.child}"
+
+
+def is_table(text: str) -> bool:
+    """Whether an angle is named that stands in a file of its own: `FILE.csv[:COLUMN]`."""
+    return Path(text.partition(":")[0]).suffix == ".csv"
+
+
+def parse_frames(text: str) -> FrameSource | None:
+    """Read `TOPIC:PARENT:CHILD`; None where it is not of that kind."""
+    parts = text.split(":")
+    return FrameSource(*parts) if len(parts) == 3 and all(parts) else None
+
+
+def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[tuple[float, ...], int]]:
+    """Values of a message and their stamps [ns] (0: none): one number, or the quaternions x y z w of a pair of frames.
+
+    Raises:
+        RecordingError: the message holds no such thing.
+    """
+    if isinstance(source, Source):
+        number, stamp_ns = number_at(body, source, bag)
+        return [((number,), stamp_ns)]
+    if getattr(body, "__msgtype__", "") != TF:
+        raise RecordingError(f"{bag}: {source}: {source.topic} holds no transforms; write TOPIC or TOPIC:FIELD")
+    found: list[tuple[tuple[float, ...], int]] = []
+    for one in body.transforms:
+        if (one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")) == (source.parent, source.child):
+            q = one.transform.rotation
+            found.append(((q.x, q.y, q.z, q.w), ros_messages.stamp_ns(one.header.stamp)))
+    return found
+
+
+def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource) -> tuple[Floats, str]:
+    """How far a frame has turned about the one axis that it turns about, shape (n,), and what a person must know.
+
+    Counted from where the frames agree, where they ever do, else from the first one.
+
+    Args:
+        quaternions: x y z w.
+        source: for errors.
+
+    Raises:
+        RecordingError: the frame stands still, or turns about more than one axis.
+    """
+    turned = Rotation.from_quat(quaternions)
+    since = (turned[0].inv() * turned).as_quat()
+    _, _, axes = np.linalg.svd(since[:, :3], full_matrices=False)
+    axis = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])
+    sine = since[:, :3] @ axis
+    angle = 2 * np.arctan2(sine, since[:, 3])
+    if np.ptp(np.unwrap(angle)) < STILL_RAD:
+        raise RecordingError(f"{source}: the frames do not turn against each other")
+    across = 2 * np.arcsin(np.clip(np.linalg.norm(since[:, :3] - sine[:, None] * axis, axis=1), 0, 1))
+    if across.max() > ACROSS_RAD:
+        raise RecordingError(
+            f"{source}: the frames turn about more than one axis, up to {math.degrees(across.max()):.1f} deg across it"
+        )
+    first = turned[0].as_quat()
+    if np.linalg.norm(first[:3] - (first[:3] @ axis) * axis) < math.sin(ACROSS_RAD / 2):
+        return angle + 2 * np.arctan2(first[:3] @ axis, first[3]), ""
+    named = ", ".join(f"{part:.3f}" for part in axis)
+    return angle, f"{source}: angles count from the first one, about the axis ({named}) of {source.child}"
+
+
+def read_table(text: str) -> tuple[Times, Floats]:
+    """Times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`.
+
+    The first line names its columns: `time_s` or `time_ns` since 1970, and the angle.
+
+    Raises:
+        RecordingError: there is no such file or column, or a line is no numbers.
+    """
+    name, _, column = text.partition(":")
+    path = Path(name)
+    lines = foreign(f"{path}: cannot read the angles", path.read_text, encoding="utf-8").splitlines()
+    header = [word.strip().lstrip("#").strip() for word in next(csv.reader(lines[:1]), [])]
+    when = _column(path, header, (*SECONDS, *NANOSECONDS), "time")
+    angle = _column(path, header, (column,) if column else ANGLES, "angle")
+    scale = 1 if header[when] in NANOSECONDS else 1_000_000_000
+    time_ns, values = [], []
+    for number, words in enumerate(csv.reader(lines[1:]), 2):
+        if not words:
+            continue
+        try:
+            seconds, value = words[when].strip(), float(words[angle])
+            time_ns.append(_nanoseconds(seconds, scale))
+        except (IndexError, ValueError, OverflowError) as error:
+            raise RecordingError(f"{path}:{number}: not a time and an angle: {', '.join(words)[:80]}") from error
+        values.append(value)
+    if not values:
+        raise RecordingError(f"{path}: no line with an angle")
+    return np.array(time_ns, np.int64), np.array(values, float)
+
+
+def _nanoseconds(text: str, scale: int) -> int:
+    whole, _, part = text.partition(".")  # a float64 rounds the seconds of today to 256 ns
+    if scale == 1 or not part.isdigit():
+        return round(float(text) * scale) if scale > 1 else int(text)
+    sign = -1 if whole.startswith("-") else 1
+    return int(whole or 0) * scale + sign * int(part[:9].ljust(9, "0"))
+
+
+def _column(path: Path, header: Sequence[str], known: Sequence[str], what: str) -> int:
+    found = [i for i, name in enumerate(header) if name in known]
+    if len(found) != 1:
+        hint = suggest(known[0], header) if len(known) == 1 else ""
+        raise RecordingError(f"{path}: {len(found)} columns of {what}: the first line names {' or '.join(known)}{hint}")
+    return found[0]
