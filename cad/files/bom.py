@@ -24,7 +24,9 @@ from design.scanner import Scanner
 JOINTS = "joints of the layout"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 
-# What else a product needs: name, quantity, source. A product that is not here asks for its data sheet.
+PAPER_V = 12.0
+
+# What else a lidar needs: name, quantity, source. One that is not here asks for its data sheet.
 WIRING: dict[str, tuple[tuple[str, int, str], ...]] = {
     "UTM-30LX": (
         ("USB 2.0 cable of the lidar, type A", 1, PAPER),
@@ -33,14 +35,6 @@ WIRING: dict[str, tuple[tuple[str, int, str], ...]] = {
     "URG-04LX": (
         ("USB 2.0 cable of the lidar, type A", 1, PAPER),
         ("power lead of the lidar, 5 V", 1, "not in the sources of the catalogue: read its data sheet"),
-    ),
-    "MX-64R": (
-        ("USB adapter to RS-485 servos, such as ROBOTIS U2D2", 1, PAPER),
-        ("servo cable, 4 pins, with power", 1, "ROBOTIS e-manual mx-64: RS-485, 10 to 14.8 V"),
-    ),
-    "AX-12A": (
-        ("USB adapter to TTL servos, such as ROBOTIS U2D2", 1, PAPER),
-        ("servo cable, 3 pins, with power", 1, "ROBOTIS e-manual ax-12a: TTL, 9 to 12 V"),
     ),
 }
 
@@ -176,15 +170,17 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
 
 
 def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
-    yield BomItem("wiring", "power supply, 12 V", quantity=1, source=PAPER, note="price unknown")
-    for product in (scanner.lidar, scanner.servo):
-        needs = WIRING.get(product.name)
-        if needs is None:
-            part = f"cables and power of {product.name}"
-            yield BomItem("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
-            continue
-        for part, quantity, source in needs:
-            yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
+    yield BomItem("wiring", f"power supply, {PAPER_V:g} V", quantity=1, source=PAPER, note="price unknown")
+    if scanner.servo.rated_v != PAPER_V:
+        yield BomItem(
+            "wiring", f"power supply of the servo, {scanner.servo.rated_v:g} V", quantity=1, note="price unknown"
+        )
+    yield from _servo_wiring(scanner.servo)
+    needs = WIRING.get(scanner.lidar.name)
+    if needs is None:
+        yield _unknown_wiring(scanner.lidar)
+    for part, quantity, source in needs or ():
+        yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
     for part, source in drive.needs:
         yield BomItem("wiring", part, quantity=1, source=source, note="price unknown")
     if scanner.slip_ring is not None:
@@ -193,6 +189,29 @@ def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
+
+
+def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
+    """The adapter and the cable of a servo, as the catalogue has them."""
+    if servo.adapter is None:
+        yield _unknown_wiring(servo)
+    for field, price in (("adapter", servo.adapter_usd), ("cable", None)):
+        part, origin = getattr(servo, field), servo.provenance().get(field)
+        if part is not None:
+            yield BomItem(
+                "wiring",
+                part,
+                quantity=1,
+                unit_usd=price,
+                total_usd=price,
+                source=origin.source if origin is not None else "",
+                note="" if price is not None else "price unknown",
+            )
+
+
+def _unknown_wiring(product: Product) -> BomItem:
+    part = f"cables and power of {product.name}"
+    return BomItem("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
 
 
 def _total(items: list[BomItem]) -> BomItem:

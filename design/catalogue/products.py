@@ -142,6 +142,10 @@ class Servo(Product):
         description="vendor:product of the adapters between it and a computer; shapes no part",
     )
 
+    adapter: str | None = Field(default=None, exclude=True, description="between its bus and a computer")
+    adapter_usd: float | None = Field(default=None, gt=0, exclude=True, description="price of the adapter")
+    cable: str | None = Field(default=None, exclude=True, description="between the adapter and the servo")
+
     @property
     def lasting_torque_nm(self) -> float:
         """What it gives all day: a fifth of its stall torque."""

@@ -9,14 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cad.assembly.make import make_parts
-from cad.files.bom import bom_text, items_of
+from cad.files.bom import _wiring, bom_text, items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
+from cad.layout.layout import drive_of
 from cad.layout.joints import LENGTHS, shank_mm
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Servo
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +56,27 @@ def test_what_the_paper_asks_for_is_there(rows):
     wiring = [row["part"] for row in rows if row["kind"] == "wiring"]
     assert sum("USB" in part for part in wiring) == 2
     assert any("12 V" in part for part in wiring)
+
+
+@pytest.mark.parametrize(
+    ("servo", "listed", "price"),
+    [
+        ("STS3215", ["USB bus board for Feetech servos, such as Waveshare's", "servo cable, 3 pins, with power"], 10.6),
+        (
+            "XL330-M288",
+            [
+                *("power supply of the servo, 5 V", "USB adapter to Dynamixel servos, such as ROBOTIS U2D2"),
+                "servo cable, 3 pins, with power",
+            ],
+            None,
+        ),
+    ],
+)
+def test_a_servo_brings_its_supply_adapter_and_cable(made, servo, listed, price):
+    scanner = replace(made.scanner, servo=load_catalogue().get(servo, Servo))
+    rows = [item for item in _wiring(scanner, drive_of(made.scanner)) if "lidar" not in item.part]
+    assert [item.part for item in rows][1 : 1 + len(listed)] == listed
+    assert [item.total_usd for item in rows if item.total_usd is not None] == ([] if price is None else [price])
 
 
 def test_screws_are_those_of_the_catalogue_and_none_bottoms(rows, made):
