@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from itertools import product
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo.bus.bus import BROADCAST, ServoBus
@@ -46,39 +45,32 @@ def find_servo(
         raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; known: {known}")
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
-    stranger: DeviceError | None = None
-    # Twice: adapter or servo may still be starting, or this computer be busy.
-    for wait_s, (speed, packets) in product((PING_S, _PATIENT_PING_S), _ways(model, baud)):
-        bus.packets = packets
-        if not bus.set_baud(speed):
-            continue
-        answering = bus.ping(BROADCAST if servo_id is None else servo_id, wait_s)
-        if len(answering) > 1:
-            raise DeviceError(f"{bus.port}: servos {answering} answer: say which one with --servo-id")
-        if not answering:
-            continue
-        found_id = answering[0]
-        try:
-            with suppress(DeviceTimeoutError, ProtocolError):  # a late answer to the ping at another speed
-                return ServoUnit(bus, _table(bus, found_id, model), found_id)
-            if unmute and _any_table(packets).can_be_mute:
-                ServoUnit(bus, _any_table(packets), found_id).answer_everything()
-                with suppress(DeviceTimeoutError, ProtocolError):
-                    return ServoUnit(bus, _table(bus, found_id, model), found_id, was_mute=True)
-        except _StrangerError as error:  # families that share a form of packets tell themselves apart by their numbers
-            stranger = error
-            continue
-        table = _any_table(packets)
-        if not table.can_be_mute:
-            continue
-        if mute == (speed, packets.protocol, found_id):
-            raise DeviceError(
-                f"{bus.port}: servo {found_id} answers pings only: its {table.status_return} is 0; "
-                f"`scanwright doctor --fix --servo {bus.port}` sets it to {table.answers_all}"
-            )
-        mute = speed, packets.protocol, found_id
-    if stranger is not None:
-        raise stranger
+    for wait_s in (PING_S, _PATIENT_PING_S):  # adapter or servo may still be starting, or this computer be busy
+        strangers = []
+        for unit in _answering(bus, model, servo_id, baud, wait_s):
+            found = _identity(unit)
+            if was_mute := found is None and unmute and unit.table.can_be_mute:
+                unit.answer_everything()
+                found = _identity(unit)
+            if isinstance(found, ControlTable):
+                if model not in (None, found.model):
+                    wrong = f"the model of servo {unit.id} is {found.model}, not {model}"
+                    raise DeviceError(f"{bus.port}: {wrong}: look at cable and task")
+                return ServoUnit(bus, found, unit.id, was_mute)
+            here = bus.baud, bus.packets.protocol, unit.id
+            if found is not None:
+                strangers.append(f"servo {unit.id} has model number {found} in protocol {bus.packets.protocol}")
+            elif unit.table.can_be_mute and mute == here:
+                level, wanted = unit.table.status_return, unit.table.answers_all
+                raise DeviceError(
+                    f"{bus.port}: servo {unit.id} answers pings only: its {level} is 0; "
+                    f"`scanwright doctor --fix --servo {bus.port}` sets it to {wanted}"
+                )
+            elif unit.table.can_be_mute:
+                mute = here
+        if strangers:
+            known = ", ".join(f"{table.number} {table.model}" for table in all_tables())
+            raise DeviceError(f"{bus.port}: {', '.join(strangers)}, which is unknown; known: {known}")
     who = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
     speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _ways(model, baud)))
     raise DeviceTimeoutError(f"{bus.port}: {who} at {speeds} baud: look at its power, its cable, its id")
@@ -108,10 +100,6 @@ def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-class _StrangerError(DeviceError):
-    """A servo answers that is none of those packets' known models."""
-
-
 def _ways(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketFormat]]:
     """Speeds and packets to ask with: every family's first speed before any one's second."""
     most = max(len(family.bauds) for family in FAMILIES)
@@ -126,26 +114,39 @@ def _ways(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketForm
                         yield speed, packets
 
 
+def _answering(
+    bus: ServoBus, model: str | None, servo_id: int | None, baud: int | None, wait_s: float
+) -> Iterator[ServoUnit]:
+    """A servo for each way in which one answers a ping, with the first table of those that speak so.
+
+    Raises:
+        DeviceError: several answer.
+    """
+    for speed, packets in _ways(model, baud):
+        bus.packets = packets
+        if bus.set_baud(speed):
+            answering = bus.ping(BROADCAST if servo_id is None else servo_id, wait_s)
+            if len(answering) > 1:
+                raise DeviceError(f"{bus.port}: servos {answering} answer: say which one with --servo-id")
+            if answering:
+                yield ServoUnit(bus, _any_table(packets), answering[0])
+
+
 def _any_table(packets: PacketFormat) -> ControlTable:
     """One of those that speak so: what is common to all of them can be read from it."""
     return next(table for table in all_tables() if table.packets is packets)
 
 
-def _table(bus: ServoBus, servo_id: int, model: str | None) -> ControlTable:
-    """The control table of a servo that answers: of that number, with its id where the table has it.
+def _identity(unit: ServoUnit) -> ControlTable | int | None:
+    """The table of a servo that answers; its model number where nobody knows that; None where it tells none.
 
-    Raises:
-        DeviceError: it is another model, or one that nobody knows; or as `ServoBus.read`.
+    Families that share a form of packets read each other's registers as numbers of models. So a servo must have its own
+    id, too, where the table says.
     """
-    speaking = [table for table in all_tables() if table.packets is bus.packets]
-    any_unit = ServoUnit(bus, speaking[0], servo_id)
-    number = any_unit.count(speaking[0].model_number)
-    for table in speaking:
-        if table.number == number and any_unit.count(table.id) == servo_id:
-            if model not in (None, table.model):
-                raise DeviceError(
-                    f"{bus.port}: the model of servo {servo_id} is {table.model}, not {model}: look at cable and task"
-                )
-            return table
-    known = ", ".join(f"{table.number} {table.model}" for table in all_tables())
-    raise _StrangerError(f"{bus.port}: servo {servo_id} has model number {number}, which is unknown; known: {known}")
+    with suppress(DeviceTimeoutError, ProtocolError):  # a late answer to the ping at another speed, or a mute one
+        number = unit.count(unit.table.model_number)
+        for table in all_tables():
+            if (table.packets, table.number) == (unit.table.packets, number) and unit.count(table.id) == unit.id:
+                return table
+        return number
+    return None

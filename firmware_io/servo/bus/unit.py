@@ -78,8 +78,14 @@ class ServoUnit:
         return was
 
     def _unlock(self, open_it: bool) -> None:
-        if self.table.lock is not None:
-            self.write(self.table.lock, 0.0 if open_it else 1.0)
+        lock, wanted = self.table.lock, 0 if open_it else 1
+        if lock is None:
+            return
+        try:
+            self.write(lock, wanted)
+        except DeviceTimeoutError:  # it may be set not to answer what it is told
+            if self.count(lock) != wanted:
+                raise
 
     def set_baud(self, baud: int) -> None:
         """Set its speed, torque being off, and find it at its new one.

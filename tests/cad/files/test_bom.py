@@ -13,8 +13,8 @@ from cad.files.bom import _wiring, bom_text, items_of
 from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
-from cad.layout.layout import drive_of
 from cad.layout.joints import LENGTHS, shank_mm
+from cad.layout.layout import drive_of
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue

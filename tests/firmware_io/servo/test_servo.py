@@ -261,6 +261,19 @@ def test_of_several_servos_on_a_bus_one_is_named(bus):
     assert (found.table.model, found.id) == ("MX-64R", 2)
 
 
+def test_a_servo_that_nobody_knows_is_asked_in_every_way_and_told_nothing(bus):
+    """Another model of protocol 1.0, whose id and speed are the number of the STS3215 where that looks for it."""
+    memory = bytes([0x68, 0x01, 41, 9, 3, 250])  # model 360, firmware, id, speed, return delay
+    said = lambda request: memory[request[5] : request[5] + request[6]] if request[4] == 2 else b""  # noqa: E731
+    line, wire = bus("1.0", lambda request: status("1.0", 9, 0, said(request)))
+    with pytest.raises(
+        DeviceError, match=r"servo 9 has model number 360 in protocol 1\.0, .*777 in protocol STS, which"
+    ):
+        find_servo(line, None, None, unmute=True, baud=500_000)
+    assert {request[4] for request in wire.sent if request[:3] == b"\xff\xff\x09"} == {2}
+    assert len({request for request in wire.sent if len(request) > 1}) < 10
+
+
 def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):
     answer = b""
     line, wire = bus("1.0", lambda request: request + answer)
