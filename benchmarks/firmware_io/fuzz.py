@@ -27,6 +27,8 @@ _SCIP_SCRAPS = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME000300120100
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
 _BLOCK = Register(36, 8)
 
+Statuses = Callable[[int, bytes], tuple[bytes, ...]]  # as a servo sends it, and others of the same meaning
+
 
 def damaged(rng: random.Random, stream: bytes, scraps: list[bytes], accidents: int, longest: int) -> bytes:
     """The stream after some accidents, each to so many bytes at the most."""
@@ -114,6 +116,13 @@ class Wire:
         """Nothing to do."""
 
 
+def plain(error: int, data: bytes) -> bytes:
+    """A status of protocol 2.0 without its stuffing: no servo sends it, but an accident may, with a right sum."""
+    body = bytes([0x55, error]) + data
+    packet = b"\xff\xff\xfd\x00\x01" + (len(body) + 2).to_bytes(2, "little") + body
+    return packet + dynamixel_packets.crc16(packet).to_bytes(2, "little")
+
+
 def lidar(streams: int, seed: int) -> None:
     """Damage dialogues, and print what became of them."""
     rng, accepted, refused, slowest_s = random.Random(seed), 0, 0, 0.0
@@ -134,7 +143,7 @@ def lidar(streams: int, seed: int) -> None:
     )
 
 
-def servo(answers: int, seed: int, packets: PacketFormat, status: Callable[[int, bytes], bytes]) -> None:
+def servo(answers: int, seed: int, packets: PacketFormat, statuses: Statuses) -> None:
     """Damage answers to one read of a block, and print what became of them."""
     rng, wire = random.Random(seed), Wire()
     with (
@@ -145,12 +154,12 @@ def servo(answers: int, seed: int, packets: PacketFormat, status: Callable[[int,
         servo_bus, accepted, slowest_s, began_s = ServoBus("wire", packets), 0, 0.0, time.perf_counter()
         for k in range(answers):
             data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(_BLOCK.size))
-            wire.answer = damaged(rng, status(0, data), _SERVO_SCRAPS, 2, 4)
+            wire.answer = damaged(rng, statuses(0, data)[0], _SERVO_SCRAPS, 2, 4)
             asked_s = time.perf_counter()
             try:
                 answer = servo_bus.read(1, _BLOCK)
                 accepted += 1
-                whole = (status(error, answer.data) for error in range(256))
+                whole = (packet for error in range(256) for packet in statuses(error, answer.data))
                 assert any(packet in wire.answer for packet in whole), "accepted with a wrong sum"
             except DeviceError:
                 pass
@@ -170,9 +179,14 @@ def main() -> None:
     streams = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     lidar(streams, seed)
-    servo(streams, seed, PROTOCOL_1, lambda error, data: dynamixel_packets.status("1.0", 1, error, data))
-    servo(streams, seed, PROTOCOL_2, lambda error, data: dynamixel_packets.status("2.0", 1, error, data))
-    servo(streams, seed, STS, lambda error, data: feetech_packets.status(1, error, data))
+    servo(streams, seed, PROTOCOL_1, lambda error, data: (dynamixel_packets.status("1.0", 1, error, data),))
+    servo(
+        streams,
+        seed,
+        PROTOCOL_2,
+        lambda error, data: (dynamixel_packets.status("2.0", 1, error, data), plain(error, data)),
+    )
+    servo(streams, seed, STS, lambda error, data: (feetech_packets.status(1, error, data),))
 
 
 if __name__ == "__main__":
