@@ -35,8 +35,8 @@ from design.errors import TaskError, suggest
 from design.record import Fault, faults_of, read_toml, tell
 
 SHIPPED = Path(__file__).parent
-LIDAR_GROUP = "scanwright.lidars"
-"""Entry points of installed packages that add a family of lidars; the products stand beside the module they name."""
+LIDAR_GROUP, SERVO_GROUP = "scanwright.lidars", "scanwright.servos"
+"""Entry points of installed packages that add a family of devices; the products stand beside the module they name."""
 
 P = TypeVar("P", bound=Product)
 KINDS: dict[str, type[Product]] = {
@@ -158,7 +158,7 @@ def _shipped() -> dict[str, Product]:
 
 
 def _installed() -> list[Path]:
-    """Folders of the modules that installed packages name in `LIDAR_GROUP`; the modules themselves stay unloaded."""
-    modules = {entry.module for entry in entry_points(group=LIDAR_GROUP)}
+    """Folders of the modules that installed packages name in these groups; the modules themselves stay unloaded."""
+    modules = {entry.module for group in (LIDAR_GROUP, SERVO_GROUP) for entry in entry_points(group=group)}
     found = [find_spec(module) for module in sorted(modules)]
     return [Path(spec.origin).parent for spec in found if spec is not None and spec.origin is not None]

@@ -7,11 +7,11 @@ An installed package adds one without a line here: an entry point of the group `
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import entry_points
 
 from design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
+from firmware_io.installed import with_installed
 from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
 from firmware_io.lidar.scip.driver import open_scip
 
@@ -27,18 +27,7 @@ def all_families() -> dict[str, LidarFamily]:
     Raises:
         DeviceError: an installed package names something else, or a family that there is already.
     """
-    known = {family.name: family for family in FAMILIES}
-    for entry in sorted(entry_points(group=LIDAR_GROUP), key=lambda entry: entry.name):
-        try:
-            family = entry.load()
-        except Exception as error:  # of somebody else's code: whatever it raises
-            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: {error}") from error
-        if not isinstance(family, LidarFamily):
-            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: it names no LidarFamily")
-        if family.name in known:
-            raise DeviceError(f"entry point {entry.value} of {LIDAR_GROUP}: there is a family '{family.name}' already")
-        known[family.name] = family
-    return known
+    return with_installed(LIDAR_GROUP, LidarFamily, FAMILIES)
 
 
 def family_of(model: str) -> LidarFamily:

@@ -1,9 +1,16 @@
-"""The families of servos that can be driven. One line here makes a family known to every command."""
+"""The families of servos that can be driven. One line here makes a family known to every command.
+
+An installed package adds one without a line here: an entry point of the group `scanwright.servos` that names a
+`ServoFamily`; the TOML files beside its module are products of the catalogue (docs/how-to/new-servo.md).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
+from design.catalogue.catalogue import SERVO_GROUP
+from firmware_io.installed import with_installed
 from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.servo.dynamixel.tables import TABLES as DYNAMIXEL_TABLES
@@ -18,11 +25,14 @@ class ServoFamily:
         name: of the family.
         tables: of its models.
         bauds: bits per second, those first that servos are set to most.
+        twin: "package.module:Class" of its `firmware_io.twins.servo.machine.ServoMachine`, made of (control table, what
+            hangs on the horn, time in ns, angle of the horn); a text, since twins live a storey above drivers.
     """
 
     name: str
     tables: tuple[ControlTable, ...]
     bauds: tuple[int, ...]
+    twin: str
 
     def formats(self, model: str | None) -> tuple[PacketFormat, ...]:
         """How the servos of that name, or all of them, pack what they say."""
@@ -34,11 +44,27 @@ FAMILIES = (
         "Dynamixel",
         DYNAMIXEL_TABLES,
         (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000, 500_000, 200_000, 9600),
+        "firmware_io.twins.servo.dynamixel_machine:DynamixelMachine",
     ),
-    ServoFamily("Feetech", FEETECH_TABLES, (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400)),
+    ServoFamily(
+        "Feetech",
+        FEETECH_TABLES,
+        (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400),
+        "firmware_io.twins.servo.feetech_machine:FeetechMachine",
+    ),
 )
 
 
+@cache
+def all_families() -> dict[str, ServoFamily]:
+    """The shipped families and those of installed packages, by name.
+
+    Raises:
+        DeviceError: an installed package names something else, or a family that there is already.
+    """
+    return with_installed(SERVO_GROUP, ServoFamily, FAMILIES)
+
+
 def all_tables() -> tuple[ControlTable, ...]:
-    """The control tables of every family."""
-    return tuple(table for family in FAMILIES for table in family.tables)
+    """The control tables of every family; raises as `all_families`."""
+    return tuple(table for family in all_families().values() for table in family.tables)

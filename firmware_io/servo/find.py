@@ -10,7 +10,7 @@ from firmware_io.servo.bus.bus import BROADCAST, ServoBus
 from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.servo.bus.unit import PING_S, ServoUnit
-from firmware_io.servo.families import FAMILIES, all_tables
+from firmware_io.servo.families import all_families, all_tables
 
 _PATIENT_PING_S = 0.2
 _LISTEN_S = 0.3
@@ -22,7 +22,7 @@ def open_bus(port: str) -> ServoBus:
     Raises:
         DeviceError: no such port, it is in use, or may not be opened.
     """
-    return ServoBus(port, FAMILIES[0].tables[0].packets)
+    return ServoBus(port, all_tables()[0].packets)
 
 
 def find_servo(
@@ -102,10 +102,11 @@ def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
 
 def _ways(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketFormat]]:
     """Speeds and packets to ask with: every family's first speed before any one's second."""
-    most = max(len(family.bauds) for family in FAMILIES)
+    families = all_families().values()
+    most = max(len(family.bauds) for family in families)
     asked = set()
     for rank in range(most):
-        for family in FAMILIES:
+        for family in families:
             for packets in family.formats(model):
                 speeds = family.bauds[rank : rank + 1] if baud is None else (baud,)
                 for speed in speeds:

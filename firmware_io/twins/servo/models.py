@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from pkgutil import resolve_name
+
 from design.errors import DeviceError
-from firmware_io.servo.dynamixel import tables as dynamixel
-from firmware_io.servo.families import all_tables
-from firmware_io.servo.feetech import tables as feetech
+from firmware_io.servo.families import all_families, all_tables
 from firmware_io.twins.dynamics import Load
-from firmware_io.twins.servo.dynamixel_machine import DynamixelMachine
-from firmware_io.twins.servo.feetech_machine import FeetechMachine
 from firmware_io.twins.servo.machine import ServoMachine
 
 
@@ -25,12 +23,11 @@ def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle
     Raises:
         DeviceError: nobody has written such a twin.
     """
-    for table in all_tables():
-        if table.model == model and protocol in (None, table.protocol):
-            if table in dynamixel.TABLES:
-                return DynamixelMachine(table, load, time_ns, angle_rad)
-            if table in feetech.TABLES:
-                return FeetechMachine(table, load, time_ns, angle_rad)
+    for family in all_families().values():
+        for table in family.tables:
+            if table.model == model and protocol in (None, table.protocol):
+                made: ServoMachine = resolve_name(family.twin)(table, load, time_ns, angle_rad)
+                return made
     known = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
     asked = model if protocol is None else f"{model} with {protocol}"
     raise DeviceError(f"there is no twin of a servo {asked}; there are: {known}")
