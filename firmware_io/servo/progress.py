@@ -36,7 +36,7 @@ class ServoState:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class TurnOrder:
     """What the servo was told to do, and where it was when it last got on with it.
 
     Attributes:
@@ -65,7 +65,7 @@ class Stall:
         return f"stall: {moved} where {math.degrees(self.due_rad):.1f} were due"
 
 
-def follow(order: Order, state: ServoState, step_rad: float) -> Order | Stall | None:
+def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | Stall | None:
     """The order with the progress made; None when the goal is reached.
 
     Args:

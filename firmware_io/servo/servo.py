@@ -25,7 +25,7 @@ from firmware_io.servo.bus.unit import ServoUnit
 from firmware_io.servo.find import find_servo, open_bus
 from firmware_io.servo.fitness import prepare
 from firmware_io.servo.guard import SILENCE_S, Guard
-from firmware_io.servo.progress import Order, ServoState, Stall, follow, nearest_turn
+from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow, nearest_turn
 
 _GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
 
@@ -57,7 +57,7 @@ class ServoDriver:
         self._unit, self._bus, self._table, self._warnings = unit, bus, table, warnings
         self._product = load_catalogue().get(table.model, Servo)
         self._mode: tuple[Setting, ...] = ()
-        self._order: Order | None = None
+        self._order: TurnOrder | None = None
         self._known: ServoState | None = None  # the last state with a position, from which turns are counted
         self._guard = Guard(bus.fileno(), *unit.torque_off())
 
@@ -116,7 +116,7 @@ class ServoDriver:
         self._observe()  # turns are counted from here
         self._watch()
         self._unit.write(self._table.wheel_speed, rate_rad_s)
-        self._order = Order(rate_rad_s, math.copysign(math.inf, rate_rad_s))
+        self._order = TurnOrder(rate_rad_s, math.copysign(math.inf, rate_rad_s))
 
     def sweep_to(self, angle_rad: float, rate_rad_s: float) -> None:
         """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
@@ -137,7 +137,7 @@ class ServoDriver:
         self._watch()
         self._unit.write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
         self._unit.write(table.goal, angle_rad + table.centre * table.goal.unit)
-        self._order = Order(rate_rad_s, angle_rad)
+        self._order = TurnOrder(rate_rad_s, angle_rad)
 
     def hold(self) -> None:
         """Stand where it is, with torque on. An AX-12A that spins only loses its drive, for want of a speed loop."""
@@ -211,7 +211,7 @@ class ServoDriver:
         rate_rad_s = sum(measured) / len(measured) if measured else self._order.rate_rad_s
         return rate_rad_s * (answer.sampled_ns - known.time_ns) / 1e9
 
-    def _follow(self, order: Order, state: ServoState) -> Order | None:
+    def _follow(self, order: TurnOrder, state: ServoState) -> TurnOrder | None:
         """The order with the progress made; None when the goal is reached."""
         progress = follow(order, state, self.step_rad)
         if isinstance(progress, Stall):

@@ -176,11 +176,11 @@ class ServoBus:
                 return status
 
     def _checked(self, status: Status, instruction: int, expected: int) -> ServoAnswer:
-        verdict, complete = self.packets.verdict(status.error), len(status.data) == expected
-        if verdict.damaged:
+        meaning, complete = self.packets.meaning(status.error), len(status.data) == expected
+        if meaning.damaged:
             raise ProtocolError("the request arrived damaged: look at cable and ground")
-        if verdict.refusal and not (complete and instruction == READ):  # a read that brings its values was no mistake
-            raise DeviceError(f"{self.port}: servo {status.id}: refused: {verdict.refusal}")
+        if meaning.refusal and not (complete and instruction == READ):  # a read that brings its values was no mistake
+            raise DeviceError(f"{self.port}: servo {status.id}: refused: {meaning.refusal}")
         if not complete:
             raise ProtocolError(f"{len(status.data)} bytes where {expected} were asked for")
         wire_ns = (len(self._line.sent) - status.length) * self._line.byte_s * 1e9
@@ -188,7 +188,7 @@ class ServoBus:
         known_ns = (len(self._line.sent) + status.length) * self._line.byte_s * 1e9 + self.return_delay_ns
         return ServoAnswer(
             data=status.data,
-            conditions=verdict.conditions,
+            conditions=meaning.conditions,
             sampled_ns=self._line.began_ns + round((total_ns + wire_ns - self.return_delay_ns) / 2),
             bound_ns=max(0, round((total_ns - known_ns) / 2)),
         )

@@ -28,7 +28,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Meaning:
     """What an error byte means.
 
     Attributes:
@@ -67,5 +67,5 @@ class PacketFormat(Protocol):
             ProtocolError: what came is damaged.
         """
 
-    def verdict(self, error: int) -> Verdict:
+    def meaning(self, error: int) -> Meaning:
         """What the error byte of a status means."""

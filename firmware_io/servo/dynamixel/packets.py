@@ -16,7 +16,7 @@ from __future__ import annotations
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
 from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import NO_ANSWER, Status, Verdict
+from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
 from firmware_io.servo.bus.serial_line import SerialLine
 
 _CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
@@ -62,10 +62,10 @@ class Protocol1:
             raise ProtocolError(f"an answer of a wrong length: {packet.hex(' ')}")
         return Status(packet[2], packet[4], packet[5:-1], len(packet))
 
-    def verdict(self, error: int) -> Verdict:
+    def meaning(self, error: int) -> Meaning:
         """What the error byte means."""
         refusal = next((text for bit, text in _REFUSALS_1.items() if error & bit), None)
-        return Verdict(error & _CONDITIONS_1, bool(error & _CHECKSUM_1), refusal)
+        return Meaning(error & _CONDITIONS_1, bool(error & _CHECKSUM_1), refusal)
 
 
 class Protocol2:
@@ -99,10 +99,10 @@ class Protocol2:
             raise ProtocolError(f"an answer that is cut short: {packet.hex(' ')}")
         return Status(packet[4], body[1], body[2:], len(packet))
 
-    def verdict(self, error: int) -> Verdict:
+    def meaning(self, error: int) -> Meaning:
         """What the error byte means."""
         conditions, number = error & _ALERT_2, error & ~_ALERT_2
-        return Verdict(conditions, number == _CRC_2, _REFUSALS_2.get(number, f"error {number}") if number else None)
+        return Meaning(conditions, number == _CRC_2, _REFUSALS_2.get(number, f"error {number}") if number else None)
 
 
 PROTOCOL_1, PROTOCOL_2 = Protocol1(), Protocol2()

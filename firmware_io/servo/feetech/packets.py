@@ -11,7 +11,7 @@ the registers and the signs are not. A servo that gets a damaged request says no
 from __future__ import annotations
 
 from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import NO_ANSWER, Status, Verdict
+from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
 from firmware_io.servo.bus.serial_line import SerialLine
 
 _HEADER = b"\xff\xff"
@@ -87,9 +87,9 @@ class Sts:
             heard, came = begun(heard + more), True
         return status(heard)
 
-    def verdict(self, error: int) -> Verdict:
+    def meaning(self, error: int) -> Meaning:
         """What the status byte means: it tells of the servo only, and refuses nothing."""
-        return Verdict(conditions=error)
+        return Meaning(conditions=error)
 
 
 STS = Sts()
