@@ -2,11 +2,11 @@
 
     uv run python -m benchmarks.firmware_io.faults [RUNS] [FAULT...]
 
-Each run is a scan of the emulated scanner (a UTM-30LX that an MX-64R spins at 180 deg/s, protocol 1.0) which the fault
-hits a moment after the recording began. Measured are: what was raised; after which time the servo stood, also where it
-turns on later; how much of the recording before the fault is missing after `scanwright repair`; and, where the scan
-goes on, after which time (from the re-plug) scans are recorded again. Times are those of this machine; the bounds to
-hold are 1 s of recording and 3 s to recover.
+Each run is a scan of the emulated scanner (a UTM-30LX that an MX-64R spins at 180 deg/s, protocol 1.0, or the servo
+that a fault names: "stall, STS3215") which the fault hits a moment after the recording began. Measured are: what was
+raised; after which time the servo stood, also where it turns on later; how much of the recording before the fault is
+missing after `scanwright repair`; and, where the scan goes on, after which time (from the re-plug) scans are recorded
+again. Times are those of this machine; the bounds to hold are 1 s of recording and 3 s to recover.
 """
 
 from __future__ import annotations
@@ -78,8 +78,7 @@ def garbage(twins: EmulatedScanner) -> None:
 
 
 INSIDE: dict[str, Fault] = {
-    "servo unplugged, protocol 1.0": lambda twins: twins.servo.unplug(),
-    "servo unplugged, protocol 2.0": lambda twins: twins.servo.unplug(),
+    "servo unplugged": lambda twins: twins.servo.unplug(),
     "lidar unplugged": lambda twins: twins.lidar.unplug(),
     "lidar unplugged and back": replugged_lidar,
     "stall": lambda twins: twins.servo.stall(),
@@ -89,6 +88,21 @@ INSIDE: dict[str, Fault] = {
 }
 SIGNALS = {"kill -9": signal.SIGKILL, "Ctrl-C": signal.SIGINT}
 FULL_DISK = "full disk"
+SERVOS = {  # model and protocol
+    "protocol 1.0": ("MX-64R", "1.0"),
+    "protocol 2.0": ("MX-64R", "2.0"),
+    "XL430-W250": ("XL430-W250", "2.0"),
+    "STS3215": ("STS3215", "STS"),
+}
+ALL = [
+    *("servo unplugged, protocol 1.0", "servo unplugged, protocol 2.0"),
+    *[name for name in (*INSIDE, *SIGNALS, FULL_DISK) if name != "servo unplugged"],
+    *[
+        f"{name}, {servo}"
+        for servo in ("XL430-W250", "STS3215")
+        for name in ("servo unplugged", "stall", "garbage", "servo brown-out", "kill -9")
+    ],
+]
 
 
 def stands_after_s(twins: EmulatedScanner, since_s: float, over: Event | None = None) -> float:
@@ -166,14 +180,16 @@ def outside(out: Path, twins: EmulatedScanner, number: int | None) -> Outcome:
 
 def trial(name: str, seed: int) -> Outcome:
     """One run of one fault with a fresh scanner."""
-    protocol = "2.0" if "2.0" in name else "1.0"
+    fault, _, servo = name.partition(", ")
+    model, protocol = SERVOS[servo or "protocol 1.0"]
+    angles = ANGLES.model_copy(update={"servo": model})
     with (
         tempfile.TemporaryDirectory() as folder,
-        emulated_scanner(ANGLES, room(None), protocol=protocol, seed=seed) as twins,
+        emulated_scanner(angles, room(None), protocol=protocol, seed=seed) as twins,
     ):
         out = Path(folder)
-        (out / "angles.json").write_text(ANGLES.to_json(), encoding="utf-8")
-        return inside(out, twins, INSIDE[name]) if name in INSIDE else outside(out, twins, SIGNALS.get(name))
+        (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        return inside(out, twins, INSIDE[fault]) if fault in INSIDE else outside(out, twins, SIGNALS.get(fault))
 
 
 def trials(name: str, runs: int) -> list[Outcome]:
@@ -207,7 +223,7 @@ def row(name: str, outcomes: list[Outcome]) -> str:
 def main() -> None:
     """Run every fault, or those that are named, as often as asked for, and print a table of the worst cases."""
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    names = sys.argv[2:] or [*INSIDE, *SIGNALS, FULL_DISK]
+    names = sys.argv[2:] or ALL
     with suppress(PermissionError):
         os.nice(-10)  # twins need their time, as hardware does not
     print("| fault | runs | ends with | servo stands after | recording lost | scans again after |")
