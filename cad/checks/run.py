@@ -19,6 +19,8 @@ from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
+from design.electrics.rules import faults_of
+from design.electrics.wiring import network_of
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
 
@@ -67,8 +69,27 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(scanner, layout.stack, bodies),
         *retention_checks(scanner, assembly),
+        *electric_checks(scanner),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes),
         *doubts,
     ]
     return checks, shadow
+
+
+def electric_checks(scanner: Scanner) -> list[Check]:
+    """Every broken rule of the wiring, or one word that it keeps them; and what the catalogue does not know of it."""
+    network = network_of(scanner)
+    faults = [
+        Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
+        for fault in faults_of(network)
+    ]
+    kept = (
+        f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "
+        "supply carries more than it may, and every device gets its voltage"
+    )
+    doubts = [
+        Check("wiring", "warning", None, None, "", fact.split(":")[0], f"{fact} is not in the catalogue: ask its maker")
+        for fact in network.unknown
+    ]
+    return [*(faults or [Check("wiring", "pass", None, None, "", "wiring", kept)]), *doubts]

@@ -13,6 +13,7 @@ from cad.files.glb_scenes import scene_files
 from cad.files.instructions import instructions_text
 from cad.files.part_files import PartsResult, write_files
 from cad.files.threemf import threemf_bytes
+from cad.files.wiring import wiring_files
 from cad.findings import PartFinding
 from cad.geometry.mesh import TriMesh, checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
@@ -58,10 +59,11 @@ def export_scanner(
     files |= _print_file(scanner, FIT_COUPON, checked_mesh(coupon, FIT_COUPON), digest)
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest)
-    progress("writing bom.csv and assembly.md")
+    progress("writing bom.csv, assembly.md and wiring.svg")
     items = items_of(scanner, assembly, joints, masses, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
+    files |= wiring_files(scanner, digest)
     files |= drawn()
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)

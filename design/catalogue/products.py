@@ -58,6 +58,24 @@ class Product(Record):
         return [f"{self.name} ({self.maker})", *values, doubt]
 
 
+Link = Literal["usb", "usb-powered", "ethernet", "serial"]
+
+
+class Lead(Record):
+    """One wire of a power lead: `net` is + or -."""
+
+    net: Literal["+", "-"]
+    colour: str
+
+
+class Ways(Record):
+    """Equal circuits of a slip ring; a circuit for signals has less noise, not less current."""
+
+    count: int = Field(gt=0)
+    amps: float = Field(gt=0)
+    use: Literal["power", "signal", "any"]
+
+
 class Lidar(Product):
     """A 2D lidar. Body frame: origin on the base at the optical axis, x to the front, z up; mm."""
 
@@ -89,6 +107,14 @@ class Lidar(Product):
         default=None, exclude=True, description="vendor:product of its port; shapes no part"
     )
     family: str | None = Field(default=None, exclude=True, description="who drives it; shapes no part")
+    supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
+    current_a: float | None = Field(default=None, gt=0, exclude=True, description="as it runs; shapes no part")
+    peak_a: float | None = Field(default=None, gt=0, exclude=True, description="as it starts; shapes no part")
+    link: Link | None = Field(default=None, exclude=True, description="how its data leave; shapes no part")
+    connector: str | None = Field(default=None, exclude=True, description="shapes no part")
+    leads: tuple[Lead, ...] | None = Field(
+        default=None, exclude=True, description="colours of its power lead; shapes no part"
+    )
 
     @model_validator(mode="after")
     def _steps_are_ordered(self) -> Lidar:
@@ -115,6 +141,10 @@ class Servo(Product):
     price_usd: float | None = Field(default=None, gt=0)
     supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
     rated_v: float = Field(default=12.0, gt=0, exclude=True, description="of torque and speed; shapes no part")
+    idle_a: float | None = Field(default=None, gt=0, exclude=True, description="that it rests with; shapes no part")
+    stall_a: float | None = Field(default=None, gt=0, exclude=True, description="at rated_v; shapes no part")
+    bus: Literal["rs485", "ttl"] | None = Field(default=None, exclude=True, description="shapes no part")
+    connector: str | None = Field(default=None, exclude=True, description="shapes no part")
     stall_torque_nm: float = Field(gt=0)
     no_load_rpm: float = Field(gt=0)
     radial_load_n: float | None = Field(default=None, gt=0)
@@ -181,6 +211,7 @@ class SlipRing(Product):
     mass_g: float = Field(gt=0)
     max_rpm: float | None = Field(default=None, gt=0)
     circuits: str
+    ways: tuple[Ways, ...] | None = Field(default=None, exclude=True, description="circuits by current; shapes no part")
     price_usd: float | None = Field(default=None, gt=0)
     # left out of the record where there is none, so that a ring with a bore keeps its digest
     flange: Flange | None = Field(default=None, exclude_if=lambda value: value is None)

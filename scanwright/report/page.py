@@ -74,6 +74,8 @@ def report_html(folder: Path) -> str:
         "places": {} if checks is None or assembly is None else _places(assembly, checks, bom),
         "bom": bom,
         "steps": read(folder / "assembly.md", lambda path: steps_html(read_text(path))),
+        "wiring": read(folder / "wiring.svg", read_picture),
+        "wiring_words": read(folder / "wiring.md", lambda path: steps_html(read_text(path))),
         "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},
         "sheets": [f"drawings/{path.name}" for path in sorted((folder / "drawings").glob("*.pdf"))],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),

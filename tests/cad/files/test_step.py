@@ -43,7 +43,7 @@ def test_another_process_writes_the_same_bytes(made, tmp_path):
         len(parts) >= 4 and {"assembly.step", "scanner.urdf", "bom.csv", "assembly.md", "assembly.glb"} <= files.keys()
     )
     metal = {"parts/servo_shaft", "parts/journal_sleeve", "parts/counterweight"}
-    assert len(files) == 5 * len(parts) + len(parts - metal) + 7  # STEP, STL, three drawings; print files
+    assert len(files) == 5 * len(parts) + len(parts - metal) + 9  # STEP, STL, three drawings; print files
     assert [name for name, path in files.items() if path.read_bytes() != (made.folder / name).read_bytes()] == []
 
 

@@ -31,6 +31,8 @@ FILES = {
     "exploded.glb",
     "assembly.md",
     "bom.csv",
+    "wiring.md",
+    "wiring.svg",
     "scanner.urdf",
     "left_out.json",
     "checks.json",

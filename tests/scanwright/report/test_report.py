@@ -53,6 +53,7 @@ SECTIONS = [
     "checks",
     "bom",
     "steps",
+    "wiring",
     "drawings",
     "files",
     "left-out",
@@ -160,6 +161,10 @@ def folder(tmp_path_factory):
     header = "kind,part,number,quantity,supplier,supplier_number,unit_usd,total_usd,mass_g,source,verified,note"
     (folder / "bom.csv").write_text("\n".join([header, *rows, ""]))
     (folder / "assembly.md").write_text(f"# Title\n\nLook at `exploded.glb`.\n\n## 1. Servo\n\n**4 x M4** {EVIL}\n")
+    (folder / "wiring.svg").write_text(
+        f"<svg xmlns='http://www.w3.org/2000/svg'><text>{html.escape(EVIL)}</text></svg>"
+    )
+    (folder / "wiring.md").write_text(f"# Title\n\n## Power\n\n- F1 {EVIL}\n- F2\n")
     (folder / "drawings").mkdir()
     (folder / "drawings" / "base_mount.svg").write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><script>alert(1)</script></svg>'

@@ -1,0 +1,177 @@
+"""`wiring.svg`: the wiring of a scanner, drawn: boxes in columns from the supply to the lidar, wires between pins.
+
+A wire leaves a box to the right and enters another from the left: between two columns first come the lanes in which
+wires change their height, one for each, then room for the words that stand on each wire before its end. A wire that
+passes columns does so below all boxes. So no words meet, whatever the scanner. Lengths in pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.sax.saxutils import escape
+
+from design.electrics.network import Box, Network, Wire
+
+ROW = 22.0  # from pin to pin
+LINE = 15.0  # from line to line of text in a box
+CHAR = 6.0  # of a letter of the text, with room for the widest
+LANE = 9.0
+APART = 34.0  # boxes of a column
+EDGE = 24.0
+HEAD = 54.0
+INKS = {
+    "red": "#c62828",
+    "black": "#222222",
+    "brown": "#7b4a1e",
+    "blue": "#1f5fbf",
+    "green": "#2e7d32",
+    "orange": "#d97706",
+    "yellow": "#b59a00",
+    "white": "#8d8d8d",
+    "white-orange": "#e8a33d",
+    "white-green": "#66a86a",
+}
+INK = "#555555"
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A box on the sheet."""
+
+    box: Box
+    x: float
+    y: float
+    width: float
+
+    @property
+    def first(self) -> float:
+        """Height of its first pin."""
+        return self.y + 24.0 + LINE * len(self.box.lines) + ROW / 2
+
+    @property
+    def bottom(self) -> float:
+        """Its lower edge."""
+        return self.first + ROW * (max(len(self.box.left), len(self.box.right)) - 0.5) + 4.0
+
+    def left(self, pin: str) -> tuple[float, float]:
+        """Where a pin of its left side is."""
+        return self.x, self.first + ROW * self.box.left.index(pin)
+
+    def right(self, pin: str) -> tuple[float, float]:
+        """Where a pin of its right side is."""
+        return self.x + self.width, self.first + ROW * self.box.right.index(pin)
+
+
+def schematic_svg(network: Network, title: str) -> str:
+    """The picture; equal networks give equal text."""
+    columns = sorted({box.column for box in network.boxes})
+    place = {column: i for i, column in enumerate(columns)}
+    spans = [_span(network, place, wire) for wire in network.wires]
+    boxes = _placed(network, columns, spans)
+    floor = max(placed.bottom for placed in boxes.values()) + 26.0
+    lanes = [0] * len(columns)
+    far, drawn = 0, []
+    for wire, (first, last) in zip(network.wires, spans, strict=True):
+        start, end = boxes[wire.start[0]].right(wire.start[1]), boxes[wire.end[0]].left(wire.end[1])
+        points = [start, *_turn(boxes, columns[first], lanes, first, start[1])]
+        if last > first + 1:
+            low = floor + 14.0 * far
+            far += 1
+            entry = _turn(boxes, columns[last - 1], lanes, last - 1, low)
+            points += [(points[-1][0], low), *entry, (entry[0][0], end[1])]
+        else:
+            points.append((points[-1][0], end[1]))
+        drawn.append(_wire(wire, [*points, end]))
+    width = max(placed.x + placed.width for placed in boxes.values()) + EDGE
+    height = floor + 14.0 * far + 34.0
+    note = "Wires cross without a joint. A lead whose colour nobody verified is measured before it is joined."
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_n(width)} {_n(height)}" width="{_n(width)}" '
+            f'height="{_n(height)}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="11">',
+            '<rect width="100%" height="100%" fill="#ffffff"/>',
+            _text(EDGE, 30.0, title, size=16, bold=True),
+            *drawn,
+            *(line for placed in boxes.values() for line in _box(placed)),
+            _text(EDGE, height - 14.0, note),
+            "</svg>",
+            "",
+        ]
+    )
+
+
+def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int]:
+    column = {box.name: place[box.column] for box in network.boxes}
+    return column[wire.start[0]], column[wire.end[0]]
+
+
+def _placed(network: Network, columns: list[int], spans: list[tuple[int, int]]) -> dict[str, _Placed]:
+    """Columns as wide as their words, gaps as wide as their lanes and the words on the wires that end there."""
+    found: dict[str, _Placed] = {}
+    x = EDGE
+    for i, column in enumerate(columns):
+        boxes = [box for box in network.boxes if box.column == column]
+        width = max(_width(box) for box in boxes)
+        y = HEAD
+        for box in boxes:
+            # pins of neighbouring columns stand half a row apart: no two wires lie on one line
+            y += (i % 2 * ROW / 2 - _Placed(box, x, y, width).first) % ROW
+            found[box.name] = _Placed(box, x, y, width)
+            y = found[box.name].bottom + APART
+        words = [len(wire.words) for wire, (_, last) in zip(network.wires, spans, strict=True) if last == i + 1]
+        crossing = sum((first == i) + (last == i + 1 and last > first + 1) for first, last in spans)
+        x += width + LANE * (crossing + 2) + CHAR * max(words, default=0) + 14.0
+    return found
+
+
+def _width(box: Box) -> float:
+    pins = max((len(pin) for pin in box.left), default=0) + max((len(pin) for pin in box.right), default=0) + 4
+    longest = max(1.15 * len(box.title), *(len(line) for line in box.lines), pins)
+    return CHAR * longest + 18.0
+
+
+def _turn(boxes: dict[str, _Placed], column: int, lanes: list[int], gap: int, y: float) -> list[tuple[float, float]]:
+    """The next free lane right of a column, at a height."""
+    edge = next(placed.x + placed.width for placed in boxes.values() if placed.box.column == column)
+    lanes[gap] += 1
+    return [(edge + LANE * (lanes[gap] + 0.5), y)]
+
+
+def _wire(wire: Wire, points: list[tuple[float, float]]) -> str:
+    ink = INKS.get(wire.colour, INK)
+    thick = 1.2 if wire.mm2 == 0 else 1.6 + 0.6 * wire.mm2
+    path = " ".join(f"{_n(x)},{_n(y)}" for x, y in points)
+    line = f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{_n(thick)}"/>'
+    x, y = points[-1]
+    return line + "\n" + _text(x - 8.0, y - 4.0, wire.words, ink=ink, anchor="end")
+
+
+def _box(placed: _Placed) -> list[str]:
+    box, x, y = placed.box, placed.x, placed.y
+    lines = [
+        f'<rect x="{_n(x)}" y="{_n(y)}" width="{_n(placed.width)}" height="{_n(placed.bottom - y)}" rx="4" '
+        'fill="#f6f6f4" stroke="#222222" stroke-width="1.4"/>',
+        _text(x + 9.0, y + 18.0, box.title, bold=True),
+        *(_text(x + 9.0, y + 18.0 + LINE * (i + 1), line) for i, line in enumerate(box.lines)),
+    ]
+    sides = [(placed.left(pin), pin, "start", 9.0) for pin in box.left]
+    sides += [(placed.right(pin), pin, "end", -9.0) for pin in box.right]
+    for (at, height), pin, anchor, inwards in sides:
+        fill = "#ffffff" if pin in box.free else "#222222"
+        lines.append(f'<circle cx="{_n(at)}" cy="{_n(height)}" r="3" fill="{fill}" stroke="#222222"/>')
+        lines.append(_text(at + inwards, height + 4.0, pin, anchor=anchor))
+    return lines
+
+
+def _text(
+    x: float, y: float, words: str, *, size: int = 11, bold: bool = False, ink: str = "#222222", anchor: str = "start"
+) -> str:
+    weight = ' font-weight="bold"' if bold else ""
+    return (
+        f'<text x="{_n(x)}" y="{_n(y)}" font-size="{size}" fill="{ink}" text-anchor="{anchor}"{weight}>'
+        f"{escape(words)}</text>"
+    )
+
+
+def _n(value: float) -> str:
+    return f"{round(value, 1) + 0.0:g}"

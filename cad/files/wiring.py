@@ -1,0 +1,105 @@
+"""`wiring.svg` and `wiring.md`: how a scanner is wired, drawn and in words, with what each wire and circuit carries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cad.files.schematic import schematic_svg
+from design.electrics.network import Network
+from design.electrics.rules import faults_of
+from design.electrics.sizing import OVER_PEAK
+from design.electrics.wiring import COMPUTER_W, LEADS_M, network_of
+from design.scanner import Scanner
+
+GROUND = (
+    "One ground: every - comes back to the - bar of the distribution, the case of the supply to the protective earth "
+    "of its mains side, the shield of a data cable to the computer's end only. Wire with the supply off and F0 out; "
+    "measure from each + to - before F0 goes in."
+)
+STALLED = (
+    "A servo that is stopped by force draws its stall current until its own guard lets go: the supply, F0 and its "
+    "branch carry that for as long, everything else keeps running."
+)
+
+
+def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
+    """Both files by name.
+
+    Args:
+        scanner: angles and products.
+        digest: of what shapes the parts.
+    """
+    network = network_of(scanner)
+    title = f"{scanner.angles.task}: wiring ({digest})"
+    return {
+        "wiring.svg": schematic_svg(network, title).encode("utf-8"),
+        "wiring.md": wiring_text(network, title).encode("utf-8"),
+    }
+
+
+def wiring_text(network: Network, title: str) -> str:
+    """The words: paragraphs and lists, no tables, so that the report shows the same."""
+    blocks = [f"# {title}", GROUND]
+    for heading, lines in (
+        ("Power", list(_power(network))),
+        ("Slip ring", list(_ring(network))),
+        ("Wires", list(_wires(network))),
+        ("Data through the ring", list(network.risks)),
+        ("Not known", [f"- {fact}: measure or ask its maker" for fact in network.unknown]),
+        ("Broken rules", [f"- {fault.where}: {fault.message}" for fault in faults_of(network)]),
+    ):
+        if lines:
+            listed = [line for line in lines if line.startswith("- ")]
+            said = [line for line in lines if not line.startswith("- ")]
+            blocks += [f"## {heading}", *(["\n".join(listed)] if listed else []), *said]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _power(network: Network) -> Iterator[str]:
+    for branch in network.branches:
+        yield (
+            f"- {branch.name}, {branch.feeds}: {branch.lasting_a:.2g} A lasting, {branch.peak_a:.2g} A at most, fuse "
+            f"{branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
+        )
+    lasting, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("lasting_a", "peak_a"))
+    yield (
+        f"- all at 12 V: {lasting:.2g} A lasting ({12 * lasting:.0f} W), {peak:.2g} A at most ({12 * peak:.0f} W); "
+        f"supply {network.supply_a:g} A"
+    )
+    for drop in network.drops:
+        yield (
+            f"- {drop.device} gets {drop.volts:.2f} V at its largest current, asks for {drop.least:g} to {drop.most:g} "
+            f"({LEADS_M:g} m of leads, and the ring where it is behind it)"
+        )
+    yield (
+        "Currents are those of the catalogue, where `scanwright catalogue NAME` tells source and doubt; the computer "
+        f"is taken to use {COMPUTER_W:g} W. A fuse carries {OVER_PEAK:g} times the peak of its branch, a wire its "
+        f"fuse. {STALLED}"
+    )
+
+
+def _ring(network: Network) -> Iterator[str]:
+    for circuit in network.circuits:
+        if not circuit.net:
+            yield f"- {circuit.number} ({circuit.colour}): spare, {circuit.rated_a:g} A"
+            continue
+        load = (
+            f"{circuit.amps:g} A of {circuit.rated_a:g}, {circuit.rated_a / circuit.amps:.2g} times"
+            if circuit.amps
+            else "signal"
+        )
+        yield f"- {circuit.number} ({circuit.colour}): {circuit.net}, {load}"
+    if network.circuits:
+        yield (
+            "Numbers and colours of the ring's leads are in the order of EIA-359, assumed: no drawing of its maker was "
+            "found. Ring them through with a meter, stator to rotor, and write the numbers on both ends."
+        )
+
+
+def _wires(network: Network) -> Iterator[str]:
+    titles = {box.name: box.title for box in network.boxes}
+    for wire in network.wires:
+        carries = f", {wire.amps:.2g} A" if wire.amps else ""
+        yield (
+            f"- {titles[wire.start[0]]} {wire.start[1]} to {titles[wire.end[0]]} {wire.end[1]}: {wire.words}{carries}"
+        )

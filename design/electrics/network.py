@@ -1,0 +1,127 @@
+"""What a wiring is made of: boxes with pins, wires between pins, circuits of the slip ring, branches with a fuse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Pin = tuple[str, str]  # box and pin
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """One device.
+
+    Attributes:
+        name: unique.
+        title: in words.
+        lines: what else stands in it.
+        left: pins towards the supply, from the top.
+        right: pins away from it.
+        column: its place from left to right.
+        free: pins that stay open on purpose.
+    """
+
+    name: str
+    title: str
+    lines: tuple[str, ...]
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    column: int
+    free: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """One wire.
+
+    Attributes:
+        start: pin nearer to the supply.
+        end: the other one.
+        net: what it carries, such as "12 V" or "D+".
+        amps: largest current; 0 for signals.
+        mm2: cross-section; 0 where it is in a ready-made cable.
+        colour: of its insulation.
+    """
+
+    start: Pin
+    end: Pin
+    net: str
+    amps: float
+    mm2: float
+    colour: str
+
+    @property
+    def words(self) -> str:
+        """Its label."""
+        return f"{self.net}, {self.colour}" + (f", {self.mm2:g} mm²" if self.mm2 else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Circuit:
+    """One circuit of the slip ring.
+
+    Attributes:
+        number: from 1.
+        colour: of its lead; assumed by the order of EIA-359 where no maker tells.
+        rated_a: what it carries for ever.
+        net: what it is used for; empty for a spare one.
+        amps: largest current.
+    """
+
+    number: int
+    colour: str
+    rated_a: float
+    net: str
+    amps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """What one fuse protects.
+
+    Attributes:
+        name: of the fuse.
+        feeds: in words.
+        lasting_a: at 12 V, as it runs.
+        peak_a: at 12 V, at its worst.
+        fuse_a: its rating.
+        mm2: of its wires.
+    """
+
+    name: str
+    feeds: str
+    lasting_a: float
+    peak_a: float
+    fuse_a: float
+    mm2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """What arrives at a device.
+
+    Attributes:
+        device: its name.
+        volts: at its largest current.
+        least: that it asks for.
+        most: that it bears.
+    """
+
+    device: str
+    volts: float
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """All of it; `unknown` are facts that the catalogue lacks, in words."""
+
+    boxes: tuple[Box, ...]
+    wires: tuple[Wire, ...]
+    circuits: tuple[Circuit, ...]
+    branches: tuple[Branch, ...]
+    drops: tuple[Drop, ...]
+    supply_a: float
+    risks: tuple[str, ...]
+    unknown: tuple[str, ...]

@@ -1,0 +1,289 @@
+"""The wiring of one scanner: a 12 V supply, a fuse and a switch, a fused branch for each device, the ring between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from design.catalogue.products import Lidar, Servo, SlipRing, Ways
+from design.electrics.network import Box, Branch, Circuit, Drop, Network, Wire
+from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, supply_for, wire_drop_v, wire_for
+from design.scanner import Scanner
+
+SUPPLY_V = 12.0
+COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed
+COMPUTER_V = 5.0
+UNKNOWN_A = 1.0  # of a device whose current nobody tells
+LEADS_M = 1.0  # of each branch
+CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
+USB_A = 0.5  # that a port gives
+DATA = {
+    "usb": ("VBUS", "D-", "D+", "GND"),
+    "usb-powered": ("VBUS", "D-", "D+", "GND"),
+    "ethernet": ("TX+", "TX-", "RX+", "RX-"),
+    "serial": ("TX", "RX", "GND"),
+}
+PLUG = {"usb": "USB", "usb-powered": "USB", "ethernet": "Ethernet", "serial": "serial port"}
+SIGNALS = {"rs485": ("D+", "D-"), "ttl": ("DATA",)}
+COLOURS = {
+    "VBUS": "red",
+    "D-": "white",
+    "D+": "green",
+    "GND": "black",
+    "shield": "braid",
+    "TX+": "white-orange",
+    "TX-": "orange",
+    "RX+": "white-green",
+    "RX-": "green",
+    "TX": "yellow",
+    "RX": "green",
+}
+ORDER = ("black", "brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white", "pink", "turquoise")
+RISKS = {
+    "usb": (
+        "USB through a ring: full speed (12 Mbit/s) passes good contacts, high speed (480 Mbit/s) only rings made for "
+        "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on a circuit of its own, the "
+        "way between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
+        "microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring with gold "
+        "contacts ends it."
+    ),
+    "ethernet": (
+        "Ethernet through a ring: 100BASE-TX needs two pairs, each twisted up to the ring on neighbouring circuits, "
+        "and asks for a data-rated ring; a cheap capsule loses frames while it turns. Watch the counters of the port "
+        "during a turn; 10BASE-T by a switch that forces it is the way out."
+    ),
+    "serial": "A serial line passes any ring: at 500 kBaud and more use RS-422 and twist the pairs.",
+}
+RISKS["usb-powered"] = RISKS["usb"].replace("power the lidar by its own lead, not by VBUS", "VBUS feeds the lidar")
+
+
+@dataclass(frozen=True, slots=True)
+class _Load:
+    """A device and what it asks of the supply."""
+
+    name: str
+    title: str
+    volts: float  # that it is fed with
+    lasting_a: float
+    peak_a: float
+
+    @property
+    def from_supply(self) -> float:
+        """Amperes at the supply for one of its own."""
+        return 1.0 if self.volts == SUPPLY_V else self.volts / SUPPLY_V / CONVERTER
+
+
+def network_of(scanner: Scanner) -> Network:
+    """The wiring of one scanner.
+
+    Raises:
+        ValueError: a device draws more than any fuse of the table carries.
+    """
+    lidar, servo, ring = scanner.lidar, scanner.servo, scanner.slip_ring
+    loads = [_servo_load(servo), _computer_load()]
+    if lidar.link != "usb-powered":
+        loads.insert(0, _lidar_load(lidar))
+    branches = [_branch(number, load) for number, load in enumerate(loads, start=1)]
+    circuits = () if ring is None else _circuits(ring, lidar)
+    return Network(
+        boxes=tuple(_boxes(scanner, loads, branches, circuits)),
+        wires=tuple(_wires(scanner, loads, branches, circuits)),
+        circuits=circuits,
+        branches=tuple(branches),
+        drops=tuple(_drops(scanner, loads, branches)),
+        supply_a=supply_for(sum(branch.peak_a for branch in branches)),
+        risks=() if ring is None or lidar.link is None else (RISKS[lidar.link],),
+        unknown=tuple(_unknown(scanner)),
+    )
+
+
+def _lidar_load(lidar: Lidar) -> _Load:
+    peak = lidar.peak_a or UNKNOWN_A
+    return _Load("lidar", lidar.name, fed_with(lidar.supply_v), lidar.current_a or peak, peak)
+
+
+def _servo_load(servo: Servo) -> _Load:
+    """Its lasting current is that of its lasting torque, a fifth of the stall."""
+    stall = servo.stall_a or UNKNOWN_A
+    volts = fed_with(servo.supply_v)
+    peak = stall * volts / servo.rated_v
+    return _Load("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak)
+
+
+def _computer_load() -> _Load:
+    amps = COMPUTER_W / COMPUTER_V
+    return _Load("computer", "computer", COMPUTER_V, amps / 2, amps)
+
+
+def fed_with(supply_v: tuple[float, float] | None) -> float:
+    """The supply's voltage where a device bears it, else that of a converter."""
+    if supply_v is None or supply_v[0] <= SUPPLY_V <= supply_v[1]:
+        return SUPPLY_V
+    return next((volts for volts in CHANGER if supply_v[0] <= volts <= supply_v[1]), SUPPLY_V)
+
+
+def _branch(number: int, load: _Load) -> Branch:
+    peak = load.peak_a * load.from_supply
+    fuse = fuse_for(peak)
+    return Branch(f"F{number}", load.title, load.lasting_a * load.from_supply, peak, fuse, wire_for(fuse))
+
+
+def _data(lidar: Lidar) -> tuple[str, ...]:
+    """Nets of its data cable; none where nobody tells how its data leave."""
+    return () if lidar.link is None else DATA[lidar.link]
+
+
+def _nets(lidar: Lidar) -> list[tuple[str, float]]:
+    """What the lidar needs of a ring: its power first, then its data; the shield last, which it can do without."""
+    peak = lidar.peak_a or UNKNOWN_A
+    power = [] if lidar.link == "usb-powered" else [("+", peak), ("-", peak)]
+    amps = peak if lidar.link == "usb-powered" else USB_A
+    data = [(net, amps if net in ("VBUS", "GND") else 0.0) for net in _data(lidar)]
+    return [*power, *data, ("shield", 0.0)]
+
+
+def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
+    """Power on the strongest circuits, signals on those for signals; what is left is spare."""
+    nobody_tells = (Ways(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
+    ways = [(group.amps, group.use) for group in ring.ways or nobody_tells for _ in range(group.count)]
+    left, taken = list(range(len(ways))), dict[int, tuple[str, float]]()
+    for net, amps in _nets(lidar):
+        wanted = "power" if net in ("+", "-") else "signal"
+        fit = [i for i in left if ways[i][1] in (wanted, "any")] or [i for i in left if net != "shield"]
+        if fit:
+            taken[fit[0]] = net, amps
+            left.remove(fit[0])
+    return tuple(
+        Circuit(i + 1, ORDER[i % len(ORDER)], amps, *taken.get(i, ("", 0.0))) for i, (amps, _) in enumerate(ways)
+    )
+
+
+def _feed(load: _Load) -> str:
+    return f"{load.volts:g} V"
+
+
+def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuits: tuple[Circuit, ...]) -> list[Box]:
+    lidar, servo = scanner.lidar, scanner.servo
+    total = sum(branch.peak_a for branch in branches)
+    supply, fuse = supply_for(total), fuse_for(total)
+    bus = tuple(pin for branch in branches for pin in (f"{branch.name} +", f"{branch.name} -"))
+    protects = tuple(f"{branch.name}: {branch.fuse_a:g} A, {branch.feeds}" for branch in branches)
+    boxes = [
+        Box(
+            "supply", f"supply 12 V, {supply:g} A", ("mains side: as its maker says",), (), ("+", "-", "PE"), 0, ("PE",)
+        ),
+        Box("switch", "main fuse and switch", (f"F0: {fuse:g} A, S1: both in +",), ("+ in",), ("+ out",), 1),
+        Box("bus", "distribution", (*protects, "- bar: the one ground of all"), ("+", "-"), bus, 2),
+    ]
+    for load in loads:
+        if load.volts != SUPPLY_V:
+            title = f"{CHANGER[load.volts]} for the {load.name}"
+            size = (f"at least {load.peak_a:.2g} A",)
+            boxes.append(Box(f"{load.name} converter", title, size, ("in +", "in -"), ("out +", "out -"), 3))
+    signals = SIGNALS[servo.bus or "ttl"]
+    plug = "data port" if lidar.link is None else PLUG[lidar.link]
+    boxes += [
+        Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug), 4),
+        Box("adapter", "servo adapter", ("such as U2D2: data only",), ("USB",), (*signals, "GND"), 5),
+        Box(
+            "servo",
+            servo.name,
+            (f"{servo.connector or 'connector unknown'}; it has two", "one for power, one for data"),
+            ("V", "GND", *signals, "GND data"),
+            (),
+            6,
+        ),
+    ]
+    data = _data(lidar)
+    power = () if lidar.link == "usb-powered" else ("+", "-")
+    shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
+    pins = (*power, *data, *(("shield",) if shielded else ()))
+    boxes.append(Box("plug", f"{plug} of the computer", ("a cut cable",), (plug,), (*data, "shield"), 5, ("shield",)))
+    if circuits:
+        ring = scanner.slip_ring
+        assert ring is not None
+        still = tuple(f"{circuit.number} {circuit.net or 'spare'}" for circuit in circuits)
+        spare = tuple(pin for pin, circuit in zip(still, circuits, strict=True) if not circuit.net)
+        boxes.append(Box("ring", ring.name, ("left: stator, right: rotor",), still, still, 6, spare))
+    boxes.append(Box("lidar", lidar.name, (lidar.connector or "connector unknown",), pins, (), 7))
+    return boxes
+
+
+def _wires(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuits: tuple[Circuit, ...]) -> list[Wire]:
+    lidar, servo = scanner.lidar, scanner.servo
+    total = sum(branch.peak_a for branch in branches)
+    thick = wire_for(fuse_for(total))
+    wires = [
+        Wire(("supply", "+"), ("switch", "+ in"), "12 V", total, thick, "red"),
+        Wire(("switch", "+ out"), ("bus", "+"), "12 V", total, thick, "red"),
+        Wire(("supply", "-"), ("bus", "-"), "0 V", total, thick, "black"),
+    ]
+    ends = {"computer": ("5 V", "0 V"), "servo": ("V", "GND"), "lidar": ("+", "-")}
+    inside = {circuit.net: f"{circuit.number} {circuit.net}" for circuit in circuits if circuit.net}
+    leads = {lead.net: lead.colour for lead in lidar.leads or ()}
+    for load, branch in zip(loads, branches, strict=True):
+        target = "ring" if load.name == "lidar" and circuits else load.name
+        feeds = [(("bus", f"{branch.name} {sign}")) for sign in "+-"]
+        amps = branch.peak_a
+        if load.volts != SUPPLY_V:
+            box = f"{load.name} converter"
+            for feed, sign, colour in zip(feeds, "+-", ("red", "black"), strict=True):
+                net = "12 V" if sign == "+" else "0 V"
+                wires.append(Wire(feed, (box, f"in {sign}"), net, amps, branch.mm2, colour))
+            feeds, amps = [(box, "out +"), (box, "out -")], load.peak_a
+        for feed, sign, end in zip(feeds, "+-", ends[load.name], strict=True):
+            net = _feed(load) if sign == "+" else "0 V"
+            pin = inside.get(end, end) if target == "ring" else end
+            colour = leads.get("+" if sign == "+" else "-", "") if target == "lidar" else ""
+            mm2 = max(branch.mm2, wire_for(fuse_for(amps)))
+            wires.append(Wire(feed, (target, pin), net, amps, mm2, colour or ("red" if sign == "+" else "black")))
+            if target == "ring" and pin != end:
+                other = leads.get("+" if sign == "+" else "-", "lead's colour unknown")
+                wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, other))
+    plug = "data port" if lidar.link is None else PLUG[lidar.link]
+    wires += [
+        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, "its cable"),
+        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, "its cable"),
+    ]
+    signals = SIGNALS[servo.bus or "ttl"]
+    wires += [Wire(("adapter", pin), ("servo", pin), pin, 0.0, 0.0, "servo cable") for pin in signals]
+    wires.append(Wire(("adapter", "GND"), ("servo", "GND data"), "GND", 0.0, 0.0, "servo cable"))
+    peaks = dict(_nets(lidar))
+    for net in (*_data(lidar), "shield"):
+        colour = COLOURS[net]
+        if not circuits:
+            wires.append(Wire(("plug", net), ("lidar", net), net, peaks[net], 0.0, colour))
+        elif net in inside:
+            wires.append(Wire(("plug", net), ("ring", inside[net]), net, peaks[net], 0.0, colour))
+            wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, colour))
+    return wires
+
+
+def _drops(scanner: Scanner, loads: list[_Load], branches: list[Branch]) -> list[Drop]:
+    found = []
+    ranges = {"lidar": scanner.lidar.supply_v, "servo": scanner.servo.supply_v}
+    for load, branch in zip(loads, branches, strict=True):
+        bounds = ranges.get(load.name)
+        if bounds is None:
+            continue
+        lost = wire_drop_v(load.peak_a, branch.mm2, LEADS_M)
+        if load.name == "lidar" and scanner.slip_ring is not None:
+            lost += 2 * load.peak_a * RING_OHM
+        found.append(Drop(load.title, load.volts - lost, *bounds))
+    return found
+
+
+def _unknown(scanner: Scanner) -> list[str]:
+    lidar, servo, ring = scanner.lidar, scanner.servo, scanner.slip_ring
+    facts: dict[str, object] = {
+        f"{lidar.name}: supply_v": lidar.supply_v,
+        f"{lidar.name}: current_a and peak_a": lidar.peak_a,
+        f"{lidar.name}: link": lidar.link,
+        f"{servo.name}: supply_v": servo.supply_v,
+        f"{servo.name}: stall_a": servo.stall_a,
+        f"{servo.name}: bus": servo.bus,
+    }
+    if lidar.link != "usb-powered":
+        facts[f"{lidar.name}: leads (the colours of its power lead)"] = lidar.leads
+    if ring is not None:
+        facts[f"{ring.name}: ways"] = ring.ways
+    return [name for name, value in facts.items() if value is None]

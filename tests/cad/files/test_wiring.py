@@ -1,0 +1,83 @@
+"""The drawing of the wiring: no words meet, and every pin and wire of the network is on it."""
+
+import itertools
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from cad.files.schematic import schematic_svg
+from cad.files.wiring import wiring_files
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.electrics.wiring import network_of
+from design.scanner import scanner_of
+
+SVG = "{http://www.w3.org/2000/svg}"
+SCANNERS = {
+    "a through bore": ("UTM-30LX", "MX-64R", "UH1256-02-0610-06S"),
+    "a capsule": ("UTM-30LX", "MX-64R", "SRC022A-6"),
+    "ethernet": ("UST-10LX", "XM430-W350", "SNU11-P0210"),
+    "no ring": ("URG-04LX", "AX-12A", None),
+    "powered by usb": ("URG-04LX-UG01", "XL330-M288", "SRC022A-6"),
+}
+
+
+def scanner_for(lidar, servo, ring):
+    angles = AngleSet(
+        task="wired",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0),
+        sensor=lidar,
+        servo=servo,
+        slip_ring=ring,
+    )
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+def extent(text):
+    """Left, top, right, bottom of a text; a letter of the font is at most 0.62 of its size wide on average."""
+    size, x, y = (float(text.get(key)) for key in ("font-size", "x", "y"))
+    width = 0.62 * size * len(text.text) * (0.9 if text.get("text-anchor") == "end" else 1.0)
+    left = x - width if text.get("text-anchor") == "end" else x
+    return left, y - 0.8 * size, left + width, y + 0.2 * size
+
+
+@pytest.mark.parametrize("name", SCANNERS)
+def test_no_words_of_the_drawing_meet_and_nothing_is_missing(name):
+    scanner = scanner_for(*SCANNERS[name])
+    network = network_of(scanner)
+    picture = ElementTree.fromstring(schematic_svg(network, "wiring"))
+    texts = picture.findall(f"{SVG}text")
+    for one, other in itertools.combinations(texts, 2):
+        a, b = extent(one), extent(other)
+        assert min(a[2], b[2]) - max(a[0], b[0]) < 1 or min(a[3], b[3]) - max(a[1], b[1]) < 1, (one.text, other.text)
+    words = [text.text for text in texts]
+    for wire in network.wires:
+        assert words.count(wire.words) >= 1
+    for box in network.boxes:
+        assert box.title in words and {*box.left, *box.right} <= {*words}
+    lines = [
+        [tuple(map(float, point.split(","))) for point in line.get("points").split()]
+        for line in picture.findall(f"{SVG}polyline")
+    ]
+    assert len(lines) == len(network.wires)
+    runs = [(a, b) for line in lines for a, b in itertools.pairwise(line) if a != b]
+    for (a, b), (c, d) in itertools.combinations(runs, 2):  # no two wires lie on one another
+        for i in (0, 1):
+            if a[i] == b[i] == c[i] == d[i]:
+                low, high = (
+                    max(min(a[1 - i], b[1 - i]), min(c[1 - i], d[1 - i])),
+                    min(max(a[1 - i], b[1 - i]), max(c[1 - i], d[1 - i])),
+                )
+                assert high <= low, (a, b, c, d)
+
+
+def test_the_words_tell_power_circuits_and_wires():
+    files = wiring_files(scanner_for(*SCANNERS["a through bore"]), "0" * 12)
+    assert files == wiring_files(scanner_for(*SCANNERS["a through bore"]), "0" * 12)
+    text = files["wiring.md"].decode()
+    assert "- F2, MX-64R: 0.92 A lasting, 4.1 A at most, fuse 5 A, wires 0.5 mm²" in text
+    assert "- 1 (black): +, 1 A of 10, 10 times" in text and "- 8 (violet): D-, signal" in text
+    assert len(re.findall(r"^- .* to .*: ", text, re.M)) > 20 and "Broken rules" not in text
+    unsure = wiring_files(scanner_for(*SCANNERS["no ring"]), "0" * 12)["wiring.md"].decode()
+    assert "## Not known" in unsure and "Slip ring" not in unsure
