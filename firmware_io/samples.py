@@ -24,7 +24,7 @@ _SCAN_BOUNDS = (
     ("range_min_m", -math.inf, math.inf),
     ("range_max_m", -math.inf, math.inf),
 )
-_LONGEST_TURN_NS = 1000 * 10**9
+_LONGEST_TURN_NS = 2**32 - 1
 _MOST_RAD = 1e9  # of a joint that counts turns: years of them
 
 
@@ -61,8 +61,8 @@ class Scan:
     range_max_m: float
     range_m: Float32[ndarray, " n"]
     intensity: Float32[ndarray, " m"]
-    beam_bearing_rad: Float64[ndarray, " k"] | None = None
-    beam_offset_ns: Int64[ndarray, " k"] | None = None
+    beam_bearing_rad: Float64[ndarray, " k"] | None = None  # as many as ranges, or `__post_init__` says so
+    beam_offset_ns: Int64[ndarray, " t"] | None = None
 
     def __post_init__(self) -> None:
         for name, low, high in _SCAN_BOUNDS:
@@ -71,7 +71,7 @@ class Scan:
         if self.beam_bearing_rad is not None or self.beam_offset_ns is not None:
             self._check_beams(self.beam_bearing_rad, self.beam_offset_ns)
 
-    def _check_beams(self, bearing_rad: Float64[ndarray, " k"] | None, offset_ns: Int64[ndarray, " k"] | None) -> None:
+    def _check_beams(self, bearing_rad: Float64[ndarray, " k"] | None, offset_ns: Int64[ndarray, " t"] | None) -> None:
         if bearing_rad is None or offset_ns is None or not bearing_rad.shape == offset_ns.shape == self.range_m.shape:
             raise RecordingError(f"scan: {self.range_m.size} ranges, and not as many bearings and times of beams")
         if not (np.abs(bearing_rad) <= _TURNS_RAD).all():

@@ -12,10 +12,12 @@ from design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
 from firmware_io.installed import with_installed
+from firmware_io.lidar.ldrobot.driver import open_ldrobot
 from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
 from firmware_io.lidar.scip.driver import open_scip
 
 FAMILIES = (
+    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "firmware_io.twins.ldrobot:ldrobot_twin"),
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
 )
 

@@ -2,6 +2,11 @@
 
     /scan          sensor_msgs/msg/LaserScan    stamp = first beam; the rest as the sensor gave it
     /joint_states  sensor_msgs/msg/JointState   `spin_joint`, radians, unwrapped
+    /scan_beams    sensor_msgs/msg/PointCloud2  of a sensor whose speed wanders, before its /scan and with the same
+                                                stamp, a row a beam: `bearing` [rad, float64], `offset` [ns, uint32]
+
+Where there is a /scan_beams, the even grid of /scan is rounded for those who know no other: its first and last bearing
+and time are true. Reading takes the true ones.
 
 `log_time` is the stamp. A metadata record named `scanwright` says where the recording comes from.
 """
@@ -10,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, cast
@@ -27,10 +32,12 @@ from firmware_io.recording import ros_messages
 from firmware_io.recording.arrays import RecordingArrays, arrays_of
 from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
 from firmware_io.recording.metadata import NOTE, held_by
+from firmware_io.recording.ros_messages import Beams
 from firmware_io.samples import JointLog, Scan
 
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"
+BEAMS_TOPIC = "/scan_beams"
 _TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
 
 
@@ -61,11 +68,15 @@ class MessageWriter:
         self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():
             self._writer.add_attachment(0, 0, name, f"text/{Path(name).suffix[1:]}", text.encode())
-        self._channels = {topic: self._channel(topic) for topic in _TYPES}
+        self._channels = {topic: self._channel(topic, message_type) for topic, message_type in _TYPES.items()}
 
     def scan(self, scan: Scan) -> None:
         """Append one scan."""
         self._check(scan.stamp_ns)
+        if scan.beam_bearing_rad is not None:
+            if BEAMS_TOPIC not in self._channels:
+                self._channels[BEAMS_TOPIC] = self._channel(BEAMS_TOPIC, ros_messages.POINT_CLOUD)
+            self._add(BEAMS_TOPIC, scan.stamp_ns, ros_messages.encode_beams(scan))
         self._add(SCAN_TOPIC, scan.stamp_ns, ros_messages.encode_scan(scan))
 
     def joint(self, time_ns: int, position_rad: float) -> None:
@@ -81,8 +92,8 @@ class MessageWriter:
         """Write the index: without it the recording counts as cut off."""
         self._writer.finish()  # type: ignore[no-untyped-call]
 
-    def _channel(self, topic: str) -> int:
-        schema = self._writer.register_schema(_TYPES[topic], "ros2msg", ros_messages.definition(_TYPES[topic]).encode())
+    def _channel(self, topic: str, message_type: str) -> int:
+        schema = self._writer.register_schema(message_type, "ros2msg", ros_messages.definition(message_type).encode())
         return self._writer.register_channel(topic, "cdr", schema)
 
     def _check(self, time_ns: int) -> None:
@@ -154,8 +165,15 @@ class Recording:
 
     def scans(self) -> Iterator[Scan]:
         """The scans in the order of their times, one at a time."""
-        for _, data in read_messages(self.path, {SCAN_TOPIC}):
-            yield _decoded_scan(self.path, data)
+        beams: tuple[int, Beams] | None = None
+        for topic, data in read_messages(self.path, {SCAN_TOPIC, BEAMS_TOPIC}):
+            if topic == BEAMS_TOPIC:
+                beams = foreign(f"{self.path}: a message of {BEAMS_TOPIC}", ros_messages.decode_beams, data)
+                continue
+            scan = _decoded_scan(self.path, data)
+            if beams is not None and beams[0] == scan.stamp_ns:
+                scan = replace(scan, beam_bearing_rad=beams[1][0], beam_offset_ns=beams[1][1])
+            yield scan
 
     def arrays(self) -> RecordingArrays:
         """All of it in memory."""

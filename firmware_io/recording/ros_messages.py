@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
-from design.arrays import Float32s, Pose
+from design.arrays import Float32s, Floats, Pose, Times
 from firmware_io.clouds.cloud import pose_numbers
 from firmware_io.samples import Scan
 
@@ -26,11 +26,15 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TEXT = "std_msgs/msg/String"
-POINT_FIELD_TYPES = {"<f4": 7, "<u4": 6, "<u2": 4}
-"""`sensor_msgs/PointField`: FLOAT32, UINT32, UINT16."""
+POINT_FIELD_TYPES = {"<f8": 8, "<f4": 7, "<u4": 6, "<u2": 4}
+"""`sensor_msgs/PointField`: FLOAT64, FLOAT32, UINT32, UINT16."""
 LASER_FRAME = "laser"
 SPIN_JOINT = "spin_joint"
 _SPIN_JOINT_BYTES = SPIN_JOINT.encode()
+_BEAM = np.dtype([("bearing", "<f8"), ("offset", "<u4")])
+_BEAM_FIELDS = [("bearing", 0, POINT_FIELD_TYPES["<f8"]), ("offset", 8, POINT_FIELD_TYPES["<u4"])]
+Beams = tuple[Floats, Times]
+"""Bearings [rad] and times after the stamp [ns] of the beams of a scan, shape (n,) each."""
 
 
 @cache
@@ -134,6 +138,26 @@ def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
         is_dense=False,
     )
     return bytes(_store().serialize_cdr(message, POINT_CLOUD))
+
+
+def encode_beams(scan: Scan) -> bytes:
+    """Bearings and times of the beams of a scan that has its own, as a `sensor_msgs/msg/PointCloud2` in CDR."""
+    rows = np.zeros(scan.range_m.size, _BEAM)
+    rows["bearing"], rows["offset"] = scan.bearing_rad, scan.time_ns - scan.stamp_ns
+    return encode_points(rows, LASER_FRAME, scan.stamp_ns)
+
+
+def decode_beams(data: bytes) -> tuple[int, Beams]:
+    """Stamp [ns], bearings [rad] and times after the stamp [ns] in what `encode_beams` writes.
+
+    Raises:
+        ValueError: its rows are of something else.
+    """
+    message = decode_message(data, POINT_CLOUD)
+    if [(field.name, field.offset, field.datatype) for field in message.fields] != _BEAM_FIELDS:
+        raise ValueError("rows that are no beams")
+    rows = np.frombuffer(message.data.tobytes(), _BEAM)
+    return stamp_ns(message.header.stamp), (rows["bearing"].astype(np.float64), rows["offset"].astype(np.int64))
 
 
 def encode_transforms(poses: Iterable[tuple[str, str, Pose]], time_ns: int) -> bytes:

@@ -107,9 +107,8 @@ def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
 
 def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding]:
     with open_lidar(port, angles.sensor if angles else None) as lidar:
-        yield DeviceFinding(
-            "ok", f"{port}: {lidar.model}, serial number {lidar.serial_number}, firmware {lidar.firmware}"
-        )
+        told = {"serial number": lidar.serial_number, "firmware": lidar.firmware}
+        yield DeviceFinding("ok", ", ".join([f"{port}: {lidar.model}", *(f"{k} {v}" for k, v in told.items() if v)]))
         if angles is not None:
             check_model(angles, lidar)
         lidar.start()

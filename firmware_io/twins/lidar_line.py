@@ -29,7 +29,6 @@ Sight = Callable[[Times, Floats], tuple[Floats, Floats]]
 -inf: too near) and intensity, both (n,)."""
 
 _AHEAD_NS = 8_000_000  # measuring takes a computer a while: begun before the turn ends, it makes no scan late
-_BACKLOG = 1 << 15  # bytes that wait for a slow reader before whole packets are dropped, as in a sensor's buffer
 _LAG_NS = 500_000_000  # where this computer sees more slowly than a sensor turns, scans are left out, not piled up
 
 
@@ -43,7 +42,7 @@ class Machine(Protocol):
     @property
     def scanning(self) -> object: ...  # noqa: D102
 
-    def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
+    def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
         """What it answers to what came, and the end of it that is no whole request yet."""
         ...
 
@@ -79,11 +78,21 @@ class LidarLine:
 
     Attributes:
         port: like "/dev/serial/by-id/...": it stays the same over a re-plug.
-        address: "127.0.0.1:PORT".
+        address: "127.0.0.1:PORT"; empty where it has no network.
         machine: the sensor.
     """
 
-    def __init__(self, name: str, machine: Machine, *, jitter_s: float = 0.0, head: int = 0, seed: int = 0) -> None:
+    def __init__(
+        self,
+        name: str,
+        machine: Machine,
+        *,
+        jitter_s: float = 0.0,
+        head: int = 0,
+        backlog: int = 1 << 15,
+        network: bool = True,
+        seed: int = 0,
+    ) -> None:
         """Nothing runs before `with`.
 
         Args:
@@ -91,11 +100,16 @@ class LidarLine:
             machine: the sensor.
             jitter_s: scans arrive up to this much late, evenly spread.
             head: bytes of a packet before its measured numbers, which `garble` spares.
+            backlog: bytes that wait for a slow reader before whole packets are dropped, as in a sensor's buffer.
+            network: whether it can be reached over TCP, too.
             seed: of jitter and faults.
         """
         self.machine = machine
         self._name = name
         self._head = head
+        self._backlog = backlog
+        self._network = network
+        self.address = ""
         self._rng = np.random.default_rng(seed)
         self._jitter_ns = round(jitter_s * 1e9)
         self._lock = threading.RLock()
@@ -104,6 +118,7 @@ class LidarLine:
         self._channels: dict[int, _Channel] = {}
         self._scans_to = -1
         self._tcp_port = 0
+        self._server: socket.socket | None = None
         self._error: BaseException | None = None
 
     def __enter__(self) -> Self:
@@ -143,10 +158,11 @@ class LidarLine:
 
             self._add(master, close)
             self._scans_to = master
-            self._server = socket.create_server(("127.0.0.1", self._tcp_port))
-            self._server.setblocking(False)  # who was about to connect may be gone again
-            self._tcp_port = self._server.getsockname()[1]
-            self.address = f"127.0.0.1:{self._tcp_port}"
+            if self._network:
+                self._server = socket.create_server(("127.0.0.1", self._tcp_port))
+                self._server.setblocking(False)  # who was about to connect may be gone again
+                self._tcp_port = self._server.getsockname()[1]
+                self.address = f"127.0.0.1:{self._tcp_port}"
         os.write(self._wake, b"x")
 
     def unplug(self) -> None:
@@ -155,7 +171,8 @@ class LidarLine:
             for fd in list(self._channels):
                 self._channels.pop(fd).close()
             Path(self.port).unlink(missing_ok=True)
-            self._server.close()
+            if self._server is not None:
+                self._server.close()
             self._sent.clear()
 
     def power_cycle(self) -> None:
@@ -195,7 +212,7 @@ class LidarLine:
         with self._lock:
             due_ns = self.machine.next_ns() - _AHEAD_NS
             due_ns = min(due_ns, self._sent[0][0]) if self._sent else due_ns
-            listening = self._server.fileno()
+            listening = -1 if self._server is None else self._server.fileno()
             readers = [self._woken, *self._channels, *([listening] if listening >= 0 else [])]
             writers = [fd for fd, channel in self._channels.items() if channel.waiting]
         wait_s = min(max(due_ns - time.monotonic_ns(), 0) / 1e9, 0.1)
@@ -205,8 +222,8 @@ class LidarLine:
             return
         with self._lock:
             for ready in readable:
-                if ready == listening:
-                    self._accept()
+                if ready == listening and self._server is not None:
+                    self._accept(self._server)
                 elif ready == self._woken:
                     os.read(self._woken, 16)
                 elif ready in self._channels:
@@ -215,9 +232,9 @@ class LidarLine:
             for channel in list(self._channels.values()):
                 self._flush(channel)
 
-    def _accept(self) -> None:
+    def _accept(self, server: socket.socket) -> None:
         with contextlib.suppress(OSError):
-            connection, _ = self._server.accept()
+            connection, _ = server.accept()
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._add(connection.fileno(), connection.close)
 
@@ -259,7 +276,7 @@ class LidarLine:
         while self._sent and self._sent[0][0] <= time.monotonic_ns():
             packet = self._sent.popleft()[1]
             channel = self._channels.get(self._scans_to)
-            if channel is not None and len(channel.waiting) < _BACKLOG:
+            if channel is not None and len(channel.waiting) < self._backlog:
                 channel.waiting += packet
 
     def _flush(self, channel: _Channel) -> None:

@@ -58,7 +58,7 @@ def emulate(
         emulated_scanner(angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
         announced(out, twins.ports),
     ):
-        print(f"lidar {angles.sensor} at {twins.ports.lidar} and {twins.lidar.address}")
+        print(f"lidar {angles.sensor} at {' and '.join(filter(None, [twins.ports.lidar, twins.lidar.address]))}")
         print(f"servo {angles.servo} at {twins.ports.servo}")
         print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
         Event().wait()

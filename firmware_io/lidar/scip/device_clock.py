@@ -21,7 +21,6 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Int64
@@ -29,7 +28,7 @@ from numpy import ndarray
 
 from design.errors import DeviceError
 from firmware_io.lidar.scip.protocol import STAMP_WRAP_MS
-from firmware_io.lidar.scip.tick_line import Point, StampLine, half_hull
+from firmware_io.lidar.scip.tick_line import StampLine, half_hull, middle_slope
 
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _RATE_USUAL = 5e-5
@@ -223,7 +222,7 @@ class DeviceClock:
             self._earliest.append(here)
         elif here.above(self._slope) < self._earliest[-1].above(self._slope):
             self._earliest[-1] = here
-        slope = _middle_slope(half_hull([(early.turn_ms, early.late_ns) for early in self._earliest], 1))
+        slope = middle_slope(half_hull([(early.turn_ms, early.late_ns) for early in self._earliest], 1))
         # Few arrivals tell the rate less well than the usual quality of quartzes does. Two of them hold the line, some
         # half of the span apart, each late by the mean over half of all: that is their rate's uncertainty.
         span_ms = max(turn_ms - self._earliest[0].turn_ms, self._period_ms)
@@ -264,12 +263,3 @@ def host_times(
     moments = [clock.update(ms, ns) for ms, ns in zip(stamp_ms.tolist(), arrival_ns.tolist(), strict=True)]
     times = np.array([moment.time_ns for moment in moments], np.int64)
     return times, np.array([moment.uncertainty_ns for moment in moments], np.int64)
-
-
-def _middle_slope(below: Sequence[Point]) -> float:
-    """Slope of the edge over the middle: of all lines below the points, it has the least area to them."""
-    middle = (below[0][0] + below[-1][0]) / 2
-    for (x0, y0), (x1, y1) in pairwise(below):
-        if x0 < x1 and middle <= x1:
-            return (y1 - y0) / (x1 - x0)
-    return 0.0

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -100,6 +101,15 @@ def half_hull(points: Sequence[Point], side: int) -> list[Point]:
             found.pop()
         found.append((x, y))
     return found
+
+
+def middle_slope(below: Sequence[Point]) -> float:
+    """Slope of the edge over the middle: of all lines below the points, it has the least area to them."""
+    middle = (below[0][0] + below[-1][0]) / 2
+    for (x0, y0), (x1, y1) in pairwise(below):
+        if x0 < x1 and middle <= x1:
+            return (y1 - y0) / (x1 - x0)
+    return 0.0
 
 
 def _outermost(points: list[Point]) -> list[Point]:

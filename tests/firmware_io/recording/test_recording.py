@@ -1,6 +1,7 @@
 """The project's recording: it comes back as it went in, other readers read it, and a failure leaves nothing."""
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,44 @@ scan_values = st.builds(
 @given(scan=scan_values)
 def test_a_scan_survives_its_bytes(scan):
     assert_same(ros_messages.decode_scan(ros_messages.encode_scan(scan)), scan)
+
+
+def with_beams(scan, seed):
+    """The same with bearings and times of its own beams, which no even grid holds."""
+    rng = np.random.default_rng(seed)
+    beams = scan.range_m.size
+    return replace(
+        scan,
+        beam_bearing_rad=-np.cumsum(rng.uniform(0.5, 1.5, beams)),
+        beam_offset_ns=np.cumsum(rng.integers(0, 10**6, beams)),
+    )
+
+
+def test_beams_of_their_own_come_back_to_the_bit_and_others_stay_even(tmp_path):
+    uneven = [with_beams(a_scan(stamp_ns=10**9 * (k + 1), range_m=[1.0] * (5 + k)), k) for k in range(3)]
+    scans = [uneven[0], a_scan(stamp_ns=10**9 + 1), *uneven[1:], a_scan(stamp_ns=10**10)]
+    found = list(open_recording(write(tmp_path / "a.mcap", scans)).scans())
+    for one, scan in zip(found, scans, strict=True):
+        assert_same(one, scan)
+        np.testing.assert_array_equal(one.bearing_rad, scan.bearing_rad)
+        np.testing.assert_array_equal(one.time_ns, scan.time_ns)
+    bearing_rad = open_recording(tmp_path / "a.mcap").arrays().bearing_rad
+    np.testing.assert_array_equal(bearing_rad[2, :6], uneven[1].beam_bearing_rad)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ({"beam_bearing_rad": None}, "not as many bearings"),
+        ({"beam_offset_ns": np.arange(5)}, "not as many bearings"),
+        ({"beam_offset_ns": np.array([0, 3, 2, 4, 5, 6])}, "before that of the one before it"),
+        ({"beam_offset_ns": np.arange(6) * 10**9}, "a turn of 5.0 s"),
+        ({"beam_bearing_rad": np.full(6, np.nan)}, "the bearing of a beam is no number"),
+    ],
+)
+def test_beams_that_cannot_be_are_refused(more, told):
+    with pytest.raises(RecordingError, match=told):
+        replace(with_beams(a_scan(), 1), **more)
 
 
 @settings(deadline=None)

@@ -259,7 +259,13 @@ CHEAP = {"servo": "STS3215"}
 SWEEPING = {"sensor": "URG-04LX", "servo": "AX-12A", "motion": SWEEP}
 
 
-@pytest.mark.parametrize(("scanner", "turns", "points"), [({}, 2, 80_000), (SWEEPING, 1, 15_000), (CHEAP, 2, 80_000)])
+ALL_AROUND = {"sensor": "LD19"}  # a turn of beams of its own each
+
+
+@pytest.mark.parametrize(
+    ("scanner", "turns", "points"),
+    [({}, 2, 80_000), (SWEEPING, 1, 15_000), (CHEAP, 2, 80_000), (ALL_AROUND, 2, 12_000)],
+)
 def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
     out, angles = tmp_path, angle_set(**scanner)
     (out / "angles.json").write_text(angles.to_json())

@@ -1,0 +1,284 @@
+"""An LDROBOT lidar on a serial line: it talks from power-up on, and hears nothing, so nothing is started or stopped.
+
+It tells neither its model nor a number. Points per second tell the LD06 and LD19 from the STL27L; whether it is the one
+or the other of the first two nobody can tell.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from types import TracebackType
+
+import numpy as np
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
+from design.errors import DeviceError, DeviceTimeoutError
+from firmware_io.lidar.arrival_line import ArrivalLine
+from firmware_io.lidar.byte_stream import Gone, SerialStream, open_stream
+from firmware_io.lidar.ldrobot import protocol
+from firmware_io.lidar.lidar import StampAt, TimedScan
+from firmware_io.lidar.turn import Points, TurnCutter, timed_scan
+
+FAMILY = "ldrobot"
+
+_BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
+_HEARD_S = 0.5  # it talks hundreds of times a second
+_TURN_S = 1.0  # without a turn: five of the slowest
+_PAUSE_NS = 500_000_000  # after such a silence it may be a new life of the sensor
+_FIRST = 3  # packets that must agree on how fast it measures
+_RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
+_STAMPS = 64  # packets over which the sensor's milliseconds are evened out
+_GRAIN_NS = 1e6 / math.sqrt(12 * _STAMPS)
+
+
+class _PacketClock:
+    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly."""
+
+    def __init__(self, period_ms: float) -> None:
+        self._period_ms = period_ms
+        self._begin: deque[float] = deque(maxlen=_STAMPS)
+        self._number = 0
+        self._last = (0, 0)  # unwrapped stamp [ms], arrival [ns]
+
+    def sensor_ns(self, stamp_ms: int, lost: int, arrival_ns: int) -> float:
+        """Time of the last point of a packet; NaN where the sensor's clock began anew.
+
+        Args:
+            stamp_ms: as it came.
+            lost: packets before it that did not come, by their angles.
+            arrival_ns: when it came.
+        """
+        last_ms, last_ns = self._last
+        step_ms = (stamp_ms - last_ms) % protocol.STAMP_WRAP_MS
+        elapsed_ms = (arrival_ns - last_ns) / 1e6
+        if self._begin and step_ms > elapsed_ms + 1000:  # no buffer holds a second
+            return math.nan
+        unwrapped_ms = last_ms + step_ms if self._begin else stamp_ms
+        self._last = (unwrapped_ms, arrival_ns)
+        self._number += 1 + lost
+        if abs(step_ms - (1 + lost) * self._period_ms) > 2 * self._period_ms + 2:  # whole turns are missing
+            self._begin.clear()
+        # a stamp is a whole millisecond: on the mean the time lies half of one behind it
+        self._begin.append(unwrapped_ms + 0.5 - self._number * self._period_ms)
+        return (sum(self._begin) / len(self._begin) + self._number * self._period_ms) * 1e6
+
+
+class LdrobotLidar:
+    """An LDROBOT lidar; `LidarDriver` says what its methods promise.
+
+    Attributes:
+        address: where it was found.
+        serial_number: empty, as it tells none.
+        firmware: empty, as it tells none.
+        dropped: turns that are missing between those that were read.
+    """
+
+    def __init__(self, address: str, model: str | None = None) -> None:
+        """Listen to it; `model` is a name of the catalogue, None for the one whose speed of measuring fits.
+
+        Raises:
+            DeviceError: no such port, it is in use, another model talks there, or nothing does.
+        """
+        self.address = address
+        self.serial_number = self.firmware = ""
+        self.dropped = 0
+        self._bad_before = 0
+        self._splitter = protocol.Splitter()
+        self._scanning = self._intensity = False
+        self._skip = self._skipped = 0
+        self._lidar = self._connect(model)
+        self._begin_anew()
+
+    def __enter__(self) -> LdrobotLidar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stream.close()
+
+    @property
+    def model(self) -> str:
+        """Name of its type: the one it was opened as, or the first whose speed of measuring fits."""
+        return self._lidar.name
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Turns per second, by the catalogue: it holds them to some parts in a hundred."""
+        return self._lidar.scan_rate_hz
+
+    @property
+    def bad_packets(self) -> int:
+        """Runs of bytes that were no packet."""
+        return self._bad_before + self._splitter.bad
+
+    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
+        """Hand out turns from now on; it measures all the time.
+
+        Raises:
+            DeviceError: clusters, which it has not.
+        """
+        if cluster != 1:
+            raise DeviceError(f"{self._name()}: cluster = {cluster}: a {self.model} tells every point: leave it at 1")
+        self._scanning, self._intensity, self._skip = True, intensity, skip
+        self._begin_anew()
+
+    def read(self, timeout_s: float | None = None) -> TimedScan:
+        """The next turn; it is waited for for a second if nothing else is said.
+
+        Raises:
+            DeviceTimeoutError: none came in time.
+            DeviceError: it was unplugged, or was not started.
+        """
+        if not self._scanning:
+            raise DeviceError(f"{self._name()}: not started")
+        deadline = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
+        while True:
+            while self._turns:
+                turn, arrival_ns = self._turns.popleft()
+                self._count_missing(turn)
+                self._skipped = (self._skipped + 1) % (self._skip + 1)
+                if self._skipped == 0:
+                    return timed_scan(turn, self._line, self._lidar, arrival_ns, intensity=self._intensity)
+            for packet, arrival_ns in self._packets(deadline):
+                self._take(packet, arrival_ns)
+
+    def stop(self) -> None:
+        """Hand out no more; its laser stays on as long as it has power."""
+        self._scanning = False
+
+    def reconnect(self, timeout_s: float = 3.0) -> None:
+        """Listen again where it was, after an unplug or a reset.
+
+        Raises:
+            DeviceError: nothing talks there in time.
+        """
+        self._stream.close()
+        deadline = time.monotonic() + timeout_s
+        while True:
+            try:
+                self._lidar = self._connect(self.model)
+            except DeviceError:
+                if time.monotonic() > deadline:
+                    raise DeviceError(
+                        f"{self._name()}: it did not come back in {timeout_s:.1f} s; check its plug"
+                    ) from None
+                time.sleep(0.05)
+            else:
+                self._begin_anew()
+                return
+
+    def _connect(self, model: str | None) -> Lidar:
+        """Open the port and hear who talks, at whatever speed."""
+        products = [product for product in load_catalogue() if isinstance(product, Lidar) and product.name in _BAUDS]
+        named = [product for product in products if model in (None, product.name)]
+        self._bad_before = self.bad_packets
+        self._stream = open_stream(self.address)
+        try:
+            for baud in dict.fromkeys(_BAUDS[product.name] for product in named):
+                if isinstance(self._stream, SerialStream):
+                    self._stream.baud = baud
+                self._splitter = protocol.Splitter()
+                points_s = self._points_s()
+                self._splitter.bad = 0  # where we cut in is nobody's fault
+                if points_s is None:
+                    continue
+                by_speed = [(abs(math.log(points_s / _points_s(product))), product) for product in products]
+                nearest = min(by_speed, key=lambda found: found[0])[0]
+                fitting = [product for off, product in by_speed if off == nearest]
+                found = [product for product in fitting if product in named]
+                if not found:
+                    others = " or ".join(product.name for product in fitting)
+                    raise DeviceError(f"{self._name()}: {points_s:.0f} points/s: this is a {others}, not a {model}")
+                return found[0]
+            raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor talks there; check power, cable and port")
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def _points_s(self) -> float | None:
+        """Points per second by angles and speed; None where nothing talks."""
+        deadline = time.monotonic() + _HEARD_S
+        told: list[float] = []
+        while len(told) < _FIRST:
+            try:
+                packets = self._packets(deadline)
+            except DeviceTimeoutError:
+                return None
+            told += [packet.speed_deg_s / packet.step_deg for packet, _ in packets if packet.step_deg > 0]
+        return float(np.median(told)) or None
+
+    def _begin_anew(self) -> None:
+        """Nothing of what came before is of use: a new line, a new clock, a new turn."""
+        baud = _BAUDS[self.model]
+        self._line = ArrivalLine(
+            smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9), rate_max=_RATE_MAX, grain_ns=_GRAIN_NS
+        )
+        self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)
+        self._cutter = TurnCutter()
+        self._turns: deque[tuple[Points, int]] = deque()
+        self._next_deg = self._last_ns = math.nan
+        self._turn_ns = math.nan
+        self._skipped = self._skip
+
+    def _take(self, packet: protocol.Packet, arrival_ns: int) -> None:
+        span_deg = packet.step_deg * protocol.POINTS
+        most_deg = 1.5 * protocol.POINTS * packet.speed_deg_s / _points_s(self._lidar)
+        if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
+            self._bad_before += 1
+            return
+        if arrival_ns - self._last_ns > _PAUSE_NS:
+            self._begin_anew()
+        gap_deg = (packet.angle_deg[0] - self._next_deg) % 360
+        lost = round(gap_deg / span_deg) if span_deg / 2 < gap_deg < 360 - span_deg / 2 else 0
+        sensor_ns = self._clock.sensor_ns(packet.stamp_ms, lost, arrival_ns)
+        if math.isnan(sensor_ns):
+            self._begin_anew()
+            sensor_ns = self._clock.sensor_ns(packet.stamp_ms, 0, arrival_ns)
+        self._last_ns = arrival_ns
+        self._next_deg = float(packet.angle_deg[-1]) + packet.step_deg
+        self._line.add(sensor_ns, arrival_ns)
+        before_ns = np.arange(1 - protocol.POINTS, 1) * (1e9 / _points_s(self._lidar))
+        points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
+        self._turns.extend((turn, arrival_ns) for turn in self._cutter.add(points))
+
+    def _count_missing(self, turn: Points) -> None:
+        """Count the turns between this one and the last, by the time between them."""
+        begin_ns, end_ns = float(turn.sensor_ns[0]), float(turn.sensor_ns[-1])
+        if not math.isnan(self._turn_ns):
+            self.dropped += max(round((begin_ns - self._turn_ns) / (end_ns - begin_ns)), 0)
+        self._turn_ns = end_ns
+
+    def _packets(self, deadline: float) -> list[tuple[protocol.Packet, int]]:
+        """What has come, at least one packet, and when it came."""
+        late_bytes = 0
+        while True:
+            over = time.monotonic() > deadline  # told before the look: what came while we were kept waiting counts
+            with Gone(self._name()):
+                received = self._stream.read(deadline - time.monotonic())
+            arrival_ns = time.monotonic_ns()
+            packets = self._splitter.feed(received)
+            if packets:
+                return [(packet, arrival_ns) for packet in packets]
+            late_bytes += len(received) if over else 0
+            if over and (not received or late_bytes > 2 * protocol.SIZE):
+                raise DeviceTimeoutError(f"{self._name()}: nothing came in time; check power and cable")
+
+    def _name(self) -> str:
+        return f"{self.address}: lidar"
+
+
+def _points_s(lidar: Lidar) -> float:
+    return lidar.steps_per_turn * lidar.scan_rate_hz
+
+
+def open_ldrobot(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LdrobotLidar:
+    """Listen to the lidar at a serial port or HOST:PORT.
+
+    Raises:
+        DeviceError: no such port, it is in use, or no LDROBOT sensor talks there.
+    """
+    return LdrobotLidar(address, model)

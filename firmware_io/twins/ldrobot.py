@@ -1,0 +1,172 @@
+"""LD06, LD19 and STL27L in software: they talk from power-up on, their motor wanders, their clock runs in milliseconds.
+
+Written from the maker's description of the packet; what nobody found described is marked [assumed].
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.arrays import Floats
+from design.catalogue.products import Lidar
+from design.errors import DeviceError, suggest
+from firmware_io.twins.lidar_line import LidarLine, Sight
+
+BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
+_POINTS = 12
+_BYTES = 47
+_BACKLOG = 1 << 10
+_CHUNK_NS = 8_000_000  # measured at once: a ray alone costs as much as a hundred
+_WANDER = 0.01  # of the speed, to and fro in `_WANDER_S` [assumed]
+_WANDER_S = 1.7
+_BOOT_NS = 1_000_000_000  # [assumed]
+
+
+def checksum(data: bytes) -> int:
+    """Remainder of the bytes, as a polynomial over two, by x^8 + x^6 + x^3 + x^2 + 1."""
+    rest = int.from_bytes(data, "big") << 8
+    for bit in range(rest.bit_length() - 1, 7, -1):
+        if rest >> bit & 1:
+            rest ^= 0x14D << (bit - 8)
+    return rest
+
+
+def write_packet(speed_deg_s: float, start_deg: float, end_deg: float, stamp_ms: int, points: list[list[int]]) -> bytes:
+    """A packet; each point is a range [mm] and an intensity."""
+    data = bytearray([0x54, 0x2C])
+    for number in (round(speed_deg_s), round(start_deg * 100) % 36_000):
+        data += number.to_bytes(2, "little")
+    for range_mm, intensity in points:
+        data += range_mm.to_bytes(2, "little") + bytes([intensity])
+    for number in (round(end_deg * 100) % 36_000, stamp_ms % 30_000):
+        data += number.to_bytes(2, "little")
+    return bytes(data) + bytes([checksum(bytes(data))])
+
+
+@dataclass
+class LdrobotMachine:
+    """The state of one sensor; times are true ones.
+
+    Attributes:
+        lidar: of the catalogue.
+        sight: what it sees.
+        began_ns: when its clock was 0.
+        baud: of its line.
+        rate_error: of its clock, 5e-5 is 50 ppm fast.
+        first_ms: what its clock showed first.
+    """
+
+    lidar: Lidar
+    sight: Sight
+    began_ns: int
+    baud: int
+    rate_error: float = 0.0
+    first_ms: int = 0
+
+    def __post_init__(self) -> None:
+        self._packet = 0
+
+    @property
+    def scanning(self) -> object:
+        """Always."""
+        return True
+
+    @property
+    def point_ns(self) -> float:
+        """True time between two points: its clock counts them out."""
+        return 1e9 / (self.lidar.steps_per_turn * self.lidar.scan_rate_hz) / (1 + self.rate_error)
+
+    def hear(self, _received: bytes, _now_ns: int) -> tuple[bytes, bytes]:
+        """Its line goes one way."""
+        return b"", b""
+
+    def next_ns(self) -> int:
+        """When the next packets are measured."""
+        return self.began_ns + round((self._packet + self._together) * _POINTS * self.point_ns)
+
+    def next_packets(self) -> list[tuple[int, bytes]]:
+        """Packets of the next milliseconds."""
+        number = _POINTS * self._packet + np.arange(_POINTS * self._together)
+        since_ns = number * self.point_ns
+        turned_deg, speed_deg_s = self._turned(since_ns / 1e9)
+        time_ns = self.began_ns + np.rint(since_ns).astype(np.int64)
+        range_m, intensity = self.sight(time_ns, -np.radians(turned_deg % 360))  # clockwise
+        measured = np.isfinite(range_m) & (range_m > 0) & (range_m < 65.0)
+        range_mm = np.where(measured, np.rint(np.where(measured, range_m, 0) * 1e3), 0).astype(int)
+        level = np.where(measured, np.clip(np.nan_to_num(intensity) / 16, 1, 255), 0).astype(int)
+        packets = []
+        for first in range(0, number.size, _POINTS):
+            last = first + _POINTS - 1
+            stamp_ms = self.first_ms + math.floor(since_ns[last] * (1 + self.rate_error) / 1e6)
+            points = np.stack([range_mm, level], axis=1)[first : last + 1].tolist()
+            data = write_packet(speed_deg_s[first], turned_deg[first], turned_deg[last], stamp_ms, points)
+            packets.append((int(time_ns[last]) + round(_BYTES * 10 / self.baud * 1e9), data))
+        self._packet += self._together
+        return packets
+
+    def leave_out(self, before_ns: int) -> None:
+        """Passes over what should have been measured before."""
+        behind = (before_ns - self.next_ns()) / (_POINTS * self.point_ns)
+        self._packet += max(math.floor(behind), 0)
+
+    def power_cycle(self, now_ns: int) -> None:
+        """Silent for as long as it starts, its clock at 0."""
+        self.began_ns, self.first_ms, self._packet = now_ns + _BOOT_NS, 0, 0
+
+    @property
+    def _together(self) -> int:
+        return max(round(_CHUNK_NS / (_POINTS * self.point_ns)), 1)
+
+    def _turned(self, since_s: Floats) -> tuple[Floats, Floats]:
+        """Angle [deg] that the motor has turned by, and its speed [deg/s]."""
+        usual_deg_s, phase = 360 * self.lidar.scan_rate_hz, 2 * np.pi * since_s / _WANDER_S
+        wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
+        return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
+
+
+class LdrobotTwin(LidarLine):
+    """A lidar that talks all the time."""
+
+    machine: LdrobotMachine
+
+    def __init__(
+        self,
+        lidar: Lidar,
+        sight: Sight,
+        *,
+        rate_error: float = 0.0,
+        first_ms: int = 0,
+        jitter_s: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Nothing runs before `with`.
+
+        Args:
+            lidar: of the catalogue.
+            sight: what it sees.
+            rate_error: of its clock.
+            first_ms: what its clock shows first.
+            jitter_s: packets arrive up to this much late.
+            seed: of jitter and faults.
+
+        Raises:
+            DeviceError: there is no twin of this model.
+        """
+        if lidar.name not in BAUDS:
+            raise DeviceError(f"no LDROBOT twin of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
+        machine = LdrobotMachine(lidar, sight, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
+        # a line that nobody listens to keeps next to nothing
+        super().__init__(lidar.name, machine, jitter_s=jitter_s, head=6, backlog=_BACKLOG, network=False, seed=seed)
+
+
+def ldrobot_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LdrobotTwin:
+    """The twin of a sensor of the catalogue.
+
+    Raises:
+        DeviceError: there is no twin of this model.
+    """
+    return LdrobotTwin(lidar, sight, seed=seed)
