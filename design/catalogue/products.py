@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 from pydantic import Field, PrivateAttr, model_validator
+from pydantic_core import to_jsonable_python
 
 from design.record import Record
 
@@ -46,14 +47,15 @@ class Product(Record):
     def facts(self) -> dict[str, Any]:
         """Every value, and under `provenance` where it comes from, for a program to read."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
-        return {**self.model_dump(mode="json"), "provenance": sources}
+        values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
+        return {**values, "provenance": sources}
 
     def lines(self) -> list[str]:
         """Every value with its source, in words."""
-        values = [
-            f"  {' ' if origin.verified else '?'} {field} = {json.dumps(getattr(self, field))}   [{origin.source}]"
-            for field, origin in self._provenance.items()
-        ]
+        values = []
+        for field, origin in self._provenance.items():
+            value = json.dumps(to_jsonable_python(getattr(self, field)))
+            values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
         doubt = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
         return [f"{self.name} ({self.maker})", *values, doubt]
 

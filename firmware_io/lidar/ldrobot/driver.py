@@ -86,7 +86,7 @@ class LdrobotLidar:
         self.serial_number = self.firmware = ""
         self.dropped = 0
         self._bad_before = 0
-        self._splitter = protocol.Splitter()
+        self._splitter = protocol.PacketSplitter()
         self._scanning = self._intensity = False
         self._skip = self._skipped = 0
         self._lidar = self._connect(model)
@@ -181,7 +181,7 @@ class LdrobotLidar:
             for baud in dict.fromkeys(_BAUDS[product.name] for product in named):
                 if isinstance(self._stream, SerialStream):
                     self._stream.baud = baud
-                self._splitter = protocol.Splitter()
+                self._splitter = protocol.PacketSplitter()
                 points_s = self._points_s()
                 self._splitter.bad = 0  # where we cut in is nobody's fault
                 if points_s is None:

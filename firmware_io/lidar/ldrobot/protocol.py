@@ -92,7 +92,7 @@ def packet(data: bytes) -> Packet:
     )
 
 
-class Splitter:
+class PacketSplitter:
     """Cuts packets out of a stream, whatever is between them.
 
     Attributes:
