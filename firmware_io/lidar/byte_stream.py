@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import select
 import socket
-from typing import Protocol
+import struct
+import termios
+import time
+from collections.abc import Callable
+from typing import Protocol, TypeVar
 
-from design.errors import DeviceError
+from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.serial_port import open_serial_port
 
 FIRST_BAUD = 115_200
+
+Heard = TypeVar("Heard")
 
 
 class Stream(Protocol):
@@ -44,6 +52,12 @@ class SerialStream:
     def baud(self, baud: int) -> None:
         self._port.baudrate = baud
         self._port.reset_input_buffer()
+
+    def set_dtr(self, up: bool) -> None:
+        """Raise or lower DTR; what has no such line stays as it is."""
+        with contextlib.suppress(OSError):
+            request = termios.TIOCMBIS if up else termios.TIOCMBIC
+            fcntl.ioctl(self._port.fileno(), request, struct.pack("I", termios.TIOCM_DTR))
 
     def can(self, baud: int) -> bool:
         """Whether the port takes that speed; it is as before afterwards."""
@@ -109,6 +123,54 @@ class Gone:
         # A port that we closed after it vanished is None to pyserial, and -1 to select.
         if isinstance(error, (OSError, TypeError, ValueError)):
             raise DeviceError(f"{self._name}: the connection broke ({error}); plug it in again") from error
+
+
+def next_heard(
+    stream: Stream, name: str, deadline_s: float, feed: Callable[[bytes], list[Heard]], longest: int
+) -> tuple[list[Heard], int]:
+    """What comes until something is whole, and when that came [ns, time.monotonic_ns].
+
+    Args:
+        stream: where it comes from.
+        name: of the device, in messages.
+        deadline_s: on time.monotonic.
+        feed: what the bytes make whole.
+        longest: bytes; so much that came too late, and is nothing, ends the waiting too.
+
+    Raises:
+        DeviceTimeoutError: nothing was whole in time.
+        DeviceError: the connection broke.
+    """
+    late_bytes = 0
+    while True:
+        over = time.monotonic() > deadline_s  # told before the look: what came while we were kept waiting counts
+        with Gone(name):
+            received = stream.read(deadline_s - time.monotonic())
+        arrival_ns = time.monotonic_ns()
+        found = feed(received)
+        if found:
+            return found, arrival_ns
+        late_bytes += len(received) if over else 0
+        if over and (not received or late_bytes > longest):
+            raise DeviceTimeoutError(f"{name}: nothing came in time; check power and cable")
+
+
+def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:
+    """Connect again and again until it works.
+
+    Raises:
+        DeviceError: it did not in time.
+    """
+    deadline_s = time.monotonic() + timeout_s
+    while True:
+        try:
+            connect()
+        except DeviceError as error:
+            if time.monotonic() > deadline_s:
+                raise DeviceError(f"{name}: it did not come back in {timeout_s:.1f} s; check its plug") from error
+            time.sleep(0.05)
+        else:
+            return
 
 
 def open_stream(address: str) -> Stream:

@@ -15,10 +15,13 @@ from firmware_io.installed import with_installed
 from firmware_io.lidar.ldrobot.driver import open_ldrobot
 from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
 from firmware_io.lidar.scip.driver import open_scip
+from firmware_io.lidar.slamtec.driver import open_slamtec
 
+# where no model is named they are tried in this order: who only listens first
 FAMILIES = (
     LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "firmware_io.twins.ldrobot:ldrobot_twin"),
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "firmware_io.twins.slamtec:slamtec_twin"),
 )
 
 

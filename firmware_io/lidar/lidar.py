@@ -47,13 +47,15 @@ class LidarDriver(Protocol):
     address: str
     serial_number: str
     firmware: str
-    dropped: int
 
     @property
     def model(self) -> str: ...  # noqa: D102
 
     @property
     def scan_rate_hz(self) -> float: ...  # noqa: D102
+
+    @property
+    def dropped(self) -> int: ...  # noqa: D102
 
     @property
     def bad_packets(self) -> int: ...  # noqa: D102

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +15,15 @@ from firmware_io.lidar.arrival_line import ArrivalLine
 from firmware_io.lidar.lidar import TimedScan
 from firmware_io.samples import Scan
 
+_BACK_DEG = 10.0  # by which the angle of a point may lie before that of the one before it
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
     """Consecutive points of a sensor that turns clockwise, as seen from above.
 
     Attributes:
-        angle_deg: clockwise from its front, 0 to 360, shape (n,).
+        angle_deg: clockwise from its front, shape (n,).
         range_m: NaN where nothing came back, shape (n,).
         intensity: as it tells them, shape (n,).
         sensor_ns: when each was measured, on a clock that runs evenly, shape (n,).
@@ -36,7 +40,11 @@ class Points:
 
 
 class TurnCutter:
-    """Cuts a stream of points where it passes the front; the turn in which it begins is not whole, and left out."""
+    """Cuts a stream of points where it passes the front; the turn in which it begins is not whole, and left out.
+
+    Sensors that triangulate tell angles that go to and fro a little: a turn is over where its front is passed first,
+    and angles count on from there, so that a turn may begin a little before 0 and end a little behind 360.
+    """
 
     def __init__(self) -> None:
         self._parts: list[Points] | None = None
@@ -45,17 +53,58 @@ class TurnCutter:
     def add(self, points: Points) -> list[Points]:
         """The turns that these points end."""
         before_deg = points.angle_deg[0] if self._last_deg is None else self._last_deg
-        behind = np.diff(points.angle_deg, prepend=before_deg) < -180
-        self._last_deg = float(points.angle_deg[-1])
+        steps_deg = (np.diff(points.angle_deg, prepend=before_deg) + _BACK_DEG) % 360 - _BACK_DEG
+        counted_deg = before_deg + np.cumsum(steps_deg)
+        turn = np.maximum.accumulate(np.maximum(np.floor(counted_deg / 360), 0))
+        angle_deg = counted_deg - 360 * turn
+        self._last_deg = float(angle_deg[-1])
+        counted = Points(angle_deg, points.range_m, points.intensity, points.sensor_ns)
         turns = []
         begin = 0
-        for end in np.flatnonzero(behind):
+        for end in np.flatnonzero(np.diff(turn, prepend=0) > 0).tolist():
             if self._parts is not None:
-                turns.append(_joined([*self._parts, points.part(slice(begin, end))]))
-            self._parts, begin = [], int(end)
+                turns.append(_joined([*self._parts, counted.part(slice(begin, end))]))
+            self._parts, begin = [], end
         if self._parts is not None:
-            self._parts.append(points.part(slice(begin, None)))
+            self._parts.append(counted.part(slice(begin, None)))
         return turns
+
+
+class TurnQueue:
+    """Turns that wait to be read.
+
+    Attributes:
+        dropped: turns that are missing between those that were handed out or left out.
+    """
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self.begin_anew(0)
+
+    def begin_anew(self, skip: int) -> None:
+        """What comes next does not continue what came; of the turns that come `skip` are left out between two."""
+        self._cutter = TurnCutter()
+        self._waiting: deque[tuple[Points, int]] = deque()
+        self._end_ns = math.nan
+        self._skip = self._skipped = skip
+
+    def add(self, points: Points, arrival_ns: int) -> None:
+        """Points that came together."""
+        self._waiting.extend((turn, arrival_ns) for turn in self._cutter.add(points))
+
+    def next(self) -> tuple[Points, int] | None:
+        """The next turn and when its last points came; None where none is whole yet."""
+        while self._waiting:
+            turn, arrival_ns = self._waiting.popleft()
+            begin_ns, end_ns = float(turn.sensor_ns[0]), float(turn.sensor_ns[-1])
+            if not math.isnan(self._end_ns) and end_ns > begin_ns:
+                self.dropped += max(round((begin_ns - self._end_ns) / (end_ns - begin_ns)), 0)
+            self._end_ns = end_ns
+            self._skipped += 1
+            if self._skipped > self._skip:
+                self._skipped = 0
+                return turn, arrival_ns
+        return None
 
 
 def timed_scan(turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, *, intensity: bool) -> TimedScan:

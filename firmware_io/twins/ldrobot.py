@@ -11,18 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Floats
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
 from firmware_io.twins.lidar_line import LidarLine, Sight
+from firmware_io.twins.world import turned_deg
 
 BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
 _POINTS = 12
 _BYTES = 47
 _BACKLOG = 1 << 10
 _CHUNK_NS = 8_000_000  # measured at once: a ray alone costs as much as a hundred
-_WANDER = 0.01  # of the speed, to and fro in `_WANDER_S` [assumed]
-_WANDER_S = 1.7
 _BOOT_NS = 1_000_000_000  # [assumed]
 
 
@@ -92,9 +90,9 @@ class LdrobotMachine:
         """Packets of the next milliseconds."""
         number = _POINTS * self._packet + np.arange(_POINTS * self._together)
         since_ns = number * self.point_ns
-        turned_deg, speed_deg_s = self._turned(since_ns / 1e9)
+        angle_deg, speed_deg_s = turned_deg(self.lidar.scan_rate_hz, since_ns / 1e9)
         time_ns = self.began_ns + np.rint(since_ns).astype(np.int64)
-        range_m, intensity = self.sight(time_ns, -np.radians(turned_deg % 360))  # clockwise
+        range_m, intensity = self.sight(time_ns, -np.radians(angle_deg % 360))  # clockwise
         measured = np.isfinite(range_m) & (range_m > 0) & (range_m < 65.0)
         range_mm = np.where(measured, np.rint(np.where(measured, range_m, 0) * 1e3), 0).astype(int)
         level = np.where(measured, np.clip(np.nan_to_num(intensity) / 16, 1, 255), 0).astype(int)
@@ -103,7 +101,7 @@ class LdrobotMachine:
             last = first + _POINTS - 1
             stamp_ms = self.first_ms + math.floor(since_ns[last] * (1 + self.rate_error) / 1e6)
             points = np.stack([range_mm, level], axis=1)[first : last + 1].tolist()
-            data = write_packet(speed_deg_s[first], turned_deg[first], turned_deg[last], stamp_ms, points)
+            data = write_packet(speed_deg_s[first], angle_deg[first], angle_deg[last], stamp_ms, points)
             packets.append((int(time_ns[last]) + round(_BYTES * 10 / self.baud * 1e9), data))
         self._packet += self._together
         return packets
@@ -120,12 +118,6 @@ class LdrobotMachine:
     @property
     def _together(self) -> int:
         return max(round(_CHUNK_NS / (_POINTS * self.point_ns)), 1)
-
-    def _turned(self, since_s: Floats) -> tuple[Floats, Floats]:
-        """Angle [deg] that the motor has turned by, and its speed [deg/s]."""
-        usual_deg_s, phase = 360 * self.lidar.scan_rate_hz, 2 * np.pi * since_s / _WANDER_S
-        wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
-        return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
 
 
 class LdrobotTwin(LidarLine):

@@ -21,6 +21,8 @@ from design.errors import TaskError
 from design.scene.ray_caster import Hits, Scene, cast
 
 _MOST_NOISE_MM = 1e5
+_WANDER = 0.01
+_WANDER_S = 1.7
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,16 @@ def looking(
         return measured.range_m, measured.intensity
 
     return look
+
+
+def turned_deg(rate_hz: float, since_s: Floats) -> tuple[Floats, Floats]:
+    """Angle [deg] that the motor of a cheap sensor has turned by, and its speed [deg/s]: it wanders by a hundredth.
+
+    How much and how fast is assumed: no maker says.
+    """
+    usual_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _WANDER_S
+    wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
+    return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
 
 
 def furnished_room() -> Float64[ndarray, "triangles 3 3"]:

@@ -17,10 +17,10 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.byte_stream import Gone, SerialStream, open_stream
+from firmware_io.lidar.byte_stream import SerialStream, next_heard, open_stream, until_back
 from firmware_io.lidar.ldrobot import protocol
 from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.turn import Points, TurnCutter, timed_scan
+from firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
 
@@ -73,7 +73,6 @@ class LdrobotLidar:
         address: where it was found.
         serial_number: empty, as it tells none.
         firmware: empty, as it tells none.
-        dropped: turns that are missing between those that were read.
     """
 
     def __init__(self, address: str, model: str | None = None) -> None:
@@ -84,11 +83,11 @@ class LdrobotLidar:
         """
         self.address = address
         self.serial_number = self.firmware = ""
-        self.dropped = 0
         self._bad_before = 0
         self._splitter = protocol.PacketSplitter()
         self._scanning = self._intensity = False
-        self._skip = self._skipped = 0
+        self._skip = 0
+        self._turns = TurnQueue()
         self._lidar = self._connect(model)
         self._begin_anew()
 
@@ -109,6 +108,11 @@ class LdrobotLidar:
     def scan_rate_hz(self) -> float:
         """Turns per second, by the catalogue: it holds them to some parts in a hundred."""
         return self._lidar.scan_rate_hz
+
+    @property
+    def dropped(self) -> int:
+        """Turns that are missing between those that were read."""
+        return self._turns.dropped
 
     @property
     def bad_packets(self) -> int:
@@ -136,15 +140,11 @@ class LdrobotLidar:
         if not self._scanning:
             raise DeviceError(f"{self._name()}: not started")
         deadline = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
-        while True:
-            while self._turns:
-                turn, arrival_ns = self._turns.popleft()
-                self._count_missing(turn)
-                self._skipped = (self._skipped + 1) % (self._skip + 1)
-                if self._skipped == 0:
-                    return timed_scan(turn, self._line, self._lidar, arrival_ns, intensity=self._intensity)
-            for packet, arrival_ns in self._packets(deadline):
+        while (turn := self._turns.next()) is None:
+            packets, arrival_ns = self._packets(deadline)
+            for packet in packets:
                 self._take(packet, arrival_ns)
+        return timed_scan(turn[0], self._line, self._lidar, turn[1], intensity=self._intensity)
 
     def stop(self) -> None:
         """Hand out no more; its laser stays on as long as it has power."""
@@ -157,19 +157,12 @@ class LdrobotLidar:
             DeviceError: nothing talks there in time.
         """
         self._stream.close()
-        deadline = time.monotonic() + timeout_s
-        while True:
-            try:
-                self._lidar = self._connect(self.model)
-            except DeviceError:
-                if time.monotonic() > deadline:
-                    raise DeviceError(
-                        f"{self._name()}: it did not come back in {timeout_s:.1f} s; check its plug"
-                    ) from None
-                time.sleep(0.05)
-            else:
-                self._begin_anew()
-                return
+
+        def connect() -> None:
+            self._lidar = self._connect(self.model)
+
+        until_back(self._name(), timeout_s, connect)
+        self._begin_anew()
 
     def _connect(self, model: str | None) -> Lidar:
         """Open the port and hear who talks, at whatever speed."""
@@ -205,10 +198,10 @@ class LdrobotLidar:
         told: list[float] = []
         while len(told) < _FIRST:
             try:
-                packets = self._packets(deadline)
+                packets, _ = self._packets(deadline)
             except DeviceTimeoutError:
                 return None
-            told += [packet.speed_deg_s / packet.step_deg for packet, _ in packets if packet.step_deg > 0]
+            told += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
         return float(np.median(told)) or None
 
     def _begin_anew(self) -> None:
@@ -218,11 +211,8 @@ class LdrobotLidar:
             smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9), rate_max=_RATE_MAX, grain_ns=_GRAIN_NS
         )
         self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)
-        self._cutter = TurnCutter()
-        self._turns: deque[tuple[Points, int]] = deque()
+        self._turns.begin_anew(self._skip)
         self._next_deg = self._last_ns = math.nan
-        self._turn_ns = math.nan
-        self._skipped = self._skip
 
     def _take(self, packet: protocol.Packet, arrival_ns: int) -> None:
         span_deg = packet.step_deg * protocol.POINTS
@@ -243,29 +233,11 @@ class LdrobotLidar:
         self._line.add(sensor_ns, arrival_ns)
         before_ns = np.arange(1 - protocol.POINTS, 1) * (1e9 / _points_s(self._lidar))
         points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
-        self._turns.extend((turn, arrival_ns) for turn in self._cutter.add(points))
+        self._turns.add(points, arrival_ns)
 
-    def _count_missing(self, turn: Points) -> None:
-        """Count the turns between this one and the last, by the time between them."""
-        begin_ns, end_ns = float(turn.sensor_ns[0]), float(turn.sensor_ns[-1])
-        if not math.isnan(self._turn_ns):
-            self.dropped += max(round((begin_ns - self._turn_ns) / (end_ns - begin_ns)), 0)
-        self._turn_ns = end_ns
-
-    def _packets(self, deadline: float) -> list[tuple[protocol.Packet, int]]:
+    def _packets(self, deadline: float) -> tuple[list[protocol.Packet], int]:
         """What has come, at least one packet, and when it came."""
-        late_bytes = 0
-        while True:
-            over = time.monotonic() > deadline  # told before the look: what came while we were kept waiting counts
-            with Gone(self._name()):
-                received = self._stream.read(deadline - time.monotonic())
-            arrival_ns = time.monotonic_ns()
-            packets = self._splitter.feed(received)
-            if packets:
-                return [(packet, arrival_ns) for packet in packets]
-            late_bytes += len(received) if over else 0
-            if over and (not received or late_bytes > 2 * protocol.SIZE):
-                raise DeviceTimeoutError(f"{self._name()}: nothing came in time; check power and cable")
+        return next_heard(self._stream, self._name(), deadline, self._splitter.feed, 2 * protocol.SIZE)
 
     def _name(self) -> str:
         return f"{self.address}: lidar"

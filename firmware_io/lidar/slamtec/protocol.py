@@ -1,0 +1,230 @@
+"""What Slamtec lidars are told and say: pure functions of bytes. Numbers are little-endian, angles grow clockwise.
+
+A request is A5 and a command; with a payload its length and the exclusive or of all before it follow. A reply begins
+with a descriptor: A5 5A, length (30 bits) with the mode in its two highest bits, and a type. Streams have no descriptor
+but the first: nodes of 5 bytes, or capsules of 84.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from operator import xor
+from typing import Final
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
+
+from design.arrays import Float32s
+from design.errors import ProtocolError
+
+STOP: Final = 0x25
+SCAN: Final = 0x20
+INFO: Final = 0x50
+HEALTH: Final = 0x52
+SAMPLE_TIMES: Final = 0x59
+EXPRESS_SCAN: Final = 0x82
+GET_CONF: Final = 0x84
+MOTOR_PWM: Final = 0xF0
+MOTOR_RPM: Final = 0xA8
+
+NODES: Final = 0x81
+CAPSULES: Final = 0x82
+DENSE: Final = 0x85
+
+CONF_SAMPLE_US: Final = 0x71
+CONF_ANSWER: Final = 0x75
+CONF_TYPICAL: Final = 0x7C
+
+_CAPSULE_SIZE = 84
+_NODE_SIZE = 5
+SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, DENSE: _CAPSULE_SIZE}
+POINTS: Final = {NODES: 1, CAPSULES: 32, DENSE: 40}
+_CABINS = np.dtype([("distance", "<u2", 2), ("offsets", "u1")])
+
+
+@dataclass(frozen=True, slots=True)
+class Descriptor:
+    """What comes: bytes of one reply or packet, whether packets follow without end, and of which type."""
+
+    size: int
+    stream: bool
+    kind: int
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """Who answers: byte of the model (its higher half the series), firmware and serial number."""
+
+    model: int
+    firmware: str
+    serial_number: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packet:
+    """What one packet of a stream tells.
+
+    Attributes:
+        start_deg: clockwise from the front.
+        first: whether the stream begins, or of a node, whether a turn does.
+        range_m: shape (n,), NaN where nothing came back.
+        quality: shape (n,), 0 in capsules, which tell none.
+        offset_deg: by how much each point lies before its place between this start and the next, shape (n,).
+    """
+
+    start_deg: float
+    first: bool
+    range_m: Float32s
+    quality: Float32s
+    offset_deg: Float64[ndarray, " n"]
+
+
+def request(command: int, payload: bytes = b"") -> bytes:
+    """A command, with its payload and their sum where it takes one."""
+    head = bytes([0xA5, command])
+    if not command & 0x80:
+        return head
+    body = head + bytes([len(payload)]) + payload
+    return body + bytes([reduce(xor, body)])
+
+
+def descriptor(data: bytes) -> Descriptor:
+    """What the 7 bytes before a reply say.
+
+    Raises:
+        ProtocolError: they are no descriptor.
+    """
+    if len(data) != 7 or data[:2] != b"\xa5\x5a":
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no descriptor")
+    word, kind = struct.unpack_from("<IB", data, 2)
+    return Descriptor(word & 0x3FFF_FFFF, bool(word >> 30 & 1), kind)
+
+
+def info(data: bytes) -> Info:
+    """The reply to INFO.
+
+    Raises:
+        ProtocolError: it has not 20 bytes.
+    """
+    if len(data) != 20:
+        raise ProtocolError(f"RPLIDAR: {len(data)} bytes about itself, not 20")
+    return Info(data[0], f"{data[2]}.{data[1]:02d}", data[4:].hex().upper())
+
+
+def health(data: bytes) -> tuple[int, int]:
+    """The reply to HEALTH: 0 good, 1 a warning, 2 a fault; and its number.
+
+    Raises:
+        ProtocolError: it has not 3 bytes, or says something else.
+    """
+    if len(data) != 3 or data[0] > 2:
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no state of health")
+    return data[0], data[1] | data[2] << 8
+
+
+def node(data: bytes) -> Packet:
+    """A node: one point with its own angle.
+
+    Raises:
+        ProtocolError: its check bits are wrong.
+    """
+    if len(data) != _NODE_SIZE or (data[0] ^ data[0] >> 1) & 1 == 0 or not data[1] & 1:
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no node")
+    angle, distance = struct.unpack_from("<HH", data, 1)
+    if angle >> 1 > 360 * 64 + 64:
+        raise ProtocolError(f"RPLIDAR: a node at {(angle >> 1) / 64:.1f} deg")
+    return Packet(
+        start_deg=(angle >> 1) / 64 % 360,
+        first=bool(data[0] & 1),
+        range_m=_ranges_m(np.array([distance / 4])),
+        quality=np.array([data[0] >> 2], np.float32),
+        offset_deg=np.zeros(1),
+    )
+
+
+def capsule(data: bytes) -> Packet:
+    """An express capsule: 32 points between its start and the next one's.
+
+    Raises:
+        ProtocolError: it does not begin as one, or its sum is wrong.
+    """
+    start_deg, first = _capsule_start(data)
+    cabins = np.frombuffer(data, _CABINS, 16, 4)
+    distance = cabins["distance"].astype(np.int64)
+    low = np.stack([cabins["offsets"] & 0xF, cabins["offsets"] >> 4], axis=1).astype(np.int64)
+    offset = low | (distance & 3) << 4
+    offset -= (offset & 0x20) << 1  # six bits with a sign, eighths of a degree
+    return Packet(
+        start_deg, first, _ranges_m((distance >> 2).ravel()), np.zeros(32, np.float32), (offset / 8.0).ravel()
+    )
+
+
+def dense(data: bytes) -> Packet:
+    """A dense capsule: 40 points, evenly between its start and the next one's.
+
+    Raises:
+        ProtocolError: it does not begin as one, or its sum is wrong.
+    """
+    start_deg, first = _capsule_start(data)
+    range_mm = np.frombuffer(data, "<u2", 40, 4)
+    return Packet(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
+
+
+_READ: dict[int, Callable[[bytes], Packet]] = {NODES: node, CAPSULES: capsule, DENSE: dense}
+
+
+class Splitter:
+    """Cuts the packets of one type out of a stream, whatever is between them.
+
+    Attributes:
+        bad: packets that were lost to something else.
+    """
+
+    def __init__(self, kind: int) -> None:
+        self.bad = 0
+        self._size, self._read = SIZES[kind], _READ[kind]
+        self._rest = b""
+        self._passed = 0
+
+    def feed(self, data: bytes) -> list[tuple[Packet, int]]:
+        """The packets that these bytes complete, each with how many bytes were passed over before it."""
+        self._rest += data
+        found: list[tuple[Packet, int]] = []
+        at = 0
+        while at + self._size <= len(self._rest):
+            try:
+                packet = self._read(self._rest[at : at + self._size])
+                if self._passed and self._size == _NODE_SIZE:  # two bits tell a node: believed where three follow
+                    if at + 4 * _NODE_SIZE > len(self._rest):
+                        break
+                    for following in range(at + _NODE_SIZE, at + 4 * _NODE_SIZE, _NODE_SIZE):
+                        self._read(self._rest[following : following + _NODE_SIZE])
+            except ProtocolError:
+                self.bad += self._passed % self._size == 0
+                self._passed += 1
+                at += 1
+            else:
+                found.append((packet, self._passed))
+                self._passed = 0
+                at += self._size
+        self._rest = self._rest[at:]
+        return found
+
+
+def _capsule_start(data: bytes) -> tuple[float, bool]:
+    if len(data) != _CAPSULE_SIZE or data[0] >> 4 != 0xA or data[1] >> 4 != 0x5:
+        raise ProtocolError(f"RPLIDAR: {len(data)} bytes that begin with {data[:2].hex()}: no capsule")
+    if reduce(xor, data[2:]) != (data[0] & 0xF | (data[1] & 0xF) << 4):
+        raise ProtocolError("RPLIDAR: the sum of a capsule is wrong")
+    word = data[2] | data[3] << 8
+    if word & 0x7FFF > 360 * 64 + 64:
+        raise ProtocolError(f"RPLIDAR: a capsule at {(word & 0x7FFF) / 64:.1f} deg")
+    return (word & 0x7FFF) / 64 % 360, bool(word & 0x8000)
+
+
+def _ranges_m(range_mm: ndarray) -> Float32s:
+    return np.where(range_mm > 0, range_mm / 1e3, np.nan).astype(np.float32)

@@ -1,0 +1,218 @@
+"""RPLIDARs: bytes against published ones, the driver against the twin, whatever breaks on the way."""
+
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given, seed, settings
+from hypothesis import strategies as st
+
+from design.catalogue.catalogue import load_catalogue
+from design.errors import DeviceError, ProtocolError
+from firmware_io.lidar.families import open_lidar
+from firmware_io.lidar.slamtec import driver, protocol
+from firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
+
+# What the maker's protocol manual and SDK write.
+REQUESTS = [
+    (protocol.INFO, b"", "A5 50"),
+    (protocol.HEALTH, b"", "A5 52"),
+    (protocol.SCAN, b"", "A5 20"),
+    (protocol.EXPRESS_SCAN, bytes(5), "A5 82 05 00 00 00 00 00 22"),
+    (protocol.MOTOR_PWM, b"\x94\x02", "A5 F0 02 94 02 C1"),
+    (protocol.MOTOR_PWM, bytes(2), "A5 F0 02 00 00 57"),
+    (protocol.MOTOR_RPM, b"\x58\x02", "A5 A8 02 58 02 55"),
+    (protocol.GET_CONF, b"\x70\0\0\0", "A5 84 04 70 00 00 00 55"),
+    (protocol.GET_CONF, b"\x7c\0\0\0", "A5 84 04 7C 00 00 00 59"),
+]
+DESCRIPTORS = [
+    ("A5 5A 14 00 00 00 04", protocol.Descriptor(20, False, 0x04)),
+    ("A5 5A 03 00 00 00 06", protocol.Descriptor(3, False, 0x06)),
+    ("A5 5A 04 00 00 00 15", protocol.Descriptor(4, False, 0x15)),
+    ("A5 5A 05 00 00 40 81", protocol.Descriptor(5, True, 0x81)),
+    ("A5 5A 54 00 00 40 82", protocol.Descriptor(84, True, 0x82)),
+]
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Twins share a computer with the tests: ten times as long; what old firmware leaves unanswered is waited for."""
+    monkeypatch.setattr(driver, "_ANSWER_S", 2.0)
+    monkeypatch.setattr(driver, "_TURN_S", 20.0)
+
+
+def lidar(model):
+    return load_catalogue().products[model]
+
+
+def wall_m(bearing_rad):
+    return 2.0 + np.sin(bearing_rad)
+
+
+def sight(time_ns, bearing_rad):
+    gap = np.abs(np.remainder(bearing_rad + np.pi, 2 * np.pi) - np.pi) > 3.0
+    return np.where(gap, np.inf, wall_m(bearing_rad)), np.full(time_ns.size, 800.0)
+
+
+# Bytes
+
+
+@pytest.mark.parametrize(("command", "payload", "published"), REQUESTS)
+def test_requests_are_those_that_are_published(command, payload, published):
+    assert protocol.request(command, payload) == bytes.fromhex(published)
+
+
+@pytest.mark.parametrize(("published", "told"), DESCRIPTORS)
+def test_descriptors_are_those_that_are_published(published, told):
+    assert protocol.descriptor(bytes.fromhex(published)) == told
+
+
+def test_a_twin_answers_published_requests_with_published_descriptors():
+    twin = SlamtecTwin(lidar("RPLIDAR A1"), sight)
+    for request, published, size in (("A5 50", DESCRIPTORS[0], 20), ("A5 52", DESCRIPTORS[1], 3)):
+        told, rest = twin.machine.hear(bytes.fromhex(request), twin.machine.began_ns)
+        assert told[:7] == bytes.fromhex(published[0]) and (len(told), rest) == (7 + size, b"")
+    wrong, _ = twin.machine.hear(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), twin.machine.began_ns)
+    assert wrong == b""
+
+
+def test_a_node_is_read_by_its_bits():
+    # quality 15, a new turn, 90 deg, 1234.5 mm
+    angle = 90 * 64 << 1 | 1
+    data = bytes([15 << 2 | 1, angle & 255, angle >> 8, 4938 & 255, 4938 >> 8])
+    packet = protocol.node(data)
+    assert (packet.start_deg, packet.first, packet.quality[0]) == (90.0, True, 15)
+    assert packet.range_m[0] == np.float32(1.2345)
+    for broken in (bytes([data[0] ^ 2]) + data[1:], data[:1] + bytes([data[1] ^ 1]) + data[2:], data[:4]):
+        with pytest.raises(ProtocolError):
+            protocol.node(broken)
+
+
+def test_a_cabin_is_read_by_its_bits():
+    # 1000 mm with +2.5 deg (20 eighths: 01 0100), 2000 mm with -1 deg (-8: 11 1000); start 350.5 deg, the first
+    cabin = (1000 << 2 | 0b01).to_bytes(2, "little") + (2000 << 2 | 0b11).to_bytes(2, "little") + bytes([0b1000_0100])
+    body = (round(350.5 * 64) | 0x8000).to_bytes(2, "little") + cabin * 16
+    total = int(np.bitwise_xor.reduce(np.frombuffer(body, np.uint8)))
+    packet = protocol.capsule(bytes([0xA0 | total & 15, 0x50 | total >> 4]) + body)
+    assert (packet.start_deg, packet.first) == (350.5, True)
+    np.testing.assert_array_equal(packet.range_m[:2], np.float32([1.0, 2.0]))
+    np.testing.assert_array_equal(packet.offset_deg[:4], [2.5, -1.0, 2.5, -1.0])
+
+
+def stream_of(model, turns=0.3):
+    twin = SlamtecTwin(lidar(model), sight)
+    start = protocol.request(protocol.SCAN if model == "RPLIDAR C1" else protocol.EXPRESS_SCAN, bytes(5))
+    twin.machine.hear(start, twin.machine.began_ns)
+    data = b""
+    while len(data) < 84 * 12 * turns:
+        data += b"".join(packet for _, packet in twin.machine.next_packets())
+    return data
+
+
+STREAMS = {model: stream_of(model) for model in ("RPLIDAR C1", "RPLIDAR A1", "RPLIDAR S2")}
+
+
+@seed(19)
+@settings(max_examples=300, deadline=None)
+@given(st.sampled_from(sorted(STREAMS)), st.data())
+def test_damaged_streams_give_packets_or_nothing(model, data):
+    kind = IDENTITIES[model].stream
+    stream = bytearray(STREAMS[model])
+    for _ in range(data.draw(st.integers(0, 12))):
+        at = data.draw(st.integers(0, len(stream) - 1))
+        what = data.draw(st.integers(0, 2))
+        if what == 0:
+            stream[at] = data.draw(st.integers(0, 255))
+        elif what == 1:
+            del stream[at : at + data.draw(st.integers(1, 60))]
+        else:
+            stream[at:at] = data.draw(st.binary(max_size=60))
+        stream = stream or bytearray(b"\xa5")
+    splitter = protocol.Splitter(kind)
+    for packet, _ in splitter.feed(bytes(stream)):
+        assert packet.range_m.size == protocol.POINTS[kind] and 0 <= packet.start_deg < 360
+    assert len(splitter.feed(STREAMS[model])) >= len(STREAMS[model]) // protocol.SIZES[kind] - 30
+
+
+READERS = [protocol.descriptor, protocol.info, protocol.health, protocol.node, protocol.capsule, protocol.dense]
+
+
+@seed(19)
+@settings(max_examples=300)
+@given(st.sampled_from(READERS), st.binary())
+def test_anything_is_an_answer_or_a_typed_error(read, data):
+    with suppress(ProtocolError):
+        read(data)
+
+
+# The driver
+
+
+@pytest.mark.parametrize("model", sorted(IDENTITIES))
+def test_turns_come_as_they_were_seen(model):
+    with SlamtecTwin(lidar(model), sight) as twin, open_lidar(twin.port, model) as ours:
+        assert ours.model == model and ours.firmware == "1.29" and len(ours.serial_number) == 32
+        ours.start(intensity=True)
+        timed = [ours.read() for _ in range(5)]
+        assert (ours.bad_packets, ours.dropped) == (0, 0)
+    usual = IDENTITIES[model].points_s / lidar(model).scan_rate_hz
+    for one in timed:
+        scan = one.scan
+        assert 0.9 * usual < scan.range_m.size < 1.1 * usual
+        lost = np.isnan(scan.range_m)
+        assert 0.02 < lost.mean() < 0.07
+        # angles are told in sixty-fourths, and between two starts straight
+        np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=1.5e-3)
+        assert scan.time_ns[-1] < one.arrival_ns
+    assert twin.machine.scanning is None  # `with` puts it out
+
+
+def test_another_model_is_refused_and_none_named_is_found():
+    with SlamtecTwin(lidar("RPLIDAR A1"), sight) as twin:
+        with pytest.raises(DeviceError, match="this is a RPLIDAR A1, not a RPLIDAR C1"):
+            open_lidar(twin.port, "RPLIDAR C1")
+        with driver.open_slamtec(twin.port) as ours:
+            assert ours.model == "RPLIDAR A1"
+
+
+@pytest.mark.parametrize("model", ["RPLIDAR A2", "RPLIDAR S2"])
+def test_bad_capsules_are_counted_and_never_handed_out(model):
+    with SlamtecTwin(lidar(model), sight) as twin, open_lidar(twin.port, model) as ours:
+        ours.start()
+        ours.read()
+        twin.garble(4)
+        twin.cut(4)
+        for _ in range(4):
+            scan = ours.read().scan
+            seen = ~np.isnan(scan.range_m)
+            np.testing.assert_allclose(scan.range_m[seen], wall_m(scan.bearing_rad[seen]), atol=1.5e-3)
+        assert 4 <= ours.bad_packets <= 20
+
+
+def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
+    with SlamtecTwin(lidar("RPLIDAR C1"), sight) as twin:
+        twin.machine.hear(protocol.request(protocol.SCAN), time.monotonic_ns())
+        with open_lidar(twin.port, "RPLIDAR C1") as ours:
+            ours.start()
+            ours.read()
+            twin.unplug()
+            with pytest.raises(DeviceError):
+                for _ in range(5):
+                    ours.read(0.3)
+            twin.plug()
+            ours.reconnect(20.0)
+            assert ours.read().scan.range_m.size > 400
+            twin.power_cycle()
+            with pytest.raises(DeviceError, match="nothing came in time"):
+                for _ in range(9):
+                    ours.read(0.1)
+            ours.reconnect(20.0)
+            assert ours.read().scan.range_m.size > 400
+
+
+def test_a_fault_is_told():
+    with SlamtecTwin(lidar("RPLIDAR S1"), sight) as twin, open_lidar(twin.port, "RPLIDAR S1") as ours:
+        twin.machine.health = 2
+        with pytest.raises(DeviceError, match="it reports fault 0x8002"):
+            ours.start()
