@@ -26,7 +26,7 @@ _STANDARD, _EXPRESS, _DENSE = 0x81, 0x82, 0x85
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
+class SlamtecIdentity:
     """What tells one model from another: the byte of INFO, its line, its typical stream, points in a second.
 
     `modes` tells whether it knows its modes (GET_CONF); older firmware stays silent.
@@ -40,12 +40,12 @@ class Identity:
 
 
 IDENTITIES = {
-    "RPLIDAR A1": Identity(0x18, 115_200, _EXPRESS, 8000, modes=False),
-    "RPLIDAR A2": Identity(0x2C, 256_000, _EXPRESS, 16_000),
-    "RPLIDAR A3": Identity(0x31, 256_000, _DENSE, 16_000),  # ultra capsules, which are typical, are left out
-    "RPLIDAR S1": Identity(0x61, 256_000, _EXPRESS, 9200),
-    "RPLIDAR S2": Identity(0x71, 1_000_000, _DENSE, 32_000),
-    "RPLIDAR C1": Identity(0x41, 460_800, _STANDARD, 5000),  # 4 for its series is assumed
+    "RPLIDAR A1": SlamtecIdentity(0x18, 115_200, _EXPRESS, 8000, modes=False),
+    "RPLIDAR A2": SlamtecIdentity(0x2C, 256_000, _EXPRESS, 16_000),
+    "RPLIDAR A3": SlamtecIdentity(0x31, 256_000, _DENSE, 16_000),  # ultra capsules, which are typical, are left out
+    "RPLIDAR S1": SlamtecIdentity(0x61, 256_000, _EXPRESS, 9200),
+    "RPLIDAR S2": SlamtecIdentity(0x71, 1_000_000, _DENSE, 32_000),
+    "RPLIDAR C1": SlamtecIdentity(0x41, 460_800, _STANDARD, 5000),  # 4 for its series is assumed
 }
 _TOGETHER = {_STANDARD: 8, _EXPRESS: 32, _DENSE: 40}  # points in a packet; nodes are written some at a time
 

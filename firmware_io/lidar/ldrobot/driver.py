@@ -84,7 +84,7 @@ class LdrobotLidar:
         self.address = address
         self.serial_number = self.firmware = ""
         self._bad_before = 0
-        self._splitter = protocol.PacketSplitter()
+        self._splitter = protocol.LdrobotSplitter()
         self._scanning = self._intensity = False
         self._skip = 0
         self._turns = TurnQueue()
@@ -174,7 +174,7 @@ class LdrobotLidar:
             for baud in dict.fromkeys(_BAUDS[product.name] for product in named):
                 if isinstance(self._stream, SerialStream):
                     self._stream.baud = baud
-                self._splitter = protocol.PacketSplitter()
+                self._splitter = protocol.LdrobotSplitter()
                 points_s = self._points_s()
                 self._splitter.bad = 0  # where we cut in is nobody's fault
                 if points_s is None:
@@ -214,7 +214,7 @@ class LdrobotLidar:
         self._turns.begin_anew(self._skip)
         self._next_deg = self._last_ns = math.nan
 
-    def _take(self, packet: protocol.Packet, arrival_ns: int) -> None:
+    def _take(self, packet: protocol.LdrobotPacket, arrival_ns: int) -> None:
         span_deg = packet.step_deg * protocol.POINTS
         most_deg = 1.5 * protocol.POINTS * packet.speed_deg_s / _points_s(self._lidar)
         if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
@@ -235,7 +235,7 @@ class LdrobotLidar:
         points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
         self._turns.add(points, arrival_ns)
 
-    def _packets(self, deadline: float) -> tuple[list[protocol.Packet], int]:
+    def _packets(self, deadline: float) -> tuple[list[protocol.LdrobotPacket], int]:
         """What has come, at least one packet, and when it came."""
         return next_heard(self._stream, self._name(), deadline, self._splitter.feed, 2 * protocol.SIZE)
 

@@ -26,7 +26,7 @@ _POINT = np.dtype([("range_mm", "<u2"), ("intensity", "u1")])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Packet:
+class LdrobotPacket:
     """What one packet tells.
 
     Attributes:
@@ -66,7 +66,7 @@ def crc8(data: bytes) -> int:
     return crc
 
 
-def packet(data: bytes) -> Packet:
+def packet(data: bytes) -> LdrobotPacket:
     """What the 47 bytes of a packet tell.
 
     Raises:
@@ -82,7 +82,7 @@ def packet(data: bytes) -> Packet:
         raise ProtocolError(f"LDROBOT: a packet from {start} to {end} (0.01 deg) at {stamp} ms")
     step_deg = (end - start) % _TURN / 100 / (POINTS - 1)
     points = np.frombuffer(data, _POINT, POINTS, 6)
-    return Packet(
+    return LdrobotPacket(
         speed_deg_s=speed,
         angle_deg=(start / 100 + step_deg * np.arange(POINTS)) % 360,
         step_deg=step_deg,
@@ -92,7 +92,7 @@ def packet(data: bytes) -> Packet:
     )
 
 
-class PacketSplitter:
+class LdrobotSplitter:
     """Cuts packets out of a stream, whatever is between them.
 
     Attributes:
@@ -104,10 +104,10 @@ class PacketSplitter:
         self._rest = b""
         self._passed = 0
 
-    def feed(self, data: bytes) -> list[Packet]:
+    def feed(self, data: bytes) -> list[LdrobotPacket]:
         """The packets that these bytes complete."""
         self._rest += data
-        found: list[Packet] = []
+        found: list[LdrobotPacket] = []
         at = 0
         while at + SIZE <= len(self._rest):
             try:

@@ -83,12 +83,12 @@ class SlamtecLidar:
         self.address = address
         self.serial_number = self.firmware = ""
         self._bad_before = 0
-        self._splitter = protocol.Splitter(protocol.CAPSULES)
+        self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
         self._scanning = self._intensity = False
         self._skip = 0
         self._rest = b""
-        self._heard: list[tuple[protocol.Packet, int]] = []
+        self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
         self._connect(model)
 
     def __enter__(self) -> SlamtecLidar:
@@ -148,7 +148,7 @@ class SlamtecLidar:
             raise DeviceError(f"{self._name()}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
         self._scanning = True
         self._bad_before = self.bad_packets
-        self._splitter = protocol.Splitter(self._mode.kind)
+        self._splitter = protocol.SlamtecSplitter(self._mode.kind)
         self._begin_anew()
         self._heard += [(packet, passed) for packet, passed in self._splitter.feed(self._rest)]
         self._rest = b""
@@ -269,12 +269,12 @@ class SlamtecLidar:
         )
         self._turns.begin_anew(self._skip)
         self._heard = []
-        self._before: protocol.Packet | None = None
+        self._before: protocol.SlamtecPacket | None = None
         self._points = 0  # measured since we began, by their count
         self._span_deg = 0.0  # of a capsule; 0 before one was whole
         self._last_ns = 0
 
-    def _take(self, heard: list[tuple[protocol.Packet, int]], arrival_ns: int) -> None:
+    def _take(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
         if self._last_ns and arrival_ns - self._last_ns > _PAUSE_NS:
             self._begin_anew()
         self._last_ns = arrival_ns
@@ -284,7 +284,7 @@ class SlamtecLidar:
             for packet, passed in heard:
                 self._take_capsule(packet, passed > 0, arrival_ns)
 
-    def _take_nodes(self, heard: list[tuple[protocol.Packet, int]], arrival_ns: int) -> None:
+    def _take_nodes(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
         """Points with angles of their own; what was passed over was some of them."""
         number = np.cumsum([1 + math.ceil(passed / protocol.SIZES[protocol.NODES]) for _, passed in heard])
         sensor_ns = (self._points + number - 1) * self._mode.point_ns
@@ -296,7 +296,7 @@ class SlamtecLidar:
         )
         self._turns.add(Points(angle_deg, range_m, quality, sensor_ns), arrival_ns)
 
-    def _take_capsule(self, packet: protocol.Packet, after_garbage: bool, arrival_ns: int) -> None:
+    def _take_capsule(self, packet: protocol.SlamtecPacket, after_garbage: bool, arrival_ns: int) -> None:
         """Its start ends the capsule before it, whose points are placed now; lost ones are told by the angle."""
         many = protocol.POINTS[self._mode.kind]
         before, self._before = self._before, packet

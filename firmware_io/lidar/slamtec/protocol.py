@@ -65,7 +65,7 @@ class Info:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Packet:
+class SlamtecPacket:
     """What one packet of a stream tells.
 
     Attributes:
@@ -126,7 +126,7 @@ def health(data: bytes) -> tuple[int, int]:
     return data[0], data[1] | data[2] << 8
 
 
-def node(data: bytes) -> Packet:
+def node(data: bytes) -> SlamtecPacket:
     """A node: one point with its own angle.
 
     Raises:
@@ -137,7 +137,7 @@ def node(data: bytes) -> Packet:
     angle, distance = struct.unpack_from("<HH", data, 1)
     if angle >> 1 > 360 * 64 + 64:
         raise ProtocolError(f"RPLIDAR: a node at {(angle >> 1) / 64:.1f} deg")
-    return Packet(
+    return SlamtecPacket(
         start_deg=(angle >> 1) / 64 % 360,
         first=bool(data[0] & 1),
         range_m=_ranges_m(np.array([distance / 4])),
@@ -146,7 +146,7 @@ def node(data: bytes) -> Packet:
     )
 
 
-def capsule(data: bytes) -> Packet:
+def capsule(data: bytes) -> SlamtecPacket:
     """An express capsule: 32 points between its start and the next one's.
 
     Raises:
@@ -158,12 +158,12 @@ def capsule(data: bytes) -> Packet:
     low = np.stack([cabins["offsets"] & 0xF, cabins["offsets"] >> 4], axis=1).astype(np.int64)
     offset = low | (distance & 3) << 4
     offset -= (offset & 0x20) << 1  # six bits with a sign, eighths of a degree
-    return Packet(
+    return SlamtecPacket(
         start_deg, first, _ranges_m((distance >> 2).ravel()), np.zeros(32, np.float32), (offset / 8.0).ravel()
     )
 
 
-def dense(data: bytes) -> Packet:
+def dense(data: bytes) -> SlamtecPacket:
     """A dense capsule: 40 points, evenly between its start and the next one's.
 
     Raises:
@@ -171,13 +171,13 @@ def dense(data: bytes) -> Packet:
     """
     start_deg, first = _capsule_start(data)
     range_mm = np.frombuffer(data, "<u2", 40, 4)
-    return Packet(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
+    return SlamtecPacket(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
 
 
-_READ: dict[int, Callable[[bytes], Packet]] = {NODES: node, CAPSULES: capsule, DENSE: dense}
+_READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: capsule, DENSE: dense}
 
 
-class Splitter:
+class SlamtecSplitter:
     """Cuts the packets of one type out of a stream, whatever is between them.
 
     Attributes:
@@ -190,10 +190,10 @@ class Splitter:
         self._rest = b""
         self._passed = 0
 
-    def feed(self, data: bytes) -> list[tuple[Packet, int]]:
+    def feed(self, data: bytes) -> list[tuple[SlamtecPacket, int]]:
         """The packets that these bytes complete, each with how many bytes were passed over before it."""
         self._rest += data
-        found: list[tuple[Packet, int]] = []
+        found: list[tuple[SlamtecPacket, int]] = []
         at = 0
         while at + self._size <= len(self._rest):
             try:

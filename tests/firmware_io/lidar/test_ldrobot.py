@@ -92,7 +92,7 @@ def test_a_packet_over_the_front_goes_on_at_zero():
 
 
 def test_packets_are_found_again_behind_garbage_and_a_cut():
-    splitter = protocol.PacketSplitter()
+    splitter = protocol.LdrobotSplitter()
     stream = b"\x2c\x54" + EXAMPLE + b"\x54" * 60 + EXAMPLE[:20] + EXAMPLE + EXAMPLE
     found = [packet for k in range(0, len(stream), 7) for packet in splitter.feed(stream[k : k + 7])]
     assert [packet.stamp_ms for packet in found] == [6714] * 3
@@ -114,7 +114,7 @@ def test_damaged_streams_give_packets_or_nothing(data):
         else:
             stream[at:at] = data.draw(st.binary(max_size=60))
         stream = stream or bytearray(b"\x54")
-    splitter = protocol.PacketSplitter()
+    splitter = protocol.LdrobotSplitter()
     found = splitter.feed(bytes(stream))
     assert len(found) <= len(stream) // protocol.SIZE
     # whatever came before, an undamaged packet is found behind it, at the latest the one after the next

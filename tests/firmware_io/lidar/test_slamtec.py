@@ -129,7 +129,7 @@ def test_damaged_streams_give_packets_or_nothing(model, data):
         else:
             stream[at:at] = data.draw(st.binary(max_size=60))
         stream = stream or bytearray(b"\xa5")
-    splitter = protocol.Splitter(kind)
+    splitter = protocol.SlamtecSplitter(kind)
     for packet, _ in splitter.feed(bytes(stream)):
         assert packet.range_m.size == protocol.POINTS[kind] and 0 <= packet.start_deg < 360
     assert len(splitter.feed(STREAMS[model])) >= len(STREAMS[model]) // protocol.SIZES[kind] - 30
