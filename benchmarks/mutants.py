@@ -36,7 +36,7 @@ MODULES = {
     "families": ("design/search/families.py", "tests/design/search"),
     "deskew": ("firmware_io/assembly/deskew.py", "tests/firmware_io/assembly"),
     "encoder": ("firmware_io/assembly/axis_curve.py", "tests/firmware_io/assembly/test_axis_curve.py"),
-    "clock": ("firmware_io/lidar/scip/device_clock.py", "tests/firmware_io/lidar/test_device_clock.py"),
+    "clock": ("firmware_io/lidar/device_clock.py", "tests/firmware_io/lidar/test_device_clock.py"),
     "registers": (
         "firmware_io/servo/bus/registers.py",
         "tests/firmware_io/servo/test_registers.py tests/firmware_io/servo/test_servo.py",

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from design.arrays import Times
-from firmware_io.lidar.scip.device_clock import DeviceClock, host_times
+from firmware_io.lidar.device_clock import DeviceClock, host_times
 
 DELAY_NS = 21_000_000
 LATE_MS, PPM, SEEDS = 20.0, 50.0, 3

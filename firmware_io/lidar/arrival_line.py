@@ -1,7 +1,7 @@
 """A sensor's even clock on the host's, from packets that can be late and never early.
 
 The straight line below all arrivals of the last seconds, as close to them as it goes, gives rate and offset: it is that
-edge of their lower convex hull which spans the middle. `scip.device_clock` is the same for stamps of whole turns in
+edge of their lower convex hull which spans the middle. `device_clock` is the same for stamps of whole turns in
 milliseconds; here the sensor's time comes in nanoseconds, packet after packet.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from firmware_io.lidar.scip.tick_line import half_hull, middle_slope
+from firmware_io.lidar.tick_line import half_hull, middle_slope
 
 _BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
 _BUCKETS = 300

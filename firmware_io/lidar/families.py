@@ -15,6 +15,7 @@ from firmware_io.installed import with_installed
 from firmware_io.lidar.ldrobot.driver import open_ldrobot
 from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
 from firmware_io.lidar.scip.driver import open_scip
+from firmware_io.lidar.sick.driver import open_sick
 from firmware_io.lidar.slamtec.driver import open_slamtec
 
 # where no model is named they are tried in this order: who only listens first
@@ -22,6 +23,7 @@ FAMILIES = (
     LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "firmware_io.twins.ldrobot:ldrobot_twin"),
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
     LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "firmware_io.twins.slamtec:slamtec_twin"),
+    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, "firmware_io.twins.sick.cola_twin:sick_twin"),
 )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from design.arrays import Floats, Times
+from firmware_io.lidar.device_clock import STAMP_WRAP_MS
 from firmware_io.lidar.lidar import StampAt
 from firmware_io.lidar.scip import protocol
 from firmware_io.lidar.scip.parameters import Parameters
@@ -116,7 +117,7 @@ class Quartz:
     def ms(self, time_ns: int) -> int:
         """What it shows, 24 bit."""
         shown_ms = self.clock_ms + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e6)
-        return shown_ms % protocol.STAMP_WRAP_MS
+        return shown_ms % STAMP_WRAP_MS
 
 
 @dataclass(slots=True)

@@ -16,9 +16,9 @@ from types import TracebackType
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.device_ports import lidar_ports
 from firmware_io.lidar.byte_stream import FIRST_BAUD, Gone, SerialStream, open_stream
+from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.scip import parameters, protocol
-from firmware_io.lidar.scip.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.errors import DeviceError
-from firmware_io.lidar.scip.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, host_times, synchronised
-from firmware_io.lidar.scip.tick_line import StampLine
+from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, host_times, synchronised
+from firmware_io.lidar.tick_line import StampLine
 
 DELAY_NS = 21_000_000
 

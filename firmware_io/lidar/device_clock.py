@@ -27,8 +27,9 @@ from jaxtyping import Int64
 from numpy import ndarray
 
 from design.errors import DeviceError
-from firmware_io.lidar.scip.protocol import STAMP_WRAP_MS
-from firmware_io.lidar.scip.tick_line import StampLine, half_hull, middle_slope
+from firmware_io.lidar.tick_line import StampLine, half_hull, middle_slope
+
+STAMP_WRAP_MS = 1 << 24  # SCIP 2.0, p. 12
 
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _RATE_USUAL = 5e-5
@@ -89,30 +90,37 @@ def synchronised(exchanges: Sequence[Exchange]) -> TimeSync:
 
 
 class StampCounter:
-    """Unwraps 24-bit stamps.
+    """Unwraps the stamps of a counter of few bits.
 
     Attributes:
         restarts: how often the sensor's clock began anew; stamps compare within one only.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, wrap: int = STAMP_WRAP_MS, per_ms: int = 1) -> None:
+        """Nothing was stamped yet.
+
+        Args:
+            wrap: the stamp that is 0 again.
+            per_ms: ticks in a millisecond.
+        """
         self.restarts = 0
+        self._wrap, self._per_ms = wrap, per_ms
         self._last: tuple[int, int] | None = None
 
     def unwrap(self, stamp: int, arrival_ns: int) -> int:
-        """Milliseconds since the sensor's clock was last 0; a pause of several wraps is told by the host's clock."""
+        """Ticks since the sensor's clock was last 0; a pause of several wraps is told by the host's clock."""
         if self._last is None:
             self._last = (stamp, arrival_ns)
             return stamp
-        last_ms, last_ns = self._last
-        step_ms = (stamp - last_ms) % STAMP_WRAP_MS
-        elapsed_ms = (arrival_ns - last_ns) // 1_000_000
-        step_ms += STAMP_WRAP_MS * max(round((elapsed_ms - step_ms) / STAMP_WRAP_MS), 0)
-        if step_ms > elapsed_ms + 60_000:  # nothing waits a minute in a buffer: the sensor began anew
+        last, last_ns = self._last
+        step = (stamp - last) % self._wrap
+        elapsed = (arrival_ns - last_ns) * self._per_ms // 1_000_000
+        step += self._wrap * max(round((elapsed - step) / self._wrap), 0)
+        if step > elapsed + 60_000 * self._per_ms:  # nothing waits a minute in a buffer: the sensor began anew
             self.restart()
             return self.unwrap(stamp, arrival_ns)
-        self._last = (last_ms + step_ms, arrival_ns)
-        return last_ms + step_ms
+        self._last = (last + step, arrival_ns)
+        return last + step
 
     def restart(self) -> None:
         """What comes next may be from a new life of the sensor's clock."""
@@ -137,17 +145,21 @@ class _Early:
 class DeviceClock:
     """Host times of the scans of one sensor, one after the other, in constant memory."""
 
-    def __init__(self, scan_period_s: float, *, smallest_delay_ns: int, first_beam_ns: int = 0) -> None:
+    def __init__(
+        self, scan_period_s: float, *, smallest_delay_ns: int, first_beam_ns: int = 0, fine: bool = False
+    ) -> None:
         """Nothing is known yet.
 
         Args:
             scan_period_s: between two scans, to one part in a hundred.
             smallest_delay_ns: from the moment that a stamp means to the arrival of an undelayed scan's last byte.
             first_beam_ns: from that moment to the first beam, which the results are times of.
+            fine: stamps have parts of a millisecond, finer than turns are even: they are taken as they are.
         """
         self._period_ms = scan_period_s * 1e3
         self._delay_ns = smallest_delay_ns
         self._first_beam_ns = first_beam_ns
+        self._fine = fine
         self._restarts = 0
         self._sync: TimeSync | None = None
         self._begin_anew()
@@ -161,7 +173,7 @@ class DeviceClock:
         """Keep the results within what a time synchronisation in this life of the sensor's clock allows."""
         self._sync = sync
 
-    def update(self, stamp_ms: int, arrival_ns: int, restarts: int = 0) -> ScanMoment:
+    def update(self, stamp_ms: float, arrival_ns: int, restarts: int = 0) -> ScanMoment:
         """Host time of a scan's first beam.
 
         Args:
@@ -177,8 +189,8 @@ class DeviceClock:
             self._origin = (stamp_ms, arrival_ns)
         since_ms = stamp_ms - self._origin[0]
         self._count += 1
-        turn = self._stamps.add(since_ms)
-        turn_ms = self._stamps.time_ms(turn)
+        turn = self._count if self._fine else self._stamps.add(since_ms)
+        turn_ms = since_ms if self._fine else self._stamps.time_ms(turn)
         # What is left after the nominal rate is small: floats hold it to a nanosecond.
         late_ns = arrival_ns - self._origin[1] - turn_ms * 1e6
         self._learn(turn, turn_ms, late_ns)
@@ -187,7 +199,7 @@ class DeviceClock:
         chance_ns = self._late_ns / min(self._count, _NEAR)
         line_ns += max(self._near_ns - _CHANCE * chance_ns, 0.0)
         time_ns = self._origin[1] + round(turn_ms * 1e6 + line_ns) - self._delay_ns
-        uncertainty_ns = math.hypot(chance_ns, self._reach_ns, _GRAIN_NS)
+        uncertainty_ns = math.hypot(chance_ns, self._reach_ns, 0.0 if self._fine else _GRAIN_NS)
         if self._sync is not None:
             told_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
             time_ns = min(max(time_ns, told_ns - half_ns), told_ns + half_ns)
@@ -196,7 +208,7 @@ class DeviceClock:
 
     def _begin_anew(self) -> None:
         self._count = 0
-        self._origin = (0, 0)
+        self._origin = (0.0, 0)
         self._stamps = StampLine(self._period_ms)
         self._fits = 0
         self._earliest: deque[_Early] = deque(maxlen=_BUCKETS)
@@ -243,7 +255,7 @@ class DeviceClock:
         turn_ms = self._stamps.time_ms(early.turn)
         return _Early(early.turn, turn_ms, early.late_ns + (early.turn_ms - turn_ms) * 1e6)
 
-    def _allowed(self, sync: TimeSync, stamp_ms: int, between_ms: float) -> tuple[int, int]:
+    def _allowed(self, sync: TimeSync, stamp_ms: float, between_ms: float) -> tuple[int, int]:
         """Host time of a turn by the synchronisation, and how far it may be off."""
         since_ms = stamp_ms - sync.stamp_ms + between_ms
         half_ns = sync.half_width_ns + 500_000 + abs(since_ms) * _RATE_MAX * 1e6

@@ -1,0 +1,186 @@
+"""LMDscandata, the telegram that holds a scan: all its channels, encoders, times of the sensor and its state.
+
+Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for the binary form. What follows the 8-bit
+channels (position, name, comment, time of day, event) is not read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray
+
+from design.errors import ProtocolError
+from firmware_io.lidar.sick.cola import Reader, Telegram, Writer
+
+WRAP_US = 1 << 32
+_ANGLE_UNIT_DEG = 1e-4
+_FRONT_DEG = 90.0  # the sensor's angle of straight ahead
+_MOST_CHANNELS = 16
+_MOST_ENCODERS = 4
+_NAME = 5
+
+DIRT_WARNING = 0x02
+FAULT = 0x01
+DIRT = 0x04
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """One number per beam.
+
+    Attributes:
+        name: DIST1 range of the first echo, RSSI1 its intensity, ...
+        scale: of the numbers; mm for DIST.
+        offset: added to the scaled numbers.
+        start: angle of the first beam, 1e-4 deg, 90 deg straight ahead, counter-clockwise from above.
+        step: from beam to beam, 1e-4 deg.
+        raw: as they came, shape (n,).
+    """
+
+    name: str
+    scale: float
+    offset: float
+    start: int
+    step: int
+    raw: ndarray
+
+    @property
+    def bearing_deg(self) -> tuple[float, float]:
+        """Bearing of the first beam, 0 straight ahead, and from beam to beam."""
+        return self.start * _ANGLE_UNIT_DEG - _FRONT_DEG, self.step * _ANGLE_UNIT_DEG
+
+    def range_m(self) -> Float32[ndarray, " n"]:
+        """Ranges of a DIST channel, NaN where nothing came back (0), shape (n,)."""
+        range_mm = self.raw * self.scale + self.offset
+        return np.where(self.raw == 0, np.nan, range_mm / 1e3).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanData:
+    """One scan as the sensor sent it.
+
+    Attributes:
+        serial_number: of the sensor.
+        status: second byte of its state: bits FAULT, DIRT_WARNING, DIRT (with FAULT).
+        telegram_count: of the telegrams, 16 bits.
+        scan_count: of the turns, 16 bits.
+        scan_us: time since power-up of the scan, 32 bits.
+        sent_us: time since power-up when the telegram was sent, 32 bits.
+        layer: angle of the scan plane, 1/200 deg or as its model says; 0 for one plane.
+        scan_rate_hz: turns per second.
+        measuring_rate_hz: beams per second, all around.
+        encoders: position and speed of each.
+        wide: channels of 16 bits.
+        narrow: channels of 8 bits.
+    """
+
+    serial_number: int
+    status: int
+    telegram_count: int
+    scan_count: int
+    scan_us: int
+    sent_us: int
+    layer: int
+    scan_rate_hz: float
+    measuring_rate_hz: float
+    encoders: tuple[tuple[int, int], ...]
+    wide: tuple[Channel, ...]
+    narrow: tuple[Channel, ...]
+
+    def channel(self, name: str) -> Channel | None:
+        """A channel by its name."""
+        return next((channel for channel in (*self.wide, *self.narrow) if channel.name == name), None)
+
+    @property
+    def beam_us(self) -> float:
+        """From beam to beam of the first channel: its part of a turn."""
+        return self.wide[0].step * _ANGLE_UNIT_DEG / 360 / self.scan_rate_hz * 1e6
+
+    @property
+    def first_beam_before_sent_us(self) -> float:
+        """From the first beam to the sending of the telegram.
+
+        Documents do not say which moment of the scan its time means, and captures differ: an LMS100 sends 23 ms after
+        it, longer than its scan takes, so there it is the first beam; a TiM55x sends 4 ms after it, in which it can
+        measure no scan of 50 ms, so there it is the end of the last beam.
+        """
+        after_us = (self.sent_us - self.scan_us) % WRAP_US
+        took_us = self.wide[0].raw.size * self.beam_us
+        return after_us if after_us > took_us / 2 else after_us + took_us
+
+
+def scan_data(telegram: Telegram) -> ScanData:
+    """The scan in an sSN or sRA LMDscandata.
+
+    Raises:
+        ProtocolError: it is none, or it is cut or damaged.
+    """
+    if telegram.word not in (b"sSN", b"sRA") or telegram.name != b"LMDscandata":
+        raise ProtocolError("no LMDscandata")
+    values = telegram.values()
+    values.numbers("u16", 2)  # version, device
+    serial_number = values.number("u32")
+    _, status = values.numbers("u8", 2)
+    telegram_count, scan_count = values.numbers("u16", 2)
+    scan_us, sent_us = values.numbers("u32", 2)
+    values.numbers("u8", 4)  # inputs, outputs
+    layer = values.number("i16")
+    scan_rate_hz, measuring_rate_hz = values.number("u32") / 100, values.number("u32") * 100
+    if not 0.1 <= scan_rate_hz <= 1e4:
+        raise ProtocolError(f"a scan rate of {scan_rate_hz:g} Hz")
+    encoders = tuple(
+        (values.number("u32"), values.number("u16")) for _ in range(_count(values, _MOST_ENCODERS, "encoders"))
+    )
+    wide = tuple(_channel(values, "u16") for _ in range(_count(values, _MOST_CHANNELS, "channels")))
+    narrow = tuple(_channel(values, "u8") for _ in range(_count(values, _MOST_CHANNELS, "channels of 8 bits")))
+    if not wide:
+        raise ProtocolError("a scan without ranges")
+    return ScanData(
+        serial_number, status, telegram_count, scan_count, scan_us, sent_us, layer, scan_rate_hz,
+        measuring_rate_hz, encoders, wide, narrow,
+    )  # fmt: skip
+
+
+def telegram_of(scan: ScanData, *, binary: bool) -> Telegram:
+    """The event that holds a scan: what `scan_data` takes up.
+
+    Raises:
+        ValueError: a number does not fit its place.
+    """
+    out = Writer("sSN LMDscandata", binary=binary).numbers("u16", [1, 1]).number("u32", scan.serial_number)
+    out.numbers("u8", [0, scan.status]).numbers("u16", [scan.telegram_count, scan.scan_count])
+    out.numbers("u32", [scan.scan_us, scan.sent_us]).numbers("u8", [0, 0, 0, 0]).number("i16", scan.layer)
+    out.numbers("u32", [round(scan.scan_rate_hz * 100), round(scan.measuring_rate_hz / 100)])
+    out.number("u16", len(scan.encoders))
+    for position, speed in scan.encoders:
+        out.number("u32", position).number("u16", speed)
+    for kind, channels in (("u16", scan.wide), ("u8", scan.narrow)):
+        out.number("u16", len(channels))
+        for channel in channels:
+            out.name(channel.name).number("f32", channel.scale).number("f32", channel.offset)
+            out.number("i32", channel.start).numbers("u16", [channel.step, channel.raw.size])
+            out.numbers("u16" if kind == "u16" else "u8", channel.raw.tolist())
+    return out.numbers("u16", [0, 0, 0, 0, 0]).telegram()
+
+
+def _count(values: Reader, most: int, what: str) -> int:
+    count = values.number("u16")
+    if count > most:
+        raise ProtocolError(f"{count} {what}: at most {most}")
+    return count
+
+
+def _channel(values: Reader, kind: str) -> Channel:
+    name = values.name(_NAME)
+    scale, offset = values.real(), values.real()
+    start, step, count = values.number("i32"), values.number("u16"), values.number("u16")
+    if not step > 0 or not abs(start) <= 7_200_000:
+        raise ProtocolError(f"{name}: angles of {start} and {step} ten-thousandths of a degree")
+    if not count:
+        raise ProtocolError(f"{name}: no beams")
+    wide = kind == "u16"
+    raw = np.array(values.numbers("u16" if wide else "u8", count), np.uint16 if wide else np.uint8)
+    return Channel(name, scale, offset, start, step, raw)

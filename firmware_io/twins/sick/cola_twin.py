@@ -1,0 +1,234 @@
+"""A TiM or LMS1xx in software: requests in, answers out, turn after turn, at times that somebody else tells."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from design.catalogue.products import Lidar
+from design.errors import ProtocolError
+from firmware_io.lidar.sick.cola import Reader, Telegram, TelegramSplitter, Writer, framed
+from firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
+from firmware_io.twins.lidar_line import LidarLine, Sight
+
+_NEVER_NS = 1 << 62
+_SEND_NS = 3_000_000  # from the last beam to the telegram: between the captures of an LMS100 and of a TiM55x
+_BOOT_NS = 1_000_000_000
+_HEAD = 100  # bytes of a telegram before its ranges
+_PASSWORDS = {2: 0xB21ACE26, 3: 0xF4724744, 4: 0x81BE23AA}
+_ACCESS_DENIED, _UNKNOWN_METHOD, _UNKNOWN_VARIABLE, _INVALID = 1, 2, 3, 5
+
+
+@dataclass(slots=True)
+class _Scanning:
+    """Who is told of scans, and which turn is next."""
+
+    binary: bool
+    turn: int
+
+
+@dataclass
+class SickMachine:
+    """The state of one sensor.
+
+    Attributes:
+        lidar: which model.
+        sight: what it sees.
+        began_ns: true time at which its clock showed `clock_us`.
+        clock_us: what it showed then.
+        rate_error: of its clock, 5e-5 is 50 ppm fast.
+        stamps_end: its scan time is that of the last beam's end, as a TiM's, not of the first beam.
+        status: second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault.
+        busy_until_ns: it says so until then.
+        silent_until_ns: it says nothing until then.
+        dialects: those that it understands; True is CoLa B.
+        scanning: what it tells scans; None where nobody asked.
+    """
+
+    lidar: Lidar
+    sight: Sight
+    began_ns: int
+    clock_us: int = 0
+    rate_error: float = 0.0
+    stamps_end: bool = False
+    status: int = 0
+    busy_until_ns: int = 0
+    silent_until_ns: int = 0
+    dialects: tuple[bool, ...] = (True, False)
+    serial_number: int = 18_030_000
+    scanning: _Scanning | None = None
+    intensity: bool = False
+    interval: int = 1
+    measuring: bool = False
+    _level: int = 0
+    _telegrams: int = 0
+    _scan_rate: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._scan_rate = round(self.lidar.scan_rate_hz * 100)
+
+    @property
+    def period_ns(self) -> float:
+        """Of a turn."""
+        return 1e9 / self.lidar.scan_rate_hz
+
+    @property
+    def beam_ns(self) -> float:
+        """From beam to beam."""
+        return self.period_ns / self.lidar.steps_per_turn
+
+    def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
+        """Answers to whole requests, and what is none yet."""
+        splitter = TelegramSplitter()
+        asked = splitter.feed(received)
+        if now_ns < self.silent_until_ns:
+            return b"", splitter.rest
+        told = [framed(self._answer(request, now_ns)) for request in asked if request.binary in self.dialects]
+        return b"".join(told), splitter.rest
+
+    def next_ns(self) -> int:
+        """When the next scan is sent."""
+        if self.scanning is None:
+            return _NEVER_NS
+        beams = self.lidar.last_step - self.lidar.first_step + 1
+        return self._first_beam_ns(self.scanning.turn) + round(beams * self.beam_ns) + _SEND_NS
+
+    def next_packets(self) -> list[tuple[int, bytes]]:
+        """The scan of the next turn."""
+        if self.scanning is None:
+            return []
+        sent_ns, turn, binary = self.next_ns(), self.scanning.turn, self.scanning.binary
+        scan = self._scan(turn, sent_ns)
+        self.scanning.turn += self.interval
+        return [(sent_ns, framed(telegram_of(scan, binary=binary)))]
+
+    def leave_out(self, before_ns: int) -> None:
+        """Passes over turns that were over before that time."""
+        while self.scanning is not None and self.next_ns() < before_ns:
+            self.scanning.turn += self.interval
+            self._telegrams += 1
+
+    def power_cycle(self, now_ns: int) -> None:
+        """Its clock begins at 0, it scans for nobody, and answers after a second."""
+        self.began_ns, self.clock_us = now_ns, 0
+        self.scanning, self.measuring, self._level = None, False, 0
+        self.silent_until_ns = now_ns + _BOOT_NS
+
+    def _us(self, time_ns: int) -> int:
+        return (self.clock_us + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e3)) % WRAP_US
+
+    def _first_beam_ns(self, turn: int) -> int:
+        return self.began_ns + round(turn * self.period_ns)
+
+    def _scan(self, turn: int, sent_ns: int) -> ScanData:
+        lidar = self.lidar
+        steps = np.arange(lidar.last_step - lidar.first_step + 1)
+        first_ns = self._first_beam_ns(turn)
+        range_m, shown = self.sight(first_ns + np.rint(steps * self.beam_ns).astype(np.int64), lidar.bearings_rad())
+        seen = np.isfinite(range_m)
+        raw = np.rint(np.where(seen, range_m, 0.0) * 1e3).clip(0, 65535).astype(np.uint16)
+        start, step = self._angles()
+        channels = [Channel("DIST1", 1.0, 0.0, start, step, raw)]
+        if self.intensity:
+            bright = np.where(seen, shown, 0.0).clip(0, 65535).astype(np.uint16)
+            channels.append(Channel("RSSI1", 1.0, 0.0, start, step, bright))
+        self._telegrams += 1
+        stamp_ns = first_ns + (round(steps.size * self.beam_ns) if self.stamps_end else 0)
+        return ScanData(
+            serial_number=self.serial_number,
+            status=self.status,
+            telegram_count=self._telegrams % 65536,
+            scan_count=turn % 65536,
+            scan_us=self._us(stamp_ns),
+            sent_us=self._us(sent_ns),
+            layer=0,
+            scan_rate_hz=lidar.scan_rate_hz,
+            measuring_rate_hz=round(lidar.scan_rate_hz * lidar.steps_per_turn / 100) * 100,
+            encoders=(),
+            wide=tuple(channels),
+            narrow=(),
+        )
+
+    def _angles(self) -> tuple[int, int]:
+        """First angle and step, 1e-4 deg, cut to whole numbers as the sensor does."""
+        per_step = 3_600_000 / self.lidar.steps_per_turn
+        return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), int(per_step)
+
+    def _answer(self, asked: Telegram, now_ns: int) -> Telegram:
+        try:
+            return self._said(asked, now_ns)
+        except ProtocolError:
+            return _refused(asked, _INVALID)
+
+    def _said(self, asked: Telegram, now_ns: int) -> Telegram:
+        word, name, values = asked.word, asked.name.decode("ascii", "replace"), asked.values()
+        answers = {b"sRN": "sRA", b"sWN": "sWA", b"sMN": "sAN", b"sEN": "sEA"}
+        if word not in answers:
+            return _refused(asked, _UNKNOWN_METHOD)
+        out = Writer(f"{answers[word]} {name}", binary=asked.binary)
+        match word, name:
+            case b"sRN", "DeviceIdent":
+                return out.text(self.lidar.name).text("V1.00").telegram()
+            case b"sRN", "SerialNumber":
+                return out.text(str(self.serial_number)).telegram()
+            case b"sRN", "SCdevicestate":
+                return out.number("u8", int(self.measuring and now_ns >= self.busy_until_ns)).telegram()
+            case b"sRN", "LMPscancfg":
+                start, step = self._angles()
+                span = (self.lidar.last_step - self.lidar.first_step) * 3_600_000 // self.lidar.steps_per_turn
+                out.number("u32", self._scan_rate).number("u16", 1).number("u32", step)
+                return out.numbers("i32", [start, start + span]).telegram()
+            case b"sMN", "SetAccessMode":
+                level = values.number("u8")
+                self._level = level if _PASSWORDS.get(level) == values.number("u32") else 0
+                return out.number("u8", int(self._level > 0)).telegram()
+            case b"sMN", "LMCstartmeas" | "LMCstopmeas" | "Run":
+                return self._method(asked, name, out)
+            case b"sWN", "LMDscandatacfg":
+                return self._configured(asked, values, out)
+            case b"sEN", "LMDscandata":
+                wanted = values.number("u8")
+                turn = math.ceil((now_ns - self.began_ns) / self.period_ns)
+                self.scanning = _Scanning(asked.binary, turn) if wanted and self.measuring else None
+                return out.number("u8", wanted).telegram()
+        return _refused(asked, _UNKNOWN_VARIABLE if word in (b"sRN", b"sWN") else _UNKNOWN_METHOD)
+
+    def _method(self, asked: Telegram, name: str, out: Writer) -> Telegram:
+        if not self._level:
+            return _refused(asked, _ACCESS_DENIED)
+        if name == "Run":  # it ends the login
+            self._level = 0
+            return out.number("u8", 1).telegram()
+        self.measuring = name == "LMCstartmeas"
+        return out.number("u8", 0).telegram()
+
+    def _configured(self, asked: Telegram, values: Reader, out: Writer) -> Telegram:
+        if not self._level:
+            return _refused(asked, _ACCESS_DENIED)
+        settings = values.numbers("u8", 11)
+        self.intensity, self.interval = bool(settings[2]), max(values.number("u16"), 1)
+        return out.telegram()
+
+
+class SickTwin(LidarLine):
+    """A SICK lidar on its line."""
+
+    machine: SickMachine
+
+    def __init__(self, machine: SickMachine, *, jitter_s: float = 0.0, seed: int = 0) -> None:
+        """Nothing runs before `with`; scans arrive up to `jitter_s` late."""
+        super().__init__(machine.lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
+
+
+def sick_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> SickTwin:
+    """The twin of a sensor of the catalogue."""
+    return SickTwin(SickMachine(lidar, sight, time.monotonic_ns()), seed=seed)
+
+
+def _refused(asked: Telegram, code: int) -> Telegram:
+    if asked.binary:
+        return Telegram(b"sFA" + code.to_bytes(2, "big"), binary=True)
+    return Telegram(b"sFA %X" % code, binary=False)

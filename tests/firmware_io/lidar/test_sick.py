@@ -1,0 +1,166 @@
+"""The SICK driver against its twin: both dialects, both ways, and whatever breaks on the way."""
+
+import time
+
+import numpy as np
+import pytest
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
+from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from firmware_io.lidar.families import open_lidar
+from firmware_io.lidar.sick import driver
+from firmware_io.lidar.sick.driver import RefusedError, open_sick
+from firmware_io.twins.sick.cola_twin import SickMachine, SickTwin
+
+MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
+
+
+def look(_time_ns, bearing_rad):
+    range_m = 3 + np.sin(bearing_rad)
+    range_m[[3, 40]] = np.inf
+    return range_m, np.arange(bearing_rad.size, dtype=float)
+
+
+def twin(model="LMS111", sight=look, jitter_s=0.0, **state):
+    lidar = load_catalogue().get(model, Lidar)
+    return SickTwin(SickMachine(lidar, sight, time.monotonic_ns(), **state), jitter_s=jitter_s)
+
+
+def check(scan, model):
+    bearing_rad = load_catalogue().get(model, Lidar).bearings_rad()
+    np.testing.assert_allclose(scan.bearing_rad, bearing_rad, atol=1e-5)
+    expected = np.round(look(None, bearing_rad)[0], 3).astype(np.float32)
+    np.testing.assert_array_equal(scan.range_m, np.where(np.isinf(expected), np.nan, expected))
+
+
+@pytest.mark.parametrize("dialects", [(True,), (False,), (True, False)], ids=["B", "A", "both"])
+@pytest.mark.parametrize("model", ["TiM551", "TiM571", "LMS111"])
+def test_scans_come_as_they_were_seen(model, dialects):
+    with twin(model, dialects=dialects) as sensor, open_lidar(sensor.address, model) as lidar:
+        assert (lidar.model, lidar.serial_number, lidar.firmware) == (model, "18030000", "V1.00")
+        lidar.start(intensity=True)
+        for _ in range(3):
+            scan = lidar.read().scan
+            check(scan, model)
+            shown = np.arange(scan.range_m.size, dtype=np.float32)
+            np.testing.assert_array_equal(scan.intensity, np.where(np.isnan(scan.range_m), 0, shown))
+        assert lidar.bad_packets == 0
+    assert not sensor.machine.measuring  # `with` puts the laser out
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_sensor_says_which_model_it_is(model):
+    with twin(model) as sensor, open_sick(sensor.port) as lidar:
+        assert (lidar.model, lidar.scan_rate_hz) == (model, load_catalogue().get(model, Lidar).scan_rate_hz)
+
+
+@pytest.mark.parametrize("stamps_end", [False, True], ids=["stamps as LMS", "stamps as TiM"])
+def test_first_beams_get_their_true_times(stamps_end):
+    true_ns = []
+
+    def timed(time_ns, bearing_rad):
+        true_ns.append(int(time_ns[0]))
+        return look(time_ns, bearing_rad)
+
+    state = {"rate_error": 5e-5, "clock_us": (1 << 32) - 300_000, "stamps_end": stamps_end}
+    with twin(sight=timed, **state) as sensor, open_sick(sensor.address) as lidar:
+        lidar.start()
+        told_ns = [lidar.read().scan.stamp_ns for _ in range(40)]  # its clock wraps meanwhile
+        late_ns = [min((told - true for true in true_ns), key=abs) for told in told_ns[20:]]
+    assert np.median(np.abs(late_ns)) < 1_500_000
+
+
+def test_damage_is_counted_and_never_handed_out():
+    with twin(dialects=(True,)) as sensor, open_sick(sensor.address) as lidar:
+        lidar.start()
+        lidar.read()
+        sensor.garble(3)
+        sensor.cut(2)
+        for _ in range(12):
+            check(lidar.read().scan, "LMS111")
+        assert 4 <= lidar.bad_packets <= 9
+        assert lidar.dropped >= 4
+
+
+def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
+    with twin(status=2) as sensor, open_sick(sensor.address) as lidar:
+        lidar.start()
+        check(lidar.read().scan, "LMS111")
+        assert lidar.contaminated
+        sensor.machine.status = 5
+        with pytest.raises(DeviceFaultError, match="too dirty"):
+            for _ in range(9):
+                lidar.read()
+        sensor.machine.status = 1
+        with pytest.raises(DeviceFaultError, match="fault of its own"):
+            for _ in range(9):
+                if lidar.contaminated:
+                    lidar.read()
+
+
+def test_an_unplugged_sensor_is_told_and_comes_back():
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        lidar.start(intensity=True)
+        lidar.read()
+        sensor.unplug()
+        with pytest.raises(DeviceError, match="plug") as told:
+            for _ in range(10):
+                lidar.read()
+        assert str(told.value).count("\n") == 0
+        with pytest.raises(DeviceError, match=r"18030000 did not come back in 0\.0 s"):
+            lidar.reconnect(0.0)
+        sensor.plug()
+        lidar.reconnect(30.0)
+        scan = lidar.read().scan
+        check(scan, "LMS111")
+        assert scan.intensity.size == scan.range_m.size
+
+
+def test_silence_is_a_timeout_and_a_restarted_sensor_scans_on():
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        lidar.start()
+        lidar.read()
+        sensor.power_cycle()
+        with pytest.raises(DeviceTimeoutError, match="nothing came"):
+            for _ in range(9):
+                lidar.read(0.05)
+        lidar.reconnect(30.0)
+        check(lidar.read().scan, "LMS111")
+
+
+def test_a_busy_sensor_is_waited_for(monkeypatch):
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        sensor.machine.busy_until_ns = time.monotonic_ns() + 200_000_000
+        lidar.start()
+        assert time.monotonic_ns() >= sensor.machine.busy_until_ns
+        lidar.stop()
+        sensor.machine.busy_until_ns = 1 << 62
+        monkeypatch.setattr(driver, "_READY_S", 0.1)
+        with pytest.raises(DeviceTimeoutError, match="still busy"):
+            lidar.start()
+
+
+def test_refusals_have_the_sensors_words(monkeypatch):
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        with pytest.raises(DeviceError, match="cluster"):
+            lidar.start(cluster=2)
+        with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: it wants a login"):
+            lidar._ask(lidar._writer("sMN LMCstartmeas"))
+        with monkeypatch.context() as other:
+            other.setattr(driver, "_PASSWORD", 1)
+            with pytest.raises(DeviceError, match="password was changed"):
+                lidar.start()
+
+
+def test_skipped_turns_are_not_missing():
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        lidar.start(skip=1)
+        first, second = lidar.read().scan, lidar.read().scan
+        assert first.scan_time_s == pytest.approx(0.04)
+        assert (second.stamp_ns - first.stamp_ns) / 1e9 == pytest.approx(0.04, rel=0.5)
+
+
+def test_what_speaks_no_cola_is_told():
+    with twin(dialects=()) as sensor, pytest.raises(DeviceTimeoutError, match="no SICK sensor answers"):
+        open_sick(sensor.address)
