@@ -21,11 +21,13 @@ class TimedScan:
             wanders.
         arrival_ns: `time.monotonic_ns` when its last byte came.
         uncertainty_ns: standard uncertainty of its time.
+        warning: what the sensor says of itself that a person should mend, and how; empty where all is well.
     """
 
     scan: Scan
     arrival_ns: int
     uncertainty_ns: int
+    warning: str = ""
 
 
 class LidarDriver(Protocol):

@@ -158,6 +158,7 @@ class _Scans:
         self.axis: AxisThread | None = None
         self.clock_ns = 0
         self.away = 0
+        self._warned = ""
         self._say = say
 
     def next(self) -> Scan:
@@ -174,6 +175,9 @@ class _Scans:
             if self.axis is not None:
                 self.axis.go()
         self.clock_ns = timed.uncertainty_ns
+        if timed.warning and timed.warning != self._warned:
+            self._say(f"warning: {self.lidar.model}: {timed.warning}")
+            self._warned = timed.warning
         return timed.scan
 
     def _found_again(self) -> TimedScan:

@@ -137,6 +137,8 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
         f"{port}: its clock is known to {timed.uncertainty_ns / 1e6:.2f} ms, scans come up to {jitter_ms:.1f} ms late",
         "this computer is busy: end other programs, or take another USB port",
     )
+    if timed.warning:
+        yield DeviceFinding("wrong", f"{port}: {timed.warning}")
     share = float(np.isfinite(timed.scan.range_m).mean())
     yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
 

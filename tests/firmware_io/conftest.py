@@ -12,6 +12,7 @@ def patience(monkeypatch):
     """Twins share a computer with the tests, and answer late where it is busy, as no device does: ten times as long."""
     monkeypatch.setattr(driver, "_ANSWER_S", 5.0)
     monkeypatch.setattr(driver, "_SCAN_S", 10.0)
+    monkeypatch.setattr(sick_driver, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
     monkeypatch.setattr(sick_driver, "_SCAN_S", 10.0)
     monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
     monkeypatch.setattr(bus, "_LATE", 1)

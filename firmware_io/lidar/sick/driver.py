@@ -56,7 +56,6 @@ class SickLidar:
         serial_number: by which it is known again.
         firmware: version, as the sensor writes it.
         dropped: telegrams that are missing between those that were read, by their counter.
-        contaminated: the last scan said that the window is dirty, but not yet too dirty.
     """
 
     def __init__(self, address: str, model: str | None = None) -> None:
@@ -71,7 +70,7 @@ class SickLidar:
         """
         self.address = address
         self.dropped = 0
-        self.contaminated = False
+        self._measuring = False
         self._bad_before = 0
         self._splitter = TelegramSplitter()
         self._binary = True
@@ -133,13 +132,17 @@ class SickLidar:
         """
         if cluster != 1:
             raise DeviceError(f"{self._name()}: cluster = {cluster}: a {self.model} cannot, take 1")
+        self._begin(intensity, skip, _READY_S)
+
+    def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
         self._login()
         self._set_rate()
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
         wanted = self._writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
         self._ask(wanted.number("u16", skip + 1))
+        self._measuring = True
         self._ask(self._writer("sMN LMCstartmeas"), expect=0)
-        self._wait_until_ready()
+        self._wait_until_ready(patience_s)
         self._ask(self._writer("sMN Run"), expect=1)
         self._forget()
         self._ask(self._writer("sEN LMDscandata").number("u8", 1))
@@ -165,14 +168,17 @@ class SickLidar:
                 self._bad_before += 1
 
     def stop(self) -> None:
-        """Stop the telegrams; the laser goes out where the sensor lets it.
+        """Stop the telegrams, and what `start` lit; a laser that cannot be put out stays on.
 
         Raises:
             DeviceError: the sensor is gone.
         """
         self._started = None
         self._ask(self._writer("sEN LMDscandata").number("u8", 0))
+        if not self._measuring:
+            return
         self._login()
+        self._measuring = False
         try:
             self._ask(self._writer("sMN LMCstopmeas"))
         except RefusedError as refused:
@@ -195,7 +201,7 @@ class SickLidar:
                     raise DeviceError(f"{self._name()}: it has another serial number")
                 self._forget()
                 if started is not None:
-                    self.start(intensity=started[0], skip=started[1])
+                    self._begin(*started, max(deadline - time.monotonic(), 0.0))
                 return
             except DeviceError as error:
                 self._stream.close()
@@ -270,9 +276,9 @@ class SickLidar:
                 f"{_SET_UP.get(code, f'with code {code}')}; is it a {self.model}?"
             )
 
-    def _wait_until_ready(self) -> None:
+    def _wait_until_ready(self, patience_s: float) -> None:
         """A sensor that starts its motor, or is busy with somebody else, is asked again and again."""
-        deadline = time.monotonic() + _READY_S
+        deadline = time.monotonic() + patience_s
         asked, ready = "SCdevicestate", 1
         while True:
             try:
@@ -285,7 +291,7 @@ class SickLidar:
                 asked, ready = "STlms", _STLMS_READY
                 continue
             if time.monotonic() > deadline:
-                raise DeviceTimeoutError(f"{self._name()}: it is still busy after {_READY_S:.0f} s")
+                raise DeviceTimeoutError(f"{self._name()}: it is still busy after {patience_s:.0f} s")
             time.sleep(_POLL_S)
 
     def _forget(self) -> None:
@@ -302,7 +308,6 @@ class SickLidar:
         first = scan.channel("DIST1")
         if first is None:
             raise ProtocolError("no DIST1")
-        self.contaminated = bool(scan.status & DIRT_WARNING)
         if self._count is not None:
             self.dropped += (scan.telegram_count - self._count - 1) % 65536
         self._count = scan.telegram_count
@@ -326,7 +331,8 @@ class SickLidar:
             range_m=first.range_m(),
             intensity=intensity.astype(np.float32),
         )
-        return TimedScan(taken, arrival_ns, moment.uncertainty_ns)
+        warning = "its window is dirty, though it still sees: clean it" if scan.status & DIRT_WARNING else ""
+        return TimedScan(taken, arrival_ns, moment.uncertainty_ns, warning)
 
     def _step_rad(self, step_deg: float) -> float:
         """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""

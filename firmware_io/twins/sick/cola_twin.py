@@ -45,6 +45,7 @@ class SickMachine:
         busy_until_ns: it says so until then.
         silent_until_ns: it says nothing until then.
         dialects: those that it understands; True is CoLa B.
+        refusals: codes with which it refuses what it is asked next, one each.
         scanning: what it tells scans; None where nobody asked.
     """
 
@@ -58,6 +59,7 @@ class SickMachine:
     busy_until_ns: int = 0
     silent_until_ns: int = 0
     dialects: tuple[bool, ...] = (True, False)
+    refusals: list[int] = field(default_factory=list)
     serial_number: int = 18_030_000
     scanning: _Scanning | None = None
     intensity: bool = False
@@ -158,6 +160,8 @@ class SickMachine:
         return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), int(per_step)
 
     def _answer(self, asked: Telegram, now_ns: int) -> Telegram:
+        if self.refusals:
+            return _refused(asked, self.refusals.pop(0))
         try:
             return self._said(asked, now_ns)
         except ProtocolError:

@@ -34,6 +34,15 @@ def check(scan, model):
     np.testing.assert_array_equal(scan.range_m, np.where(np.isinf(expected), np.nan, expected))
 
 
+def until_fine(lidar):
+    for _ in range(1000):
+        try:
+            return lidar.read()
+        except DeviceFaultError:
+            continue
+    raise AssertionError("it stays at its fault")
+
+
 @pytest.mark.parametrize("dialects", [(True,), (False,), (True, False)], ids=["B", "A", "both"])
 @pytest.mark.parametrize("model", ["TiM551", "TiM571", "LMS111"])
 def test_scans_come_as_they_were_seen(model, dialects):
@@ -86,17 +95,16 @@ def test_damage_is_counted_and_never_handed_out():
 def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
     with twin(status=2) as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
-        check(lidar.read().scan, "LMS111")
-        assert lidar.contaminated
-        sensor.machine.status = 5
-        with pytest.raises(DeviceFaultError, match="too dirty"):
-            for _ in range(9):
-                lidar.read()
-        sensor.machine.status = 1
-        with pytest.raises(DeviceFaultError, match="fault of its own"):
-            for _ in range(9):
-                if lidar.contaminated:
+        timed = lidar.read()
+        check(timed.scan, "LMS111")
+        assert timed.warning == "its window is dirty, though it still sees: clean it"
+        for status, words in ((5, "too dirty to see through: clean it"), (1, "fault of its own")):
+            sensor.machine.status = status
+            with pytest.raises(DeviceFaultError, match=words):
+                for _ in range(1000):
                     lidar.read()
+            sensor.machine.status = 0
+            until_fine(lidar)
 
 
 def test_an_unplugged_sensor_is_told_and_comes_back():
@@ -151,6 +159,27 @@ def test_refusals_have_the_sensors_words(monkeypatch):
             other.setattr(driver, "_PASSWORD", 1)
             with pytest.raises(DeviceError, match="password was changed"):
                 lidar.start()
+
+
+def test_a_busy_method_is_asked_again_and_other_codes_are_told_by_their_words():
+    with twin() as sensor, open_sick(sensor.address) as lidar:
+        sensor.machine.refusals[:] = [0x0D, 0x0D]
+        lidar.start()
+        check(lidar.read().scan, "LMS111")
+        lidar.stop()
+        for code, words in ((0x04, "a condition for it is not met"), (0x14, "internal error"), (0x99, "not in the")):
+            sensor.machine.refusals[:] = [code]
+            with pytest.raises(RefusedError, match=f"SetAccessMode: error {code:X}: {words}"):
+                lidar.start()
+
+
+def test_a_sensor_of_unknown_name_wants_its_model():
+    with twin() as sensor:
+        sensor.machine.lidar = sensor.machine.lidar.model_copy(update={"name": "LMS1xx"})
+        with pytest.raises(DeviceError, match=r"calls itself 'LMS1xx'.*name its model; known: LMS111"):
+            open_sick(sensor.address)
+        with open_sick(sensor.address, "LMS111") as lidar:
+            assert lidar.model == "LMS111"
 
 
 def test_skipped_turns_are_not_missing():

@@ -29,10 +29,11 @@ from design.scene.ray_caster import cast
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.clouds.ply import read_ply
 from firmware_io.lidar.scip import driver
+from firmware_io.lidar.sick.scan_data import DIRT_WARNING
 from firmware_io.recording.recording import open_recording
 from firmware_io.recording.repair.repair import repair
 from firmware_io.samples import JointLog
-from firmware_io.scan import acquire, axis_thread
+from firmware_io.scan import acquire, axis_thread, doctor
 from firmware_io.scan.plan import plan_scan
 from firmware_io.scan.setpoints import course
 from firmware_io.servo.progress import ServoState
@@ -258,6 +259,7 @@ def residuals_m(cloud, angles, scene):
 
 SWEEP = {"mode": "sweep", "limits_deg": [-45, 45], "period_s": 6.0}  # at 30.6 deg/s, 1.05 steps of 0.293 deg in 10 ms
 CHEAP = {"servo": "STS3215"}
+SICK = {"sensor": "LMS111"}
 SWEEPING = {"sensor": "URG-04LX", "servo": "AX-12A", "motion": SWEEP}
 
 
@@ -267,7 +269,7 @@ CAPSULES = {"sensor": "RPLIDAR S1"}
 
 @pytest.mark.parametrize(
     ("scanner", "turns", "points"),
-    [({}, 2, 80_000), (SWEEPING, 1, 15_000), (CHEAP, 2, 80_000), (ALL_AROUND, 2, 12_000), (CAPSULES, 2, 12_000)],
+    [({}, 2, 80_000), (SWEEPING, 1, 15_000), (CHEAP, 2, 80_000), (ALL_AROUND, 2, 12_000), (CAPSULES, 2, 12_000), (SICK, 2, 40_000)],
 )
 def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
     out, angles = tmp_path, angle_set(**scanner)
@@ -451,6 +453,25 @@ def test_the_doctor_finds_healthy_devices_healthy(out, twins, command):
     assert re.search(r"scans/s of 40\.0", said)
     assert "protocol 1.0 at 57600 baud" in said
     assert "wrong" not in said
+
+
+def test_scan_and_doctor_tell_a_dirty_window(tmp_path, command, monkeypatch):
+    monkeypatch.setattr(acquire, "_CLOCK_LEAST_S", 0.3)
+    monkeypatch.setattr(doctor, "_LOOK_S", 1.0)
+    angles = angle_set(**SICK)
+    (tmp_path / "angles.json").write_text(angles.to_json())
+    with emulated_scanner(angles, room(None)) as scanner:
+        scanner.lidar.machine.status = DIRT_WARNING
+        said = []
+        acquire.acquire(plan_scan(tmp_path, lidar=scanner.ports.lidar, servo=scanner.ports.servo), said.append)
+        told = "LMS111: its window is dirty, though it still sees: clean it"
+        assert [line for line in said if "dirty" in line] == [f"warning: {told}"]
+        code, lines, _ = command("doctor", tmp_path, "--lidar", scanner.ports.lidar, "--servo", scanner.ports.servo)
+    assert code == 1
+    assert "LMS111, serial number 18030000, firmware V1.00" in lines
+    assert "scans/s of 50.0" in lines
+    (wrong,) = [line for line in lines.splitlines() if line.startswith("wrong")]
+    assert "its window is dirty" in wrong
 
 
 def test_the_doctor_says_what_is_wrong_and_the_remedy(twins, command, monkeypatch):
