@@ -19,7 +19,7 @@ from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
-from design.electrics.rules import faults_of
+from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
@@ -82,7 +82,7 @@ def electric_checks(scanner: Scanner) -> list[Check]:
     network = network_of(scanner)
     faults = [
         Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
-        for fault in faults_of(network)
+        for fault in broken_rules(network)
     ]
     kept = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "

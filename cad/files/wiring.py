@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from cad.files.schematic import schematic_svg
 from design.electrics.network import Network
-from design.electrics.rules import faults_of
+from design.electrics.rules import broken_rules
 from design.electrics.sizing import OVER_PEAK
 from design.electrics.wiring import COMPUTER_W, LEADS_M, network_of
 from design.scanner import Scanner
@@ -46,7 +46,7 @@ def wiring_text(network: Network, title: str) -> str:
         ("Wires", list(_wires(network))),
         ("Data through the ring", list(network.risks)),
         ("Not known", [f"- {fact}: measure or ask its maker" for fact in network.unknown]),
-        ("Broken rules", [f"- {fault.where}: {fault.message}" for fault in faults_of(network)]),
+        ("Broken rules", [f"- {fault.where}: {fault.message}" for fault in broken_rules(network)]),
     ):
         if lines:
             listed = [line for line in lines if line.startswith("- ")]

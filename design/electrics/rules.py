@@ -10,19 +10,19 @@ from design.electrics.sizing import OVER_PEAK, wire_a
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class BrokenRule:
     """One rule that is broken: where, and in words."""
 
     where: str
     message: str
 
 
-def faults_of(network: Network) -> list[Fault]:
+def broken_rules(network: Network) -> list[BrokenRule]:
     """Every broken rule; empty where the wiring is right."""
     return [*_open(network), *_joined(network), *_circuits(network), *_branches(network), *_volts(network)]
 
 
-def _open(network: Network) -> Iterator[Fault]:
+def _open(network: Network) -> Iterator[BrokenRule]:
     """Every pin has a wire, or is free on purpose; every wire ends in pins that are there."""
     wired = {pin for wire in network.wires for pin in (wire.start, wire.end)}
     known: set[Pin] = set()
@@ -30,12 +30,12 @@ def _open(network: Network) -> Iterator[Fault]:
         for name in (*box.left, *box.right):
             known.add((box.name, name))
             if (box.name, name) not in wired and name not in box.free:
-                yield Fault(box.name, f"pin {name} is not connected")
+                yield BrokenRule(box.name, f"pin {name} is not connected")
     for missing in sorted(wired - known):
-        yield Fault(missing[0], f"a wire ends in {missing[1]}, which is no pin of it")
+        yield BrokenRule(missing[0], f"a wire ends in {missing[1]}, which is no pin of it")
 
 
-def _joined(network: Network) -> Iterator[Fault]:
+def _joined(network: Network) -> Iterator[BrokenRule]:
     """No pin joins two nets; grounds are one net, whatever they are called."""
     ground = {"0 V", "GND"}
     nets: dict[Pin, set[str]] = {}
@@ -44,31 +44,33 @@ def _joined(network: Network) -> Iterator[Fault]:
             nets.setdefault(pin, set()).add("0 V" if wire.net in ground else wire.net)
     for (name, joined), found in sorted(nets.items()):
         if len(found) > 1:
-            yield Fault(name, f"pin {joined} joins {' and '.join(sorted(found))}")
+            yield BrokenRule(name, f"pin {joined} joins {' and '.join(sorted(found))}")
 
 
-def _circuits(network: Network) -> Iterator[Fault]:
+def _circuits(network: Network) -> Iterator[BrokenRule]:
     for circuit in network.circuits:
         if circuit.amps > circuit.rated_a:
-            yield Fault(
+            yield BrokenRule(
                 "ring",
                 f"circuit {circuit.number} ({circuit.net}) carries {circuit.amps:g} A, rated {circuit.rated_a:g}",
             )
 
 
-def _branches(network: Network) -> Iterator[Fault]:
+def _branches(network: Network) -> Iterator[BrokenRule]:
     """A fuse carries the peak, its wires carry the fuse, the supply carries all."""
     for branch in network.branches:
         if branch.fuse_a < OVER_PEAK * branch.peak_a:
-            yield Fault(branch.name, f"{branch.fuse_a:g} A blows at the {branch.peak_a:.2g} A of {branch.feeds}")
+            yield BrokenRule(branch.name, f"{branch.fuse_a:g} A blows at the {branch.peak_a:.2g} A of {branch.feeds}")
         if wire_a(branch.mm2) < branch.fuse_a:
-            yield Fault(branch.name, f"{branch.mm2:g} mm² carries {wire_a(branch.mm2):g} A, its fuse {branch.fuse_a:g}")
+            yield BrokenRule(
+                branch.name, f"{branch.mm2:g} mm² carries {wire_a(branch.mm2):g} A, its fuse {branch.fuse_a:g}"
+            )
     peak = sum(branch.peak_a for branch in network.branches)
     if peak > network.supply_a:
-        yield Fault("supply", f"gives {network.supply_a:g} A, all together draw {peak:.2g}")
+        yield BrokenRule("supply", f"gives {network.supply_a:g} A, all together draw {peak:.2g}")
 
 
-def _volts(network: Network) -> Iterator[Fault]:
+def _volts(network: Network) -> Iterator[BrokenRule]:
     for drop in network.drops:
         if not drop.least <= drop.volts <= drop.most:
-            yield Fault(drop.device, f"gets {drop.volts:.2f} V, wants {drop.least:g} to {drop.most:g}")
+            yield BrokenRule(drop.device, f"gets {drop.volts:.2f} V, wants {drop.least:g} to {drop.most:g}")

@@ -37,7 +37,17 @@ def test_all_products_of_the_issue_are_there(shipped):
     by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
     hokuyo = {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX"}
     sick = {"LMS 200", "LMS111", "LMS151", "TiM551", "TiM561", "TiM571", "TiM781"}
-    cheap = {"LD06", "LD19", "STL27L", "RPLIDAR A1", "RPLIDAR A2", "RPLIDAR A3", "RPLIDAR S1", "RPLIDAR S2", "RPLIDAR C1"}
+    cheap = {
+        "LD06",
+        "LD19",
+        "STL27L",
+        "RPLIDAR A1",
+        "RPLIDAR A2",
+        "RPLIDAR A3",
+        "RPLIDAR S1",
+        "RPLIDAR S2",
+        "RPLIDAR C1",
+    }
     assert by_kind[Lidar] == {*hokuyo, *sick, *cheap}
     assert by_kind[Servo] == {
         *(

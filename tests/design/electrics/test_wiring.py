@@ -8,7 +8,7 @@ import pytest
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar, Servo, SlipRing
-from design.electrics.rules import faults_of
+from design.electrics.rules import broken_rules
 from design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
 from design.electrics.wiring import network_of
 from design.scanner import scanner_of
@@ -35,7 +35,7 @@ def network(lidar="UTM-30LX", servo="MX-64R", ring="UH1256-02-0610-06S"):
 def test_every_combination_of_the_catalogue_keeps_the_rules(servo):
     for lidar, ring in itertools.product(names(Lidar), [*names(SlipRing), None]):
         made = network(lidar, servo, ring)
-        known = [fault for fault in faults_of(made) if not made.unknown]
+        known = [fault for fault in broken_rules(made) if not made.unknown]
         assert known == [], (lidar, ring, known)
 
 
@@ -60,17 +60,17 @@ def test_the_default_scanner_by_hand():
 def test_six_circuits_take_a_lidar_on_usb_without_its_shield():
     made = network(ring="SRC022A-6")
     assert [circuit.net for circuit in made.circuits] == ["+", "-", "VBUS", "D-", "D+", "GND"]
-    assert ("lidar", "shield") not in {wire.end for wire in made.wires} and faults_of(made) == []
+    assert ("lidar", "shield") not in {wire.end for wire in made.wires} and broken_rules(made) == []
     assert "Ethernet" in network("UST-10LX", ring="SRC022A-6").risks[0]
     assert network(ring=None).circuits == () and network(ring=None).risks == ()
 
 
 def test_each_rule_sees_what_it_is_there_for():
     made = network()
-    assert faults_of(made) == []
+    assert broken_rules(made) == []
 
     def said(**change):
-        return [f"{fault.where}: {fault.message}" for fault in faults_of(replace(made, **change))]
+        return [f"{fault.where}: {fault.message}" for fault in broken_rules(replace(made, **change))]
 
     assert "servo: pin V is not connected" in said(wires=tuple(w for w in made.wires if w.end != ("servo", "V")))
     astray = (*made.wires, replace(made.wires[0], end=("servo", "VCC")))

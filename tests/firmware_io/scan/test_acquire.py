@@ -269,7 +269,14 @@ CAPSULES = {"sensor": "RPLIDAR S1"}
 
 @pytest.mark.parametrize(
     ("scanner", "turns", "points"),
-    [({}, 2, 80_000), (SWEEPING, 1, 15_000), (CHEAP, 2, 80_000), (ALL_AROUND, 2, 12_000), (CAPSULES, 2, 12_000), (SICK, 2, 40_000)],
+    [
+        ({}, 2, 80_000),
+        (SWEEPING, 1, 15_000),
+        (CHEAP, 2, 80_000),
+        (ALL_AROUND, 2, 12_000),
+        (CAPSULES, 2, 12_000),
+        (SICK, 2, 40_000),
+    ],
 )
 def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
     out, angles = tmp_path, angle_set(**scanner)
