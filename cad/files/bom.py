@@ -1,7 +1,7 @@
 """`bom.csv`: everything to print, turn and buy for one scanner, with what is known of numbers and prices.
 
-Prices are those of the catalogue, each with its source; a price that nobody has looked up stays empty and is counted in
-the last row, never guessed.
+Prices are those of the catalogue, each with its source and year. Where it has none, a range of `prices.py` stands in
+columns of its own, stated as an estimate; the last row adds both up and names what has not even that.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from cad.assembly.assembly import Assembly
 from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
+from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, UNSURE, estimate_usd, year_of
 from cad.layout.belt.stack import BeltStack
 from cad.layout.drive import DriveLayout
 from cad.layout.joints import Joint
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
+from design.electrics.wiring import network_of
 from design.scanner import Scanner
 
 JOINTS = "joints of the layout"
@@ -44,7 +46,7 @@ class BomItem:
     """One row. Empty texts and None are unknown.
 
     Attributes:
-        kind: printed, turned, sawn, bought, screw, nut, insert, wiring or total.
+        kind: printed, turned, sawn, material, bought, screw, nut, insert, wiring, consumable, tool or total.
         part: what it is.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
@@ -52,6 +54,9 @@ class BomItem:
         supplier_number: what to order there.
         unit_usd: price of one.
         total_usd: price of all.
+        low_usd: least that all of them may cost: from the price, or an estimate.
+        high_usd: most.
+        priced: year of the price.
         mass_g: of one.
         source: where the price, or the row, comes from.
         verified: whether that value is verified; empty where there is none.
@@ -66,6 +71,9 @@ class BomItem:
     supplier_number: str = ""
     unit_usd: float | None = None
     total_usd: float | None = None
+    low_usd: float | None = None
+    high_usd: float | None = None
+    priced: str = ""
     mass_g: float | None = None
     source: str = ""
     verified: str = ""
@@ -96,9 +104,13 @@ def items_of(
             how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
         note = f"{how}; drawing drawings/{name}.pdf"
         items.append(BomItem(part.process, name, number, 1, mass_g=round(masses_g[name], 1), note=note))
+    items.append(_filament(scanner, items))
     items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
-    items += _wiring(scanner, assembly.layout.drive)
+    items += _wiring(scanner)
+    items += _electrics(scanner)
+    items += _with_it(assembly.layout.drive, joints)
+    items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
 
@@ -169,20 +181,15 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
         yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note)
 
 
-def _wiring(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
-    yield BomItem("wiring", f"power supply, {PAPER_V:g} V", quantity=1, source=PAPER, note="price unknown")
-    if scanner.servo.rated_v != PAPER_V:
-        yield BomItem(
-            "wiring", f"power supply of the servo, {scanner.servo.rated_v:g} V", quantity=1, note="price unknown"
-        )
+def _wiring(scanner: Scanner) -> Iterator[BomItem]:
+    supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
+    yield BomItem("wiring", supply, quantity=1, source=PAPER, note="price unknown")
     yield from _servo_wiring(scanner.servo)
     needs = WIRING.get(scanner.lidar.name)
     if needs is None:
         yield _unknown_wiring(scanner.lidar)
     for part, quantity, source in needs or ():
         yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
-    for part, source in drive.needs:
-        yield BomItem("wiring", part, quantity=1, source=source, note="price unknown")
     if scanner.slip_ring is not None:
         circuits = scanner.slip_ring.circuits
         part = "plug, socket and heat shrink for the leads of the slip ring"
@@ -214,9 +221,102 @@ def _unknown_wiring(product: Product) -> BomItem:
     return BomItem("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
 
 
+def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
+    """Plastic of all printed parts, a tenth more for supports and what fails."""
+    grams = 1.1 * sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
+    low, high = (round(grams / 1000 * usd, 2) for usd in FILAMENT_USD_PER_KG)
+    return BomItem(
+        kind="material",
+        part="plastic to print, by mass",
+        quantity=1,
+        low_usd=low,
+        high_usd=high,
+        mass_g=round(grams, 1),
+        source=ESTIMATED,
+        note=f"{scanner.printer.maker}; a kg for {FILAMENT_USD_PER_KG[0]:g} to {FILAMENT_USD_PER_KG[1]:g} USD",
+    )
+
+
+def _electrics(scanner: Scanner) -> Iterator[BomItem]:
+    """What the wiring needs beside the devices themselves."""
+    network, source = network_of(scanner), "wiring.md"
+    blades: dict[float, int] = {}
+    for branch in network.branches:
+        blades[branch.fuse_a] = blades.get(branch.fuse_a, 0) + 1
+    for amps, count in sorted(blades.items()):
+        yield BomItem(
+            "wiring", f"blade fuse, {amps:g} A", "ISO 8820-3", count, source=source, note="and one spare of each"
+        )
+    main = next(box for box in network.boxes if box.name == "switch")
+    yield BomItem("wiring", "main fuse with holder", "ISO 8820-3", 1, source=source, note=main.lines[0])
+    yield BomItem("wiring", "switch, 12 V DC", quantity=1, source=source, note=main.lines[0])
+    yield BomItem("wiring", "distribution with fuse holders, and a ground bar", quantity=1, source=source)
+    for box in network.boxes:
+        if box.name.endswith("converter"):
+            yield BomItem("wiring", box.title, quantity=1, source=source, note=", ".join(box.lines))
+    for mm2 in sorted({wire.mm2 for wire in network.wires if wire.mm2 > 0}):
+        yield BomItem(
+            "wiring", f"stranded wire, {mm2:g} mm², red and black", "IEC 60228", 1, source=source, note="5 m each"
+        )
+
+
+def _with_it(drive: DriveLayout, joints: list[Joint]) -> Iterator[BomItem]:
+    """Small things of the drive, what is used up, and tools."""
+    for part, source in drive.needs:
+        kind = "consumable" if estimate_usd("consumable", part) else "wiring"
+        yield BomItem(kind, part, quantity=1, source=source, note="price unknown")
+    locked = "screws that end in metal or nuts"
+    yield BomItem(
+        "consumable", "threadlocker, medium strength", quantity=1, source=locked, note="a few drops; price unknown"
+    )
+    sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
+    yield BomItem("tool", "hexagon keys", quantity=1, source=JOINTS, note=f"for {sizes}; price unknown")
+    yield BomItem("tool", "torque screwdriver, 0.1 to 1 N m", quantity=1, source="assembly.md", note="price unknown")
+    yield BomItem("tool", "multimeter", quantity=1, source="wiring.md", note="price unknown")
+    if any("retaining ring" in part for part, _ in drive.needs):
+        note = "reads 0.01 mm; price unknown"
+        yield BomItem("tool", "dial indicator on a stand", quantity=1, source="assembly.md", note=note)
+    if any(part.startswith(("cable tie", "a soft tube")) for part, _ in drive.needs) or any(
+        joint.inserts for joint in joints
+    ):
+        yield BomItem("tool", "soldering iron", quantity=1, source="assembly.md", note="leads, inserts; price unknown")
+
+
+def _ranged(item: BomItem) -> BomItem:
+    """The row with what it may cost: its price, wider where that is doubtful, or an estimate."""
+    if item.low_usd is not None:
+        return item
+    if item.total_usd is not None:
+        low, high = (1.0, 1.0) if item.verified == "yes" else UNSURE
+        return replace(
+            item,
+            low_usd=round(low * item.total_usd, 2),
+            high_usd=round(high * item.total_usd, 2),
+            priced=year_of(item.source),
+        )
+    each = estimate_usd(item.kind, item.part)
+    if each is None:
+        return item
+    low, high = (round((item.quantity or 1) * usd, 2) for usd in each)
+    said = item.note.replace("price unknown", "").rstrip("; ")
+    note = "; ".join(filter(None, (said, "" if item.kind == "printed" else ESTIMATED)))
+    return replace(item, low_usd=low, high_usd=high, note=note)
+
+
 def _total(items: list[BomItem]) -> BomItem:
     known = [item.total_usd for item in items if item.total_usd is not None]
     unknown = sum(item.total_usd is None for item in items)
     doubtful = sum(item.total_usd is not None and item.verified == "no" for item in items)
-    note = f"sum of {len(known)} known prices, {doubtful} of them not verified; {unknown} rows without a price"
-    return BomItem("total", "all rows with a price", total_usd=round(sum(known), 2), note=note)
+    open_ = [item.part for item in items if item.low_usd is None]
+    tools = sum(item.high_usd or 0.0 for item in items if item.kind == "tool")
+    note = (
+        f"sum of {len(known)} known prices, {doubtful} of them not verified; {unknown} rows without a price: the range "
+        f"counts them by estimates, tools up to {tools:.0f}; "
+        f"{'not in the range: ' + ', '.join(open_) if open_ else 'nothing is without an estimate'}; no tax, no carriage"
+    )
+    low, high = (
+        round(sum(usd for item in items if (usd := getattr(item, end)) is not None)) for end in ("low_usd", "high_usd")
+    )
+    return BomItem(
+        "total", "all rows with a price", total_usd=round(sum(known), 2), low_usd=low, high_usd=high, note=note
+    )

@@ -14,7 +14,6 @@ from cad.files.instructions import instructions_text
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import LENGTHS, shank_mm
-from cad.layout.layout import drive_of
 from cad.screws import INSERT_LENGTH, SCREWS
 from design.angles import Angles
 from design.catalogue.catalogue import load_catalogue
@@ -52,6 +51,27 @@ def test_prices_are_the_catalogues_and_unknown_ones_stay_empty(rows, made):
     assert f"{without} rows without a price" in total["note"]
 
 
+def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range(rows):
+    assert [row["part"] for row in rows if row["low_usd"] == ""] == []
+    for row in rows:
+        assert 0 <= float(row["low_usd"]) <= float(row["high_usd"])
+        if row["kind"] not in ("printed", "total") and row["total_usd"] == "":
+            assert "estimate of 2026" in row["note"] + row["source"], row
+        if row["verified"] == "no" and row["total_usd"]:
+            assert float(row["low_usd"]) < float(row["total_usd"]) < float(row["high_usd"])
+    *parts, total = rows
+    for end in ("low_usd", "high_usd"):
+        assert float(total[end]) == pytest.approx(sum(float(row[end]) for row in parts), abs=0.5)
+    assert next(row["priced"] for row in rows if row["part"] == "lidar") == "2016"
+    plastic = next(row for row in rows if row["kind"] == "material")
+    printed = sum(float(row["mass_g"]) for row in rows if row["kind"] == "printed")
+    assert float(plastic["mass_g"]) == pytest.approx(1.1 * printed, abs=0.1)
+    assert float(plastic["high_usd"]) == pytest.approx(1.1 * printed / 1000 * 35, abs=0.01)
+    assert {"threadlocker, medium strength", "retaining ring DIN 471 - 12"} <= {row["part"] for row in rows}
+    assert sum(row["kind"] == "tool" for row in rows) >= 4
+    assert all(row["number"] or row["supplier"] for row in rows if row["kind"] in ("bought", "screw", "nut"))
+
+
 def test_what_the_paper_asks_for_is_there(rows):
     wiring = [row["part"] for row in rows if row["kind"] == "wiring"]
     assert sum("USB" in part for part in wiring) == 2
@@ -65,16 +85,16 @@ def test_what_the_paper_asks_for_is_there(rows):
         (
             "XL330-M288",
             [
-                *("power supply of the servo, 5 V", "USB adapter to Dynamixel servos, such as ROBOTIS U2D2"),
+                "USB adapter to Dynamixel servos, such as ROBOTIS U2D2",
                 "servo cable, 3 pins, with power",
             ],
             None,
         ),
     ],
 )
-def test_a_servo_brings_its_supply_adapter_and_cable(made, servo, listed, price):
+def test_a_servo_brings_its_adapter_and_cable(made, servo, listed, price):
     scanner = replace(made.scanner, servo=load_catalogue().get(servo, Servo))
-    rows = [item for item in _wiring(scanner, drive_of(made.scanner)) if "lidar" not in item.part]
+    rows = [item for item in _wiring(scanner) if "lidar" not in item.part]
     assert [item.part for item in rows][1 : 1 + len(listed)] == listed
     assert [item.total_usd for item in rows if item.total_usd is not None] == ([] if price is None else [price])
 

@@ -156,9 +156,11 @@ def folder(tmp_path_factory):
         for s in ("pass", "note", "warning", "error", "pass")
     ]
     write_json(folder / "checks.json", {"schema": "scanwright/checks/1", "checks": checks})
-    rows = ["bought,lidar,UTM-30LX,1,Hokuyo,,5000.0,5000.0,370.0,,yes,", "nut,hexagon nut,ISO 4032 M4,4" + 8 * ","]
-    rows += ['total,all rows,,,,,,5438.5,,,,"sum of 4"']
-    header = "kind,part,number,quantity,supplier,supplier_number,unit_usd,total_usd,mass_g,source,verified,note"
+    rows = ["bought,lidar,UTM-30LX,1,Hokuyo,,5000.0,5000.0,5000.0,5000.0,2016,370.0,,yes,"]
+    rows += ["nut,hexagon nut,ISO 4032 M4,4" + 11 * ","]
+    rows += ['total,all rows,,,,,,5438.5,5400,5500,,,,,"sum of 4"']
+    header = "kind,part,number,quantity,supplier,supplier_number,unit_usd,total_usd,low_usd,high_usd,priced,mass_g,"
+    header += "source,verified,note"
     (folder / "bom.csv").write_text("\n".join([header, *rows, ""]))
     (folder / "assembly.md").write_text(f"# Title\n\nLook at `exploded.glb`.\n\n## 1. Servo\n\n**4 x M4** {EVIL}\n")
     (folder / "wiring.svg").write_text(
