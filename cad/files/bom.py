@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 from cad.assembly.assembly import Assembly
 from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
-from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, UNSURE, estimate_usd, year_of
+from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
 from cad.layout.belt.stack import BeltStack
 from cad.layout.drive import DriveLayout
 from cad.layout.joints import Joint
@@ -287,13 +287,10 @@ def _ranged(item: BomItem) -> BomItem:
     if item.low_usd is not None:
         return item
     if item.total_usd is not None:
-        low, high = (1.0, 1.0) if item.verified == "yes" else UNSURE
-        return replace(
-            item,
-            low_usd=round(low * item.total_usd, 2),
-            high_usd=round(high * item.total_usd, 2),
-            priced=year_of(item.source),
-        )
+        year = year_of(item.source)
+        low, high = (1.0, 1.0) if item.verified == "yes" and year >= RECENT else UNSURE
+        usd = item.total_usd
+        return replace(item, low_usd=round(low * usd, 2), high_usd=round(high * usd, 2), priced=year)
     each = estimate_usd(item.kind, item.part)
     if each is None:
         return item

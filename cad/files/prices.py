@@ -10,7 +10,8 @@ import re
 
 ESTIMATED = "estimate of 2026 of what shops usually ask, none was asked"
 FILAMENT_USD_PER_KG = (15.0, 35.0)
-UNSURE = (0.7, 1.5)  # times a catalogue price that nobody verified
+UNSURE = (0.7, 1.5)  # times a catalogue price that nobody verified, or of before RECENT
+RECENT = "2024"
 EACH: dict[str, tuple[tuple[str, float, float], ...]] = {
     "printed": (("", 0.0, 0.0),),  # its plastic has a row of its own
     "turned": (("journal_sleeve", 25.0, 90.0), ("", 50.0, 180.0)),
@@ -21,8 +22,9 @@ EACH: dict[str, tuple[tuple[str, float, float], ...]] = {
     "wiring": (
         ("power supply", 15.0, 45.0),
         ("step-", 4.0, 15.0),
-        ("fuse", 0.3, 1.5),
         ("distribution", 6.0, 20.0),
+        ("main fuse", 2.0, 8.0),
+        ("fuse", 0.3, 1.5),
         ("switch", 3.0, 10.0),
         ("wire", 5.0, 15.0),
         ("adapter", 25.0, 60.0),

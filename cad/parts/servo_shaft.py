@@ -44,7 +44,7 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
         make=partial(servo_shaft, stack, scanner.servo, scanner.printer),
         step=Step("Shaft on the horn", words),
         process="turned",
-        material=TURNED_FROM,
+        material=TURNED_FROM if stack.bearing is None else f"{ALUMINIUM.name}, or {STEEL.name} with its own waist",
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
         sheet=OnSheet(fits, (*cross_words(stack), *_waist_words(stack))),
         shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
