@@ -222,7 +222,7 @@ def test_a_missing_file_a_folder_and_bytes_are_one_line(tmp_path):
 
 
 def test_an_unknown_task_name_lists_the_shipped_ones(tmp_path):
-    with pytest.raises(TaskError, match="ceiling, ground_ahead, indoor_urg, pitching, rolling, uniform"):
+    with pytest.raises(TaskError, match="ceiling, ground_ahead, indoor_urg, low_cost, pitching, rolling, uniform"):
         load_task(tmp_path.relative_to(tmp_path.parent) / "ground")
 
 
@@ -254,6 +254,7 @@ def test_all_shipped_tasks_load_under_their_own_name(load_shipped):
         "ceiling",
         "ground_ahead",
         "indoor_urg",
+        "low_cost",
         "pitching",
         "rolling",
         "uniform",
