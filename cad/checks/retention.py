@@ -58,19 +58,24 @@ def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
 
 
 def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Check]:
-    where, hanging = f"{joint.part} on {joint.onto}", hanging_on(assembly, joint)
+    said, where, hanging = f"{joint.part} on {joint.onto}", _place(joint), hanging_on(assembly, joint)
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     carries = LIDAR in hanging
     if hold is None:
-        message = f"{where}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
+        message = f"{said}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
         yield Check("retention", "error" if carries else "note", None, None, "", where, message)
         return
     bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic
     if bare and carries:
-        message = f"{where}: the lidar hangs on threads in bare plastic, which creeps: nuts or inserts"
+        message = f"{said}: the lidar hangs on threads in bare plastic, which creeps: nuts or inserts"
         yield Check("retention", "error", None, None, "", where, message)
     yield _margin(scanner, assembly, joint, hold, hanging)
-    yield _screws(joint, hold, where)
+    yield _screws(joint, hold)
+
+
+def _place(joint: Joint) -> str:
+    """Both sides of a joint, as the pictures of a report look for them."""
+    return f"{joint.part} and {joint.onto}"
 
 
 def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Check:
@@ -87,15 +92,15 @@ def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hang
     return at_least("retention", margins[first], LEAST_MARGIN, "times", joint.part, what)
 
 
-def _screws(joint: Joint, hold: Hold, where: str) -> Check:
+def _screws(joint: Joint, hold: Hold) -> Check:
     said = f"{hold.engaged_mm:.1f} mm of thread" if hold.asked_mm else f"{hold.engaged_mm:.1f} mm of nut or insert"
     message = (
-        f"{where}: {joint.count} x {joint.number}: {said}, {hold.asked_mm:.1f} asked, {hold.torque_nm:g} N m "
-        f"({hold.preload_n:.0f} N); what loosens it: {hold.loosens}"
+        f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {said}, {hold.asked_mm:.1f} asked, "
+        f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); what loosens it: {hold.loosens}"
     )
     held = hold.engaged_mm >= hold.asked_mm
     value, limit = tidy(hold.engaged_mm), tidy(hold.asked_mm)
-    return Check("screw", "pass" if held else "error", value, limit, "mm", where, message)
+    return Check("screw", "pass" if held else "error", value, limit, "mm", _place(joint), message)
 
 
 def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:

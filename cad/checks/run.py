@@ -92,4 +92,7 @@ def electric_checks(scanner: Scanner) -> list[Check]:
         Check("wiring", "warning", None, None, "", fact.split(":")[0], f"{fact} is not in the catalogue: ask its maker")
         for fact in network.unknown
     ]
-    return [*(faults or [Check("wiring", "pass", None, None, "", "wiring", kept)]), *doubts]
+    return [
+        *(faults or [Check("wiring", "pass", None, None, "", f"{scanner.lidar.name} and {scanner.servo.name}", kept)]),
+        *doubts,
+    ]

@@ -248,3 +248,10 @@ def test_a_filter_keeps_what_is_known_to_keep_it(shipped):
     assert all(p.price_usd is not None for p in cheap) and "MX-28" not in {p.name for p in cheap}
     assert {p.kind for p in chosen(shipped, min_range_m=15)} == {"lidar"}
     assert len(chosen(shipped)) == len(shipped.products)
+
+
+def test_every_product_tells_its_values_in_words():
+    """Records of a product too: the flange of a capsule, the circuits of a ring, the leads of a lidar."""
+    for product in load_catalogue():
+        assert len(product.lines()) == len(product.provenance()) + 2
+    assert any('"count": 6' in line for line in load_catalogue().named("SRC022A-6").lines())

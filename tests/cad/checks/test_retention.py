@@ -82,7 +82,7 @@ def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, m
     hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
     _instead(monkeypatch, joints, hub, replace(hub, fixing="grub"))
     assert [check.where for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
-        f"{hub.part} on {hub.onto}"
+        f"{hub.part} and {hub.onto}"
     ]
     for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):
         _instead(monkeypatch, joints, nuts, replace(nuts, fixing="thread", thread=None))
