@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Int64, Real
 from numpy import ndarray
 
 from design.errors import DeviceError
@@ -154,7 +154,8 @@ class DeviceClock:
             scan_period_s: between two scans, to one part in a hundred.
             smallest_delay_ns: from the moment that a stamp means to the arrival of an undelayed scan's last byte.
             first_beam_ns: from that moment to the first beam, which the results are times of.
-            fine: stamps have parts of a millisecond, finer than turns are even: they are taken as they are.
+            fine: stamps have parts of a millisecond, finer than turns are even: they are taken as they are. The
+                uncertainty allows for a tick all the same.
         """
         self._period_ms = scan_period_s * 1e3
         self._delay_ns = smallest_delay_ns
@@ -199,7 +200,7 @@ class DeviceClock:
         chance_ns = self._late_ns / min(self._count, _NEAR)
         line_ns += max(self._near_ns - _CHANCE * chance_ns, 0.0)
         time_ns = self._origin[1] + round(turn_ms * 1e6 + line_ns) - self._delay_ns
-        uncertainty_ns = math.hypot(chance_ns, self._reach_ns, 0.0 if self._fine else _GRAIN_NS)
+        uncertainty_ns = math.hypot(chance_ns, self._reach_ns, _GRAIN_NS)
         if self._sync is not None:
             told_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
             time_ns = min(max(time_ns, told_ns - half_ns), told_ns + half_ns)
@@ -263,7 +264,7 @@ class DeviceClock:
 
 
 def host_times(
-    clock: DeviceClock, stamp_ms: Int64[ndarray, " n"], arrival_ns: Int64[ndarray, " n"]
+    clock: DeviceClock, stamp_ms: Real[ndarray, " n"], arrival_ns: Int64[ndarray, " n"]
 ) -> tuple[Int64[ndarray, " n"], Int64[ndarray, " n"]]:
     """Host times of the first beams [ns] and their uncertainty [ns], as a stream of scans would get them.
 

@@ -57,6 +57,18 @@ def test_other_quartzes_and_other_spreads(spread, ppm):
     assert np.abs(error_ms[late]).max() < 1.0
 
 
+def test_fine_stamps_are_taken_as_they_are_where_turns_are_uneven():
+    rng = np.random.default_rng(4)
+    shown_ms = 77.0 + np.cumsum(20 + rng.uniform(-1.0, 1.0, 6000))  # no line passes near such turns
+    true_ns = np.int64(7e15) + np.rint((shown_ms - shown_ms[0]) / (1 + 50e-6) * 1e6).astype(np.int64)
+    arrival_ns = np.maximum.accumulate(true_ns + np.rint(rng.uniform(0, 5e6, true_ns.size)).astype(np.int64))
+    clock = DeviceClock(0.02, smallest_delay_ns=0, fine=True)
+    time_ns, uncertainty_ns = host_times(clock, np.floor(shown_ms * 1e3) / 1e3, arrival_ns)
+    error_ns, late = time_ns - true_ns, settled(true_ns)
+    assert np.abs(error_ns[late]).max() < 200_000
+    assert np.mean(np.abs(error_ns[late]) < 2 * uncertainty_ns[late]) > 0.95
+
+
 @pytest.mark.parametrize("beat", [0.0, 5e-6, 2e-5, 1e-4, 4e-4])  # a tick in 200, 50, 10 and 2.5 s
 def test_a_slow_beat_of_turns_and_ticks_is_seen_through(beat):
     true_ns, stamp_ms, arrival_ns = sensor(240, 25.0 * (1 + beat), seed=4)
