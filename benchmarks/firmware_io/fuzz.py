@@ -1,6 +1,6 @@
 """Damaged replies through both codecs: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED]`.
 
-STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each of its protocols,
+STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each protocol,
 each with a few flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed
 errors, whatever is accepted must have right sums, told by loops of this file, and nothing may hang. Anything else ends
 the run.
