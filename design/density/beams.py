@@ -87,6 +87,12 @@ def polar_and_azimuth(directions: Float[ndarray, "n 3"]) -> tuple[Float[ndarray,
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
+def is_closed(bearings_rad: Float[ndarray, " beams"]) -> bool:
+    """Whether a fan sees all around: from its last beam to its first it is no farther than between others."""
+    apart = np.abs(np.diff(bearings_rad))
+    return apart.size > 1 and bool(2 * np.pi - apart.sum() <= 1.5 * np.median(apart))
+
+
 def blind_zones(
     bearings_rad: Float[ndarray, " beams"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
 ) -> Float[ndarray, "zones 2"]:

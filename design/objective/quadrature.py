@@ -7,7 +7,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Setting, Vector
-from design.density.beams import polar_and_azimuth
+from design.density.beams import is_closed, polar_and_azimuth
 from design.errors import TaskError
 from design.frames import R_world_rot
 from design.objective.problem import Problem
@@ -28,7 +28,9 @@ def polar_rule(
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     polar, azimuth = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     step = problem.grid_step_deg
-    breaks = np.concatenate([_density_breaks(polar, problem.ball_rad), problem.blind_zones(polar).ravel()])
+    breaks = np.concatenate(
+        [_density_breaks(problem.bearings_rad, polar, problem.ball_rad), problem.blind_zones(polar).ravel()]
+    )
     rule = _grid_rule(field, step, axis) if step else circle_rule(field, axis, breaks, nodes)
     if not rule.fine.sum() > 0:
         raise TaskError(EMPTY)
@@ -46,7 +48,14 @@ def _grid_rule(field: Field, step_deg: float, axis: Vector) -> PolarRule:
     return PolarRule(unique, summed, summed, np.zeros(len(unique), dtype=np.intp))
 
 
-def _density_breaks(beam_polar_rad: Float[ndarray, " beams"], ball_rad: float) -> Float[ndarray, " n"]:
-    """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends."""
-    marks = np.array([beam_polar_rad.min(), beam_polar_rad.max(), beam_polar_rad[0], beam_polar_rad[-1]])
+def _density_breaks(
+    bearings_rad: Float[ndarray, " beams"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
+) -> Float[ndarray, " n"]:
+    """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends.
+
+    A fan all around has no ends: between its last beam and its first it goes on as between any two.
+    """
+    marks = np.array([beam_polar_rad.min(), beam_polar_rad.max()])
+    if not is_closed(bearings_rad):
+        marks = np.append(marks, beam_polar_rad[[0, -1]])
     return np.concatenate([marks - ball_rad, marks, marks + ball_rad])

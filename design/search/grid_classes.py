@@ -5,6 +5,7 @@ by the third row q of `R_rot_laser`, and where the axis u points. And with the s
 
     (q0, q1) about u is (-q0, -q1) about -u       for any fan
     (q0, q1) about u is (q0, -q1) about u         for a symmetric fan
+    (q0, q1) about u is (-q0, -q1) about u        for a fan that looks as far behind as ahead: a full circle
 """
 
 from __future__ import annotations
@@ -48,9 +49,19 @@ class Folded:
 
 
 def mirrors_of(bearings_rad: Float[ndarray, " beams"]) -> Float[ndarray, "mirrors 2 2"]:
-    """Mirrors of (q0, q1) that a fan allows, shape (1 or 2, 2, 2); the identity is the first."""
-    symmetric = np.allclose(bearings_rad, -bearings_rad[::-1], atol=1e-9)
-    return np.array([np.eye(2), np.diag([1.0, -1.0])])[: 2 if symmetric else 1]
+    """Mirrors of (q0, q1) that a fan allows, shape (1, 2 or 4, 2, 2); the identity is the first."""
+    mirrors = np.array([np.eye(2)])
+    if _same_circle(bearings_rad, -bearings_rad):
+        mirrors = np.concatenate([mirrors, mirrors @ np.diag([1.0, -1.0])])
+    if _same_circle(bearings_rad, bearings_rad + np.pi):
+        mirrors = np.concatenate([mirrors, -mirrors])
+    return mirrors
+
+
+def _same_circle(one_rad: Float[ndarray, " beams"], other_rad: Float[ndarray, " beams"]) -> bool:
+    """Whether two fans are the same directions, in whatever order and whole turns apart."""
+    ends = np.array([np.sort(np.round(fan % (2 * np.pi), 9) % np.round(2 * np.pi, 9)) for fan in (one_rad, other_rad)])
+    return bool(np.allclose(ends[0], ends[1], atol=1e-8))
 
 
 def fold_axes(ranges: AngleRanges) -> Folded:

@@ -68,7 +68,7 @@ def search(
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
     start = time.perf_counter()
-    mirrors = mirrors_of(problem.bearings_rad)[: 2 if problem.sweep is None else 1]
+    mirrors = mirrors_of(problem.bearings_rad)[: None if problem.sweep is None else 1]
     fine = _grid(problem, ranges, limits)
     progress(_looked_over(problem, fine))
     avoid = ranges.holes == "avoid"

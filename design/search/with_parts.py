@@ -188,9 +188,10 @@ def equivalents(
     if problem.sweep is not None:
         return [angles_deg]
     turned = (a + 360.0) % 360.0 - 180.0  # with -b the axis points the other way
-    found = [(a, b, c, d), (turned, 0.0 - b, 0.0 - c, 0.0 - d)]
-    if len(mirrors_of(problem.bearings_rad)) == 2:
-        found += [(a, b, 0.0 - c, d), (turned, 0.0 - b, c, 0.0 - d)]
+    found: list[tuple[float, float, float, float]] = []
+    for beta, alpha in np.diagonal(mirrors_of(problem.bearings_rad), axis1=1, axis2=2).tolist():
+        plane = 0.0 + alpha * c, 0.0 + beta * d  # q0 has the sign of beta_laser, q1 that of alpha_laser
+        found += [(a, b, *plane), (turned, 0.0 - b, 0.0 - plane[0], 0.0 - plane[1])]
     limits = [ranges.limits(name) for name in NAMES]
     inside = [
         setting

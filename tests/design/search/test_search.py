@@ -44,6 +44,7 @@ CASES = {
     "a fan without symmetry, axis fixed": case(
         LEFT, {"step_deg": 15, "alpha_rot_deg": 20, "beta_rot_deg": -35}, sensor="URG-04LX", period_s=4.0
     ),
+    "a fan all around": case(LEFT, {"step_deg": 45}, sensor="LD19", period_s=4.0),
     "scan plane fixed": case(AHEAD, {"step_deg": 15, "alpha_laser_deg": 37, "beta_laser_deg": -12}, period_s=2.0),
     "one angle fixed, one range short": case(
         AHEAD, {"step_deg": 30, "alpha_rot_deg": 100, "beta_laser_deg": [-17, 50]}, period_s=2.0
@@ -93,7 +94,7 @@ def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name):
 
 
 @pytest.mark.usefixtures("unrefined")
-@pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX"])
+@pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX", "LD19"])
 def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor):
     """Every direction has a weight here and none like its mirror image, so nothing but symmetry makes J equal."""
     uneven = {"weight": [{"shape": "all", "value": 0.2}, LEFT["weight"][0]]}

@@ -88,6 +88,10 @@ def test_equivalent_settings_have_the_same_J_and_stay_in_the_ranges():
     for other in found:
         assert score(p, np.radians(other)).J == pytest.approx(J, abs=1e-9)
     assert equivalents(p, setting, AngleRanges(alpha_rot_deg=(0, 90), alpha_laser_deg=(0, 90))) == [setting]
+    around = problem("LD19")
+    assert len(equivalents(around, setting, ranges)) == 8
+    J = [score(around, np.radians(other)).J for other in equivalents(around, setting, ranges)]
+    np.testing.assert_allclose(J, J[0], atol=1e-9)
     assert len(equivalents(problem("URG-04LX"), setting, ranges)) == 2  # its fan is not symmetric
 
 
