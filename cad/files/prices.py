@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import re
 
+from cad.layout.names import JOURNAL_SLEEVE
+
 ESTIMATED = "estimate of 2026 of what shops usually ask, none was asked"
 FILAMENT_USD_PER_KG = (15.0, 35.0)
 UNSURE = (0.7, 1.5)  # times a catalogue price that nobody verified, or of before RECENT
 RECENT = "2024"
 EACH: dict[str, tuple[tuple[str, float, float], ...]] = {
     "printed": (("", 0.0, 0.0),),  # its plastic has a row of its own
-    "turned": (("journal_sleeve", 25.0, 90.0), ("", 50.0, 180.0)),
+    "turned": ((JOURNAL_SLEEVE, 25.0, 90.0), ("", 50.0, 180.0)),
     "sawn": (("", 8.0, 30.0),),
     "screw": (("", 0.05, 0.35),),
     "nut": (("", 0.03, 0.20),),
