@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("scanwright", "design", "cad", "firmware_io")
 OURS = re.compile(rf"({'|'.join(PACKAGES)})(\.[A-Za-z_]\w*)+")
 IN_THE_PROJECT = re.compile(rf"(({'|'.join(PACKAGES)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
-WRITTEN_BY_A_BUILD = {"assembly.md"}
+WRITTEN_BY_A_BUILD = {"wiring.md", "assembly.md"}
 
 project = "Scanwright"
 author = "the Scanwright authors"
