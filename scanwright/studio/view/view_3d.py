@@ -63,7 +63,7 @@ class View3D:
             self.tiles.faces,
             self.tiles.wxyz,
             self.tiles.directions * RADIUS_M,
-            batched_colors=(200, 200, 200),
+            batched_colors=_blank(self.tiles.directions),
             side=SIDES[self._looked],
             lod="off",
             cast_shadow=False,
@@ -93,6 +93,9 @@ class View3D:
     def stand_in(self, task: Task) -> None:
         """Put up the room of a task, in the colour of what has none yet."""
         room, _ = room_about(task)
+        before = self._stands_in
+        if before is not None and np.array_equal([before.low, before.high], [room.low, room.high]):
+            return  # paint changes what counts, and no wall
         self._stands_in, self.room = room, room_tiles(room)
         x, y, z = room.high - room.low
         self._room_eye_m = (float(-0.8 * x), float(0.8 * y), float(0.5 * (x + z)))
@@ -103,7 +106,7 @@ class View3D:
             self.room.faces,
             self.room.wxyz,
             self.room.middles_m,
-            batched_colors=(200, 200, 200),
+            batched_colors=_blank(self.room.middles_m),
             side="front",
             lod="off",
             cast_shadow=False,
@@ -200,6 +203,11 @@ class View3D:
                 point_shading="flat",
                 precision="float32",
             )
+
+
+def _blank(tiles: Array) -> Colours:
+    """A colour for each tile from the first: a browser that got one for all complains of the many that follow."""
+    return np.full((len(tiles), 3), 200, np.uint8)
 
 
 def _unlit(colours: Colours, normals: Array) -> Colours:

@@ -108,16 +108,16 @@ def test_a_touched_file_is_no_current_build(ceiling):
 
 
 def test_building_again_elsewhere_finds_the_one_file_that_was_touched(ceiling, monkeypatch, capsys):
-    table = ceiling / "task.toml"
-    kept = table.read_bytes()
-    table.write_bytes(kept + b"# mine\n")  # the last of all files by name: every other one is compared before it
-    assert max(FILES - {"manifest.json"}) == "task.toml"
+    drawing = ceiling / "wiring.svg"
+    kept = drawing.read_bytes()
+    drawing.write_bytes(kept + b"<!-- mine -->")  # the last of all files by name: every other one is compared before it
+    assert max(FILES - {"manifest.json"}) == "wiring.svg"
     monkeypatch.setattr(sys, "argv", ["scanwright", "build", "--check", str(ceiling)])
     with pytest.raises(SystemExit) as stop:
         scanwright_command()
-    table.write_bytes(kept)
+    drawing.write_bytes(kept)
     assert stop.value.code == 1
-    assert f"{ceiling}: task.toml: sha256 " in capsys.readouterr().out
+    assert f"{ceiling}: wiring.svg: sha256 " in capsys.readouterr().out
 
 
 def _written(folder, files):
