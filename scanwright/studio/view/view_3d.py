@@ -80,7 +80,8 @@ class View3D:
         """Show the far half of the sphere with the scanner before it, the near half, the room instead, or nothing."""
         in_room = (self._looked == "in its room") != (looked == "in its room")
         self._looked = looked
-        self.sphere.side = SIDES[looked]
+        if self.on_sphere:
+            self.sphere.side = SIDES[looked]
         self.sphere.visible = self.on_sphere
         if self._room is not None:
             self._room.visible = looked == "in its room"
