@@ -52,7 +52,8 @@ def parts(glb: Path, png: Path) -> None:
         canvas.mesh(body, colour)
     corners = np.array([body.bounds for body, _ in bodies])
     middle = (corners[:, 0].min(0) + corners[:, 1].max(0)) / 2
-    image = canvas.picture(SIZE, middle + np.array([-0.9, 2.2, 0.7]), middle, parallel=0.27)
+    reach = float(np.linalg.norm(corners[:, 1].max(0) - corners[:, 0].min(0))) / 2
+    image = canvas.picture(SIZE, middle + np.array([-0.9, 2.2, 0.7]), middle, parallel=0.7 * reach)
     image.quantize(128).save(png, optimize=True)
 
 

@@ -3,7 +3,7 @@
 Every joint is taken out in turn: what then has no way to the deck hangs on it. That weighs five times its weight, in
 the direction that is worst for each screw; friction and preload hold nothing. Screws share a force equally and take a
 moment as a group of equal springs does; those that point at the axis from a hub or a boss take no moment, their fit
-does.
+does. What gives way under that fails; what has less than twice of it to spare is a warning.
 """
 
 from __future__ import annotations

@@ -76,6 +76,17 @@ def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_asse
     ] == [len(joints)] * 2
 
 
+def test_what_gives_way_fails_and_what_has_little_to_spare_warns(scanner_and_assembly, monkeypatch):
+    scanner, assembly = scanner_and_assembly
+    margin = min(c.value for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None)
+    for over, severity in ((0.4 * margin, "pass"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
+        with monkeypatch.context() as shaken:
+            shaken.setattr(room, "SHOCK_G", 5.0 * over)
+            checks = [c for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None]
+        weakest = min(checks, key=lambda check: check.value)
+        assert (weakest.severity, weakest.value) == (severity, pytest.approx(margin / over, rel=0.02))
+
+
 def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, monkeypatch):
     scanner, assembly = scanner_and_assembly
     joints = joints_of(assembly.layout)
