@@ -15,14 +15,14 @@ from pydantic import Field, Strict, model_validator
 from design.arrays import Array
 from design.record import Record
 
-LONGEST_S = 600.0
+SHORTEST_S, LONGEST_S = 1e-3, 600.0
 
 
 class Spin(Record):
     """Continuous rotation at constant speed."""
 
     mode: Literal["spin"] = Field(default="spin", description="turn on and on")
-    period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of one full turn of the servo")
+    period_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time of one full turn of the servo")
 
     @property
     def duration_s(self) -> float:
@@ -34,7 +34,9 @@ class Shortest(Record):
     """Spin as fast as the limits of the task allow, `period_s = "shortest"` in its file: the search finds how fast."""
 
     mode: Literal["shortest"] = Field(default="shortest", description="spin, as fast as the limits allow")
-    longest_s: float = Field(default=60.0, strict=True, gt=0, le=LONGEST_S, description="beyond which it gives up")
+    longest_s: float = Field(
+        default=60.0, strict=True, ge=SHORTEST_S, le=LONGEST_S, description="beyond which it gives up"
+    )
 
     @property
     def duration_s(self) -> float:
@@ -49,7 +51,7 @@ class Sweep(Record):
     limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]] = Field(
         description="the two ends, from where the index marks meet"
     )
-    period_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time out and back")
+    period_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time out and back")
     profile: Literal["trapezoid"] = Field(default="trapezoid", description="speed up, cruise, brake")
     accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="while it speeds up and brakes")
 
@@ -113,8 +115,10 @@ class StopAndGo(Record):
 
     mode: Literal["stop_and_go"] = Field(default="stop_and_go", description="stand still while the lidar measures")
     stops: int = Field(strict=True, ge=1, le=100_000, description="in one full turn")
-    dwell_s: float = Field(strict=True, gt=0, le=LONGEST_S, description="time of measuring at each stop")
-    move_s: float = Field(default=0.2, strict=True, gt=0, le=LONGEST_S, description="from one stop to the next")
+    dwell_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time of measuring at each stop")
+    move_s: float = Field(
+        default=0.2, strict=True, ge=SHORTEST_S, le=LONGEST_S, description="from one stop to the next"
+    )
 
     @property
     def duration_s(self) -> float:

@@ -1,7 +1,7 @@
 """Whether the stated errors of J hold, and whether anything beats the reported optima: what would break is printed.
 
     uv run python -m benchmarks.design.claims [errors] [optima] [evolution] [--pairs 300] [--draws 100000]
-        [--tasks NAME...] [--random 100] [--seed 1]
+        [--tasks NAME...] [--random 100] [--first 0] [--seed 1]
 
 Errors: random tasks at random settings (bands, cones, rectangles on planes, fine maps, masks of meshes, scenes; regions
 down to a thousandth of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against
@@ -9,6 +9,7 @@ down to a thousandth of a degree, balls of 0.3 to 15 degrees; all motions and ob
 Optima: settings drawn at random from the ranges of each shipped task, and scipy's `differential_evolution`. All are
 looked at roughly, the best of them with all nodes.
 Evolution: as many random tasks as asked for, the optimum of each against 500 evaluations of `differential_evolution`.
+Every pair and every random task has a number, so `--first` goes on where another run stopped.
 """
 
 from __future__ import annotations
@@ -199,21 +200,22 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=100_000)
     parser.add_argument("--tasks", nargs="*", default=shipped_tasks())
     parser.add_argument("--random", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
     if "errors" in asked.what:
-        print_errors(asked.pairs, asked.seed)
+        print_errors(range(asked.first, asked.pairs), asked.seed)
     if "optima" in asked.what:
         for name in asked.tasks:
             print_contest(load_task(Path(name)), asked.draws, asked.seed)
     if "evolution" in asked.what:
-        print_evolution(asked.random, asked.seed)
+        print_evolution(range(asked.first, asked.random), asked.seed)
 
 
-def print_errors(pairs: int, seed: int) -> None:
+def print_errors(pairs: range, seed: int) -> None:
     """Each broken claim with all that repeats it, then the sum of all."""
     claims = []
-    for i in range(pairs):
+    for i in pairs:
         claims.append(random_claim(np.random.default_rng([seed, i])))
         if not claims[-1].kept:
             print(f"BROKEN pair {i}, off by {claims[-1].off:.1e}: {claims[-1]}", flush=True)
@@ -221,7 +223,7 @@ def print_errors(pairs: int, seed: int) -> None:
             print(f"{i + 1} pairs, {sum(not claim.kept for claim in claims)} broken", flush=True)
     stated = np.array([claim.score.J_error for claim in claims])
     off = np.array([claim.off for claim in claims])
-    print(f"stated errors kept: {sum(claim.kept for claim in claims)} of {pairs}")
+    print(f"stated errors kept: {sum(claim.kept for claim in claims)} of {len(pairs)}")
     large = int((stated > SMALL_ERROR).sum())
     print(f"stated: median {np.median(stated):.1e}, largest {stated.max():.1e}, above {SMALL_ERROR:g} in {large} pairs")
     share = (off / stated).max()
@@ -247,10 +249,10 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
         print(f"  {setting.round(2).tolist()}: J = {rival.J:.6f} +- {rival.J_error:.0e} {name}", flush=True)
 
 
-def print_evolution(tasks: int, seed: int) -> None:
+def print_evolution(tasks: range, seed: int) -> None:
     """Random tasks whose optimum evolution beats, with all that repeats them, then how many."""
     beaten = refused = 0
-    for i in range(tasks):
+    for i in tasks:
         rng = np.random.default_rng([seed, i])
         loaded = random_task(rng, BALLS_DEG[1])
         generations = EVALUATIONS // (POPULATION * len(NAMES)) - 1
@@ -269,7 +271,7 @@ def print_evolution(tasks: int, seed: int) -> None:
         )
         if result.beaten_by > 0:
             print(f"  {result} {task.model_dump(mode='json')}", flush=True)
-    print(f"evolution of {EVALUATIONS} settings beats the optimum of {beaten} of {tasks - refused} random tasks")
+    print(f"evolution of {EVALUATIONS} settings beats the optimum of {beaten} of {len(tasks) - refused} random tasks")
 
 
 def _drawn(rng: np.random.Generator, kinds: dict[str, float]) -> str:

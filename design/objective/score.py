@@ -37,7 +37,7 @@ class Score:
 
     Attributes:
         J: the objective.
-        J_error: estimate of its numerical error, on the safe side; see `score_on`.
+        J_error: estimate of its numerical error, on the safe side (`score_on`); of a lowest count one at least.
         J_lower: with g of the mean counts, a lower bound of J as g is convex.
         least: lowest count in the weighted region at any start phase, beams per ball.
         blind_weight: share of the weight that is blind: beyond a ball radius of all that the fan passes over.
@@ -56,12 +56,14 @@ def score(problem: Problem, angles_rad: Setting) -> Score:
     Raises:
         TaskError: no direction has a weight.
     """
-    nodes = problem.nodes
+    nodes, before = problem.nodes, None
     while True:
         found = score_on(problem, angles_rad, nodes)
         if found.J_error <= problem.tolerance or nodes >= MOST_NODES or problem.grid_step_deg:
             return found
-        nodes *= 3
+        if (found.J, found.J_error) == before:  # a whole count, which no nodes make smaller
+            return found
+        nodes, before = nodes * 3, (found.J, found.J_error)
 
 
 def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
@@ -172,13 +174,17 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
             share = samples.weights / samples.weights.sum()
             value, bound, hidden = float(share @ z.mean_g), float(share @ lower), float(share @ blind)
             found.append(_Found(value, 0.0, bound, int(z.least.min()), hidden))
-    values = np.array([f.value for f in found])
+    values, least = np.array([f.value for f in found]), min(f.least for f in found)
     gather = np.max if moment.gathered == "highest" else np.mean
+    if moment.gathered == "highest":
+        error = max(float(np.ptp(values)), _one_less(moment, least))
+    else:
+        error = SURE * float(np.std(values, ddof=1)) / SETS**0.5
     return _Found(
         value=float(gather(values)),
-        error=float(np.ptp(values) if moment.gathered == "highest" else SURE * np.std(values, ddof=1) / SETS**0.5),
+        error=error,
         lower=float(gather([f.lower for f in found])),
-        least=min(f.least for f in found),
+        least=least,
         blind=float(np.mean([f.blind for f in found])),
     )
 
@@ -190,14 +196,26 @@ def _highest(
     fine: Float[ndarray, " n"],
     blind: Bool[ndarray, " n"],
 ) -> _Found:
-    """The highest g anywhere; what every third of the nodes misses in the mean tells what all of them do."""
+    """The highest g anywhere; what every third of the nodes misses in the mean tells what all of them do.
+
+    All thirds may meet the same count where a sliver between two nodes has one less, so that is the least error.
+    """
     g = np.where(fine > 0, moment.g(z.least), -np.inf)
+    least = int(z.least[fine > 0].min())
     value = float(g.max())
     thirds = [highest for highest in (g[i::3].max(initial=-np.inf) for i in range(3)) if np.isfinite(highest)]
     return _Found(
         value=value,
-        error=MISSED_AGAIN * (value - float(np.mean(thirds))),
+        error=max(MISSED_AGAIN * (value - float(np.mean(thirds))), _one_less(moment, least)),
         lower=float(lower[fine > 0].max()),
-        least=int(z.least[fine > 0].min()),
+        least=least,
         blind=float(fine @ blind / fine.sum()),
     )
+
+
+def _one_less(moment: Moment, least: int) -> float:
+    """How much g rises where a count is one less than `least`; 0 where there is none less."""
+    if not least:
+        return 0.0
+    fewer, as_found = moment.g(np.array([least - 1.0, least]))
+    return float(fewer - as_found)

@@ -84,7 +84,8 @@ def calibrate_recordings(
         found = estimate(beams, mount, start)
     except RecordingError as refusal:
         say("asking how late the angles are")
-        raise RecordingError(f"{refusal}{_late(opened)}") from refusal
+        named = ", ".join(str(path) for path in recordings)
+        raise RecordingError(f"{named}: {refusal}{_late(opened)}") from refusal
     say("asking the entropy")
     seen = witness(mount, beams, fan_side(beams, mount), start, found.x, found.noise_m)
     record = {

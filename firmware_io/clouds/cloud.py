@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -214,7 +215,7 @@ def pose_matrix(numbers: Iterable[float]) -> Pose:
     from scipy.spatial.transform import Rotation
 
     x, y, z, *quaternion = numbers
-    length = float(np.linalg.norm(quaternion))
+    length = math.hypot(*quaternion)
     if not np.isfinite([x, y, z, length]).all() or abs(length - 1) > _NORM_ERROR:
         raise RecordingError(
             f"pose at ({x:g}, {y:g}, {z:g}) with a quaternion of length {length:.4g}: finite, and of length 1"

@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from design.catalogue.catalogue import Catalogue, load_catalogue
 from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.errors import TaskError, suggest
-from design.motion import LONGEST_S
+from design.motion import LONGEST_S, SHORTEST_S
 from design.record import Record
 from design.task.named_record import named_record
 from design.task.task import AngleRanges, Limits, LoadedTask, load_task
@@ -24,7 +24,7 @@ SHIPPED = Path(__file__).parent / "shipped"
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 NO_RING = "none"
 
-Period = Annotated[float, Field(strict=True, gt=0, le=LONGEST_S)] | Literal["shortest"]
+Period = Annotated[float, Field(strict=True, ge=SHORTEST_S, le=LONGEST_S)] | Literal["shortest"]
 
 
 class Mounting(Record):

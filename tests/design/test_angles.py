@@ -172,7 +172,10 @@ def without(key):
         (full_table() | {"t_rot_laser_mm": [1.0]}, ["t_rot_laser_mm"]),
         (full_table() | {"covariance": np.eye(3).tolist()}, ["covariance"]),
         (full_table() | {"J": "low"}, ["J", "low"]),
-        (full_table() | {"motion": {"mode": "spin", "period_s": 0}}, ["motion.period_s", "greater than 0"]),
+        (
+            full_table() | {"motion": {"mode": "spin", "period_s": 0}},
+            ["motion.period_s", "greater than or equal to 0.001"],
+        ),
         (full_table() | {"angles_deg": dict.fromkeys(NAMES, "up")}, ["angles_deg.alpha_rot", "up"]),
         (full_table() | {"angles_deg": {"alpha_rot_deg": 3}}, ["angles_deg.alpha_rot_deg", "did you mean 'alpha_rot'"]),
         (json.dumps(full_table()).replace("12.5", "NaN"), ["angles_deg.beta_laser"]),

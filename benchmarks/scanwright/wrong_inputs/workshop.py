@@ -46,6 +46,19 @@ value = 2.0
 shape = "band"
 theta_deg = [150, 180]
 """
+_STUDY = """
+name = "two"
+tasks = ["task.toml"]
+sensors = ["UTM-30LX", "UST-10LX"]
+servos = ["MX-64R"]
+slip_rings = ["UH1256-02-0610-06S"]
+front = ["J", "mass_g"]
+winners = 1
+"""
+_KEPT = """
+{"schema": "scanwright/servo-settings/1", "port": "none", "model": "MX-64R", "protocol": "2.0", "id": 1,
+ "settings": [{"register": "return_delay_time", "before": 250, "after": 0}]}
+"""
 _MAP = """
 [[weight]]
 shape = "map"
@@ -78,7 +91,12 @@ def jobs() -> list[Job]:
         Job((*placed, "--poses", "poses.tum", "--organised"), ("poses.tum",), (), ".ply"),
         Job((*placed, "--poses", "poses.csv"), ("poses.csv",), (), ".ply"),
         Job(("assemble", "r.mcap", "--angles", "set/angles.json", "-o", "OUT"), ("set/own_body.npz",), (), ".ply"),
-        Job(("calibrate", "r.mcap", "--angles", "angles.json", "-o", "OUT"), ("r.mcap", "angles.json"), (), ".json"),
+        Job(
+            ("calibrate", "fine.mcap", "--angles", "angles.json", "-o", "OUT"),
+            ("fine.mcap", "angles.json"),
+            (),
+            ".json",
+        ),
         Job(("repair", "r.mcap", "-o", "OUT"), ("r.mcap",), (), ".mcap"),
         Job(("scan", "set", "--dry-run", "--turns", "2"), ("set/angles.json", "set/emulated.json"), (4,)),
         Job(("convert", "r.mcap", "OUT"), ("r.mcap",), (), ".bag"),
@@ -91,6 +109,21 @@ def jobs() -> list[Job]:
     ]
     topics = ("--scan", "/scan", "--angle", "/joint_states:position[0]", "--angle-unit", "rad")
     found += [Job(("import", "bag.bag", *topics, "-o", "OUT"), ("bag.bag",), (), ".mcap")]
+    axis = ("--angle", "axis.csv:rot_rad", "--angle-unit", "rad")
+    found += [
+        Job(("import", "bag.bag", "--scan", "/scan", *axis, "-o", "OUT"), ("axis.csv",), (), ".mcap"),
+        Job(("assemble", "own.mcap", "--angles", "angles.json", "-o", "OUT"), ("own.mcap",), (), ".ply"),
+        Job((*placed, "--max-range-m", "9", "--edges-deg", "8", "--outliers", "2"), (), (7, 9, 11), ".ply"),
+        Job((*placed, "--voxel-m", "0.1", "--normals"), (), (7,), ".ply"),
+        Job(("view", "r.mcap", "--angles", "angles.json", "-o", "OUT"), ("r.mcap", "angles.json"), (), ".mcap"),
+        Job(("doctor", "--restore", "kept.json", "--servo", "none"), ("kept.json",)),
+        Job(("catalogue", "--min-range-m", "5", "--max-mass-g", "900", "--max-price-usd", "900"), (), (2, 4, 6)),
+        Job(("study", "study.toml", "--plan", "--results", "kept"), ("study.toml",)),
+        Job(("compare", "task.toml", "--out", "compared"), ("task.toml",)),
+    ]
+    new = ("new", "mine", "--lidar", "UST-10LX", "--servo", "XM430-W350", "--height-m", "0.4", "-o", "OUT")
+    seen = ("--see", "ground:0.5:5:3", "--see", "thing:0.1:3", "--scan-s", "2", "--robot", "box:0.6:0.4:0.2")
+    found.append(Job((*new, *seen, "--ahead-m", "0.1"), (), (7, 11, 13, 15, 17, 19), ".toml"))
     for k, kind in enumerate(FORMATS):
         other = FORMATS[(k + 1) % len(FORMATS)]
         found.append(Job(("convert", f"a.{kind}", "OUT"), (f"a.{kind}",), (), f".{other}"))
@@ -124,7 +157,13 @@ def furnish(folder: Path) -> None:
     for name in ("angles.json", "set/angles.json"):
         (folder / name).write_text(angles.to_json(), encoding="utf-8")
     _record(folder / "r.mcap")
-    bearing_rad = _bearings_rad()
+    _record(folder / "own.mcap", own_beams=True)
+    _record(folder / "fine.mcap", scans=320, beams=361, turns=2)
+    rows = [f"{_START_NS + k * _PERIOD_NS},{np.pi * k * _PERIOD_NS / 1e9:.9f}" for k in range(_SCANS)]
+    (folder / "axis.csv").write_text("time_ns,rot_rad\n" + "\n".join(rows) + "\n")
+    (folder / "kept.json").write_text(_KEPT)
+    (folder / "study.toml").write_text(_STUDY)
+    bearing_rad = _bearings_rad(_BEAMS)
     hidden = np.zeros((_BEAMS, 720), bool)
     hidden[:4, ::3] = True
     np.savez(folder / "set/own_body.npz", beams=bearing_rad > 2, stator=hidden, bearing_rad=bearing_rad)
@@ -148,34 +187,39 @@ def furnish(folder: Path) -> None:
         (folder / f"{kind}.toml").write_text(_TASK + _MAP.format(file=f"map.{kind}"))
 
 
-def _bearings_rad() -> np.ndarray:
-    return np.linspace(-2.0, 2.5, _BEAMS)
+def _bearings_rad(beams: int) -> np.ndarray:
+    return np.linspace(-2.0, 2.5, beams)
 
 
-def _record(path: Path) -> None:
-    """A room of flat walls, seen by a laser that rolls."""
+def _record(
+    path: Path, *, scans: int = _SCANS, beams: int = _BEAMS, turns: float = 0.75, own_beams: bool = False
+) -> None:
+    """A room of flat walls, seen by a laser that rolls; each scan with bearings and times of its own, if asked."""
     rng = np.random.default_rng(0)
-    bearing_rad = _bearings_rad()
+    bearing_rad, step_ns = _bearings_rad(beams), 9_000_000 // (beams - 1)
     with RecordingWriter(path, {"source": "wrong inputs"}) as writer:
-        for k in range(_SCANS):
+        for k in range(scans):
             stamp_ns = _START_NS + k * _PERIOD_NS
-            joint_rad = np.pi * k * _PERIOD_NS / 1e9
+            joint_rad = 2 * np.pi * turns * k / scans
             flat = np.stack([np.cos(bearing_rad), np.sin(bearing_rad), 0 * bearing_rad], axis=1)
             turned = np.stack([flat[:, 0], np.cos(joint_rad) * flat[:, 1], np.sin(joint_rad) * flat[:, 1]], axis=1)
-            range_m = _ranges_m(np.zeros(3), turned) + rng.normal(0, 0.005, _BEAMS)
-            range_m[rng.random(_BEAMS) < 0.05] = np.nan
+            range_m = _ranges_m(np.zeros(3), turned) + rng.normal(0, 0.005, beams)
+            range_m[rng.random(beams) < 0.05] = np.nan
             writer.joint(stamp_ns, joint_rad)
+            offset_ns = step_ns * np.arange(beams) + rng.integers(0, step_ns // 2, beams)
             writer.scan(
                 Scan(
                     stamp_ns=stamp_ns,
                     angle_min_rad=-2.0,
-                    angle_increment_rad=4.5 / (_BEAMS - 1),
-                    time_increment_s=1e-4,
+                    angle_increment_rad=4.5 / (beams - 1),
+                    time_increment_s=step_ns / 1e9,
                     scan_time_s=_PERIOD_NS / 1e9,
                     range_min_m=0.1,
                     range_max_m=30.0,
                     range_m=range_m.astype(np.float32),
-                    intensity=rng.uniform(0, 4000, _BEAMS).astype(np.float32),
+                    intensity=rng.uniform(0, 4000, beams).astype(np.float32),
+                    beam_bearing_rad=bearing_rad if own_beams else None,
+                    beam_offset_ns=offset_ns if own_beams else None,
                 )
             )
 

@@ -57,7 +57,12 @@ def test_all_that_is_wrong_is_told_at_once_each_with_its_line(tmp_path):
         ["/task.toml:20", "mask.0.axis = [0, 0, 0]"],
         ["/task.toml:21", "mask.0.half_angle_dg"],
     ]
-    for words in ("did you mean 'sensor'?", "did you mean 'cone'?", "did you mean 'half_angle_deg'?", "greater than 0"):
+    for words in (
+        "did you mean 'sensor'?",
+        "did you mean 'cone'?",
+        "did you mean 'half_angle_deg'?",
+        "greater than or equal to 0.001",
+    ):
         assert sum(words in line for line in told) == 1, words
 
 

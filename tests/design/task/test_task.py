@@ -81,7 +81,7 @@ WRONG = {
     "unit in a value": (swap("18.0", '"18 s"'), ["motion.period_s", "18 s"]),
     "number in quotes": (swap("18.0", '"18.0"'), ["motion.period_s", "18.0"]),
     "true for a number": (swap("18.0", "true"), ["motion.period_s"]),
-    "period zero": (swap("18.0", "0.0"), ["motion.period_s", "0.0", "greater than 0"]),
+    "period zero": (swap("18.0", "0.0"), ["motion.period_s", "0.0", "greater than or equal to 0.001"]),
     "period negative": (swap("18.0", "-18.0"), ["motion.period_s", "-18.0"]),
     "period infinite": (swap("18.0", "inf"), ["motion.period_s", "inf"]),
     "period of hours": (swap("18.0", "3601.0"), ["motion.period_s", "600"]),
