@@ -24,6 +24,7 @@ TF = "tf2_msgs/msg/TFMessage"
 SECONDS, NANOSECONDS = ("time_s", "time", "t"), ("time_ns",)
 ANGLES = ("angle", "angle_deg", "angle_rad", "position", "position_rad")
 ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning about one
+MOST_ANGLE, MOST_NS = 1e9, 2**63 - 1  # years of turns; what an int64 holds
 STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
 
 
@@ -125,6 +126,9 @@ def read_table(text: str) -> tuple[Times, Floats]:
             time_ns.append(_nanoseconds(seconds, scale))
         except (IndexError, ValueError, OverflowError) as error:
             raise RecordingError(f"{path}:{number}: not a time and an angle: {', '.join(words)[:80]}") from error
+        if not (abs(value) <= MOST_ANGLE and abs(time_ns[-1]) <= MOST_NS):
+            said = f"{', '.join(words)[:80]}: an angle of at most {MOST_ANGLE:g}, a time within 292 years of 1970"
+            raise RecordingError(f"{path}:{number}: {said}")
         values.append(value)
     if not values:
         raise RecordingError(f"{path}: no line with an angle")

@@ -82,6 +82,8 @@ def test_a_table_keeps_every_nanosecond(tmp_path, words):
     [
         ("time_s,angle\n", "", "no line with an angle"),
         ("time_s,angle\n1,2\nx,3\n", "", r"log\.csv:3: not a time and an angle: x, 3"),
+        ("time_s,angle\n1,2\n2,NaN\n", "", r"log\.csv:3: 2, NaN: an angle of at most 1e\+09"),
+        ("time_ns,angle\n99999999999999999999,2\n", "", r"log\.csv:2: 99999999999999999999, 2: .* a time within 292 y"),
         ("time_s,angle\n1\n", "", r"log\.csv:2: not a time and an angle: 1"),
         ("when,angle\n1,2\n", "", "0 columns of time: the first line names time_s or time"),
         ("time_s,angle,angle_rad\n1,2,3\n", "", "2 columns of angle"),
