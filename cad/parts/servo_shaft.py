@@ -93,7 +93,7 @@ def cross_words(stack: Hub) -> tuple[str, ...]:
 
 def _waist(stack: DirectStack) -> cq.Solid:
     """What is turned off: its ends slope at 45 deg, an edge would crack."""
-    radius, waist = stack.shaft_diameter / 2, stack.waist_radius
+    radius, waist = stack.shaft_diameter / 2, stack.waist_mm / 2
     slope = radius - waist
     low = stack.horn + stack.collar_height
     high = low + WAIST + slope
@@ -115,9 +115,10 @@ def _waist_words(stack: DirectStack) -> tuple[str, ...]:
     if stack.bearing is None:
         return ()
     bottom, width = GROOVES[stack.retaining_ring]
+    in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_mm:.2f}"
     return (
-        f"Waist {WAIST:g} long: as drawn in {ALUMINIUM.name}; in {STEEL.name} \u00d8{STEEL.waist_mm:g}, nothing else "
-        "bends enough and yields late enough. No other metal.",
+        f"Waist {WAIST:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}, nothing else bends enough and yields late "
+        "enough. No other metal.",
         f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
     )

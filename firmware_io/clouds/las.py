@@ -108,6 +108,29 @@ def _check_header(path: Path) -> None:
         numbers = np.array([header.scales, header.offsets])
         if not np.isfinite(numbers).all() or (header.scales <= 0).any():
             raise RecordingError(f"{path}: scales {header.scales}, offsets {header.offsets}: finite, scales above 0")
+        if header.are_points_compressed:
+            _check_chunks(path, header.offset_to_point_data, header.point_count)
+
+
+def _check_chunks(path: Path, at: int, points: int) -> None:
+    """Refuse a table of chunks that is longer than there are points: the decoder ends the process over it.
+
+    Its place stands before the points, or at the very end of a file that was streamed; it begins with a version and
+    the number of chunks (LASzip, chunk table).
+    """
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        stream.seek(at)
+        place = int.from_bytes(stream.read(8), "little", signed=True)
+        if place == -1:
+            stream.seek(max(0, size - 8))
+            place = int.from_bytes(stream.read(8), "little", signed=True)
+        if not at < place <= size - 8:
+            raise RecordingError(f"{path}: the table of its chunks would begin at byte {place:,} of {size:,}")
+        stream.seek(place + 4)
+        chunks = int.from_bytes(stream.read(4), "little")
+    if chunks > points + 1:
+        raise RecordingError(f"{path}: {chunks:,} chunks announced for {points:,} points")
 
 
 def _step_m(path: Path, world: Float64[ndarray, "n 3"]) -> float:

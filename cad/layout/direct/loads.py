@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.direct.stack import WAIST_MM, DirectStack
+from cad.layout.direct.stack import DirectStack
 from cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
@@ -41,21 +41,21 @@ class ShaftMetal:
     Attributes:
         name: as it is ordered.
         modulus_pa: of elasticity.
-        waist_mm: diameter of the waist in this metal.
+        waist: diameter of the waist in this metal, as a share of that in aluminium.
         yields_pa: shear stress at which it yields.
         grows_per_k: thermal expansion.
     """
 
     name: str
     modulus_pa: float
-    waist_mm: float
+    waist: float
     yields_pa: float
     grows_per_k: float
 
 
 # 0.2 % proof stress of 430 MPa (EN 755-2, bars) and 900 MPa (EN ISO 683-2, to 16 mm), by von Mises
-ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, WAIST_MM["aluminium"], 0.577 * 430e6, 23e-6)
-STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, WAIST_MM["steel"], 0.577 * 900e6, 12e-6)
+ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6, 23e-6)
+STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.77, 0.577 * 900e6, 12e-6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +84,12 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
 
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
     """Whether the horn alone bears the heaviest linkage."""
-    return _is_rated(scanner, _heaviest(scanner, stack).moment_nm)
+    return _is_rated(scanner, heaviest(scanner, stack).moment_nm)
 
 
 def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
     """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
-    weight = _heaviest(scanner, stack)
+    weight = heaviest(scanner, stack)
     bar = bar_g / 1000 * STANDARD_GRAVITY * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
     return _is_rated(scanner, weight.across_n * weight.lever_m + bar)
 
@@ -110,7 +110,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
     """
     b = (stack.bearing_middle - stack.horn) / 1000
     z = (np.arange(SLICES) + 0.5) / SLICES * b
-    EI = metal.modulus_pa * math.pi / 4 * (stack.radius_at(1000 * z, metal.waist_mm) / 1000) ** 4
+    EI = metal.modulus_pa * math.pi / 4 * (stack.radius_at(1000 * z, metal.waist * stack.waist_mm) / 1000) ** 4
     moment = weight.across_n * (weight.lever_m - z) + weight.along_n * weight.off_axis_m
     bend, reach = b / SLICES / EI, b - z
     give = float((bend * reach**2).sum()) + 1 / cage_n_per_m
@@ -137,7 +137,7 @@ def _second_moment(diameter_mm: float) -> float:
     return math.pi / 64 * (diameter_mm / 1000) ** 4
 
 
-def _heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
+def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
     """Weight of the rotor with the heaviest linkage."""
     lidar, ring = scanner.lidar, scanner.slip_ring
     normal = stack.R()[:, 2]

@@ -30,7 +30,6 @@ from design.arrays import Array
 RING_GAP = 3.0
 WAIST = 32.0  # length of the shaft's waist: it bends where horn and bearing are not quite in line
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
-WAIST_MM = {"aluminium": 5.0, "steel": 4.0}  # its diameter by what the shaft is of; the first is what is drawn
 # DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
 GROOVES = {
     8: (7.6, 0.9),
@@ -70,6 +69,7 @@ class DirectStack(Hub):
     flange_thickness: float
     collar_radius: float
     collar_height: float
+    waist_mm: float  # diameter of the waist, in aluminium
 
     @property
     def bearing_middle(self) -> float:
@@ -119,11 +119,6 @@ class DirectStack(Hub):
         if self.bearing is None:
             return self.ring_bottom - RING_GAP - self.collar_height
         return self.ring_bottom - max(0.0, APART - self.ring_length) - WAIST - self.collar_height
-
-    @property
-    def waist_radius(self) -> float:
-        """Of the shaft's waist, in aluminium."""
-        return WAIST_MM["aluminium"] / 2
 
     @property
     def retaining_ring(self) -> int:

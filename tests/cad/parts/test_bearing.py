@@ -202,7 +202,7 @@ def beam(weight, stack, cage, metal, off_m=0.0):
     n = 40_000
     bearing = (stack.bearing_middle - stack.horn) / 1000
     z = np.linspace(0, bearing, n + 1)
-    waist, spigot = metal.waist_mm / 2, stack.shaft_diameter / 2
+    waist, spigot = metal.waist * stack.waist_mm / 2, stack.shaft_diameter / 2
     ends = [0.0, stack.flange_thickness, stack.collar_height, stack.collar_height + WAIST]
     mm = 1000 * z
     radius = np.select(
@@ -268,7 +268,7 @@ def test_all_that_is_out_of_line_leaves_half_of_the_horns_rating(servo, angles):
 def test_a_stiff_waist_would_put_the_misalignment_on_the_horn():
     scanner = SCANNERS["ground_ahead"]
     stack, weight = direct_stack(scanner), Weight(6.7, 4.7, 0.14, 2e-4)
-    stiff = supported(weight, stack, 3e5, replace(STEEL, waist_mm=6.0))
+    stiff = supported(weight, stack, 3e5, replace(STEEL, waist=6.0 / stack.waist_mm))
     assert stiff.misaligned_nm_per_m > 2.5 * supported(weight, stack, 3e5, STEEL).misaligned_nm_per_m
 
 

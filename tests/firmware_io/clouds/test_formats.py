@@ -121,6 +121,27 @@ def test_las_keeps_points_and_columns_and_says_what_it_loses(tmp_path, suffix):
     assert len(said) == 6
 
 
+@pytest.mark.parametrize(
+    ("place", "number", "says"),
+    [
+        (4, b"\x70\x72\x72\x74", "1,953,657,456 chunks announced for 10 points"),
+        (None, b"\xff" * 7 + b"\x7f", "would begin"),
+    ],
+    ids=["its length", "its place"],
+)
+def test_a_damaged_table_of_chunks_is_refused_before_the_decoder_ends_the_process(tmp_path, place, number, says):
+    path = tmp_path / "c.laz"
+    write_clouds(path, [Cloud(np.arange(30.0).reshape(10, 3))])
+    data = bytearray(path.read_bytes())
+    points = int.from_bytes(data[96:100], "little")
+    table = int.from_bytes(data[points : points + 8], "little")
+    at = points if place is None else table + place
+    data[at : at + len(number)] = number
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match=says):
+        read_clouds(path)
+
+
 def test_las_takes_longer_steps_for_long_ways_and_says_so(tmp_path):
     far = np.array([[0.0, 0, 0], [214_000, 0, 0], [1_500_000.5, 0, 0]])
     assert through(tmp_path, Cloud(far[:2]), "las")[1] == ["LAS rounds coordinates to 0.1 mm"]
