@@ -8,16 +8,12 @@ import select
 import socket
 import struct
 import termios
-import time
-from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Protocol
 
-from design.errors import DeviceError, DeviceTimeoutError
+from design.errors import DeviceError
 from firmware_io.serial_port import open_serial_port
 
 FIRST_BAUD = 115_200
-
-Heard = TypeVar("Heard")
 
 
 class Stream(Protocol):
@@ -108,69 +104,6 @@ class SocketStream:
     def close(self) -> None:
         """Let go of the connection."""
         self._socket.close()
-
-
-class Gone:
-    """Turns what a vanished port raises into a DeviceError of one line."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        # A port that we closed after it vanished is None to pyserial, and -1 to select.
-        if isinstance(error, (OSError, TypeError, ValueError)):
-            raise DeviceError(f"{self._name}: the connection broke ({error}); plug it in again") from error
-
-
-def next_heard(
-    stream: Stream, name: str, deadline_s: float, feed: Callable[[bytes], list[Heard]], longest: int
-) -> tuple[list[Heard], int]:
-    """What comes until something is whole, and when that came [ns, time.monotonic_ns].
-
-    Args:
-        stream: where it comes from.
-        name: of the device, in messages.
-        deadline_s: on time.monotonic.
-        feed: what the bytes make whole.
-        longest: bytes; so much that came too late, and is nothing, ends the waiting too.
-
-    Raises:
-        DeviceTimeoutError: nothing was whole in time.
-        DeviceError: the connection broke.
-    """
-    late_bytes = 0
-    while True:
-        over = time.monotonic() > deadline_s  # told before the look: what came while we were kept waiting counts
-        with Gone(name):
-            received = stream.read(deadline_s - time.monotonic())
-        arrival_ns = time.monotonic_ns()
-        found = feed(received)
-        if found:
-            return found, arrival_ns
-        late_bytes += len(received) if over else 0
-        if over and (not received or late_bytes > longest):
-            raise DeviceTimeoutError(f"{name}: nothing came in time; check power and cable")
-
-
-def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:
-    """Connect again and again until it works.
-
-    Raises:
-        DeviceError: it did not in time.
-    """
-    deadline_s = time.monotonic() + timeout_s
-    while True:
-        try:
-            connect()
-        except DeviceError as error:
-            if time.monotonic() > deadline_s:
-                raise DeviceError(f"{name}: it did not come back in {timeout_s:.1f} s; check its plug") from error
-            time.sleep(0.05)
-        else:
-            return
 
 
 def open_stream(address: str) -> Stream:

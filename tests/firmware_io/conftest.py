@@ -2,7 +2,8 @@
 
 import pytest
 
-from firmware_io.lidar.scip import driver
+from firmware_io.lidar.scip import dialogue, driver
+from firmware_io.lidar.sick import dialogue as cola_dialogue
 from firmware_io.lidar.sick import driver as sick_driver
 from firmware_io.servo.bus import bus, serial_line
 
@@ -10,9 +11,9 @@ from firmware_io.servo.bus import bus, serial_line
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Twins share a computer with the tests, and answer late where it is busy, as no device does: ten times as long."""
-    monkeypatch.setattr(driver, "_ANSWER_S", 5.0)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 5.0)
     monkeypatch.setattr(driver, "_SCAN_S", 10.0)
-    monkeypatch.setattr(sick_driver, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
+    monkeypatch.setattr(cola_dialogue, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
     monkeypatch.setattr(sick_driver, "_SCAN_S", 10.0)
     monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
     monkeypatch.setattr(bus, "_LATE", 1)

@@ -17,9 +17,9 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.byte_stream import SerialStream, next_heard, open_stream, until_back
 from firmware_io.lidar.ldrobot import protocol
 from firmware_io.lidar.lidar import StampAt, TimedScan
+from firmware_io.lidar.sensor_line import SensorLine, until_back
 from firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
@@ -88,7 +88,8 @@ class LdrobotLidar:
         self._scanning = self._intensity = False
         self._skip = 0
         self._turns = TurnQueue()
-        self._lidar = self._connect(model)
+        self._line = SensorLine(address, 2 * protocol.SIZE)
+        self._lidar = self._recognised(model)
         self._begin_anew()
 
     def __enter__(self) -> LdrobotLidar:
@@ -97,7 +98,7 @@ class LdrobotLidar:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._stream.close()
+        self._line.leave(self.stop, error)
 
     @property
     def model(self) -> str:
@@ -126,7 +127,9 @@ class LdrobotLidar:
             DeviceError: clusters, which it has not.
         """
         if cluster != 1:
-            raise DeviceError(f"{self._name()}: cluster = {cluster}: a {self.model} tells every point: leave it at 1")
+            raise DeviceError(
+                f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
+            )
         self._scanning, self._intensity, self._skip = True, intensity, skip
         self._begin_anew()
 
@@ -138,13 +141,13 @@ class LdrobotLidar:
             DeviceError: it was unplugged, or was not started.
         """
         if not self._scanning:
-            raise DeviceError(f"{self._name()}: not started")
-        deadline = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
+            raise DeviceError(f"{self._line.name}: not started")
+        deadline_s = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
         while (turn := self._turns.next()) is None:
-            packets, arrival_ns = self._packets(deadline)
+            packets, arrival_ns = self._packets(deadline_s)
             for packet in packets:
                 self._take(packet, arrival_ns)
-        return timed_scan(turn[0], self._line, self._lidar, turn[1], intensity=self._intensity)
+        return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], intensity=self._intensity)
 
     def stop(self) -> None:
         """Hand out no more; its laser stays on as long as it has power."""
@@ -156,24 +159,23 @@ class LdrobotLidar:
         Raises:
             DeviceError: nothing talks there in time.
         """
-        self._stream.close()
 
         def connect() -> None:
-            self._lidar = self._connect(self.model)
+            self._line.reopen()
+            self._lidar = self._recognised(self.model)
 
-        until_back(self._name(), timeout_s, connect)
+        until_back(self._line.name, timeout_s, connect)
         self._begin_anew()
 
-    def _connect(self, model: str | None) -> Lidar:
-        """Open the port and hear who talks, at whatever speed."""
+    def _recognised(self, model: str | None) -> Lidar:
+        """Hear who talks, at whatever speed; the line is closed where nobody does."""
         products = [product for product in load_catalogue() if isinstance(product, Lidar) and product.name in _BAUDS]
         named = [product for product in products if model in (None, product.name)]
         self._bad_before = self.bad_packets
-        self._stream = open_stream(self.address)
-        try:
+        with self._line.closed_on_error():
             for baud in dict.fromkeys(_BAUDS[product.name] for product in named):
-                if isinstance(self._stream, SerialStream):
-                    self._stream.baud = baud
+                if self._line.serial is not None:
+                    self._line.serial.baud = baud
                 self._splitter = protocol.LdrobotSplitter()
                 points_s = self._points_s()
                 self._splitter.bad = 0  # where we cut in is nobody's fault
@@ -185,20 +187,17 @@ class LdrobotLidar:
                 found = [product for product in fitting if product in named]
                 if not found:
                     others = " or ".join(product.name for product in fitting)
-                    raise DeviceError(f"{self._name()}: {points_s:.0f} points/s: this is a {others}, not a {model}")
+                    raise DeviceError(f"{self._line.name}: {points_s:.0f} points/s: this is a {others}, not a {model}")
                 return found[0]
             raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor talks there; check power, cable and port")
-        except BaseException:
-            self._stream.close()
-            raise
 
     def _points_s(self) -> float | None:
         """Points per second by angles and speed; None where nothing talks."""
-        deadline = time.monotonic() + _HEARD_S
+        deadline_s = time.monotonic() + _HEARD_S
         told: list[float] = []
         while len(told) < _FIRST:
             try:
-                packets, _ = self._packets(deadline)
+                packets, _ = self._packets(deadline_s)
             except DeviceTimeoutError:
                 return None
             told += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
@@ -207,7 +206,7 @@ class LdrobotLidar:
     def _begin_anew(self) -> None:
         """Nothing of what came before is of use: a new line, a new clock, a new turn."""
         baud = _BAUDS[self.model]
-        self._line = ArrivalLine(
+        self._arrivals = ArrivalLine(
             smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9), rate_max=_RATE_MAX, grain_ns=_GRAIN_NS
         )
         self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)
@@ -230,17 +229,14 @@ class LdrobotLidar:
             sensor_ns = self._clock.sensor_ns(packet.stamp_ms, 0, arrival_ns)
         self._last_ns = arrival_ns
         self._next_deg = float(packet.angle_deg[-1]) + packet.step_deg
-        self._line.add(sensor_ns, arrival_ns)
+        self._arrivals.add(sensor_ns, arrival_ns)
         before_ns = np.arange(1 - protocol.POINTS, 1) * (1e9 / _points_s(self._lidar))
         points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
         self._turns.add(points, arrival_ns)
 
-    def _packets(self, deadline: float) -> tuple[list[protocol.LdrobotPacket], int]:
+    def _packets(self, deadline_s: float) -> tuple[list[protocol.LdrobotPacket], int]:
         """What has come, at least one packet, and when it came."""
-        return next_heard(self._stream, self._name(), deadline, self._splitter.feed, 2 * protocol.SIZE)
-
-    def _name(self) -> str:
-        return f"{self.address}: lidar"
+        return self._line.hear(self._splitter.feed, deadline_s)
 
 
 def _points_s(lidar: Lidar) -> float:

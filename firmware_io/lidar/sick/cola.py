@@ -4,7 +4,7 @@
     CoLa B    02 02 02 02  length  sRN DeviceIdent  xor    numbers are big-endian, length and xor of the payload only
 
 What is said is the same in both: a word of three letters, a name, and values in a fixed order of types. `Writer` and
-`Reader` put them down and take them up in either dialect. CoLa A has no checksum: what is not hex where a number
+`values.Reader` put them down and take them up in either dialect. CoLa A has no checksum: what is not hex where a number
 stands, and a telegram that ends early, is all that tells a broken one.
 
 Sources: SICK LMS4000 manual 8023198 (framing), TiM781 manual 8024232 (error codes), LMS500 instructions 8013796.
@@ -12,24 +12,18 @@ Sources: SICK LMS4000 manual 8023198 (framing), TiM781 manual 8024232 (error cod
 
 from __future__ import annotations
 
-import re
 import struct
 from dataclasses import dataclass
 from functools import reduce
 from operator import xor
-from typing import Literal
 
 from design.errors import ProtocolError
-
-Kind = Literal["u8", "u16", "u32", "i16", "i32", "f32"]
+from firmware_io.lidar.sick.values import FORMAT, Kind, Reader
 
 LONGEST = 1 << 15  # payload: LMS1xx with all its channels needs a fifth
 _START_B = b"\x02\x02\x02\x02"
 _STX, _ETX = 0x02, 0x03
 _WORDS = (b"sRN", b"sRA", b"sWN", b"sWA", b"sMN", b"sMA", b"sAN", b"sEN", b"sEA", b"sSN", b"sFA")
-_FORMAT: dict[Kind, str] = {"u8": ">B", "u16": ">H", "u32": ">I", "i16": ">h", "i32": ">i", "f32": ">f"}
-_BITS: dict[Kind, int] = {"u8": 8, "u16": 16, "u32": 32, "i16": 16, "i32": 32, "f32": 32}
-_TOKEN = re.compile(rb"[0-9A-F]{1,8}|[+-][0-9]{1,10}")
 
 ERRORS = {
     0x01: "access denied: it wants a login",
@@ -137,7 +131,7 @@ class Writer:
             ValueError: it does not fit its type.
         """
         try:
-            packed = struct.pack(_FORMAT[kind], value)
+            packed = struct.pack(FORMAT[kind], value)
         except (struct.error, OverflowError) as error:
             raise ValueError(f"{value} is no {kind}") from error
         if kind == "f32":
@@ -168,103 +162,6 @@ class Writer:
             return Telegram(command, self._binary)
         joined = b"".join(values) if self._binary else b" ".join(values)
         return Telegram(command + b" " + joined, self._binary)
-
-
-class Reader:
-    """Takes up the values of a telegram, one after the other."""
-
-    def __init__(self, values: bytes, binary: bool) -> None:
-        self._values, self._binary, self._at = values, binary, 0
-
-    def number(self, kind: Kind) -> int:
-        """One whole number.
-
-        Raises:
-            ProtocolError: there is none, or it does not fit its type.
-        """
-        bits = _BITS[kind]
-        if self._binary:
-            value = int.from_bytes(self._taken(bits // 8), "big")
-        else:
-            token = self._token()
-            if not _TOKEN.fullmatch(token):
-                raise ProtocolError(f"no number: {token[:20]!r}")
-            if token[:1] in b"+-":
-                value = int(token)
-                if kind.startswith("i"):
-                    if not -(1 << bits - 1) <= value < 1 << bits - 1:
-                        raise ProtocolError(f"{value} is no {kind}")
-                    return value
-            else:
-                value = int(token, 16)
-        # A sensor writes a negative word of 16 bits as eight hex digits or as four.
-        if kind.startswith("i") and value >= 1 << bits - 1:
-            value -= 1 << (32 if value >> bits else bits)
-            if value < -(1 << bits - 1):
-                raise ProtocolError(f"{value} is no {kind}")
-        elif not 0 <= value < 1 << bits:
-            raise ProtocolError(f"{value} is no {kind}")
-        return value
-
-    def real(self) -> float:
-        """One number of IEEE 754, 32 bits.
-
-        Raises:
-            ProtocolError: there is none, or it is none.
-        """
-        if not self._binary and self._values[self._at : self._at + 1] == b"+":
-            raise ProtocolError("a decimal where a float stands")
-        value = float(struct.unpack(">f", struct.pack(">I", self.number("u32")))[0])
-        if not abs(value) < 1e9:
-            raise ProtocolError(f"{value} is no scale")
-        return value
-
-    def numbers(self, kind: Kind, count: int) -> list[int]:
-        """Several of one type; raises as `number` does."""
-        if count * (_BITS[kind] // 8 if self._binary else 2) > len(self._values) - self._at + 1:
-            raise ProtocolError(f"{count} values announced, fewer came")
-        if self._binary:
-            raw = self._taken(count * _BITS[kind] // 8)
-            return list(struct.unpack(f">{count}{_FORMAT[kind][1]}", raw))
-        return [self.number(kind) for _ in range(count)]
-
-    def name(self, length: int) -> str:
-        """A name of fixed length.
-
-        Raises:
-            ProtocolError: it is cut, or not ASCII.
-        """
-        raw = self._taken(length)
-        if not self._binary:
-            self._skip_space()
-        if not (raw.isascii() and raw.decode("ascii").isprintable()):
-            raise ProtocolError(f"no name: {raw[:20]!r}")
-        return raw.decode("ascii")
-
-    def text(self) -> str:
-        """A text of any length, its length before it; raises as `name` does."""
-        return self.name(self.number("u16"))
-
-    def _taken(self, length: int) -> bytes:
-        if self._at + length > len(self._values):
-            raise ProtocolError("the telegram ends early")
-        self._at += length
-        return self._values[self._at - length : self._at]
-
-    def _token(self) -> bytes:
-        if self._at >= len(self._values):
-            raise ProtocolError("the telegram ends early")
-        end = self._values.find(b" ", self._at)
-        end = len(self._values) if end < 0 else end
-        token = self._values[self._at : end]
-        self._at = end + 1
-        return token
-
-    def _skip_space(self) -> None:
-        if self._at < len(self._values):
-            if self._values[self._at] != 0x20:
-                raise ProtocolError("a name that is longer than its length")
-            self._at += 1
 
 
 class TelegramSplitter:

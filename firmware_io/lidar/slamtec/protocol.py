@@ -39,6 +39,9 @@ CONF_SAMPLE_US: Final = 0x71
 CONF_ANSWER: Final = 0x75
 CONF_TYPICAL: Final = 0x7C
 
+_MARK = b"\xa5\x5a"
+_DESCRIPTOR_SIZE = 7
+_LONGEST_REPLY = 512
 _CAPSULE_SIZE = 84
 _NODE_SIZE = 5
 SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, DENSE: _CAPSULE_SIZE}
@@ -98,7 +101,7 @@ def descriptor(data: bytes) -> Descriptor:
     Raises:
         ProtocolError: they are no descriptor.
     """
-    if len(data) != 7 or data[:2] != b"\xa5\x5a":
+    if len(data) != _DESCRIPTOR_SIZE or data[:2] != _MARK:
         raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no descriptor")
     word, kind = struct.unpack_from("<IB", data, 2)
     return Descriptor(word & 0x3FFF_FFFF, bool(word >> 30 & 1), kind)
@@ -175,6 +178,32 @@ def dense(data: bytes) -> SlamtecPacket:
 
 
 _READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: capsule, DENSE: dense}
+
+
+class ReplySplitter:
+    """Cuts replies out of what comes before a stream begins, whatever is between them."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[tuple[Descriptor, bytes]]:
+        """The replies that these bytes complete; with the descriptor of a stream come the bytes that followed it."""
+        self._rest += data
+        found: list[tuple[Descriptor, bytes]] = []
+        while (at := self._rest.find(_MARK)) >= 0 and len(self._rest) >= at + _DESCRIPTOR_SIZE:
+            begin = at + _DESCRIPTOR_SIZE
+            told = descriptor(self._rest[at:begin])
+            end = len(self._rest) if told.stream else begin + told.size
+            if told.size > _LONGEST_REPLY:
+                self._rest = self._rest[at + 1 :]
+                continue
+            if end > len(self._rest):
+                break
+            found.append((told, self._rest[begin:end]))
+            self._rest = self._rest[end:]
+        if at < 0:
+            self._rest = self._rest[-1:]
+        return found
 
 
 class SlamtecSplitter:

@@ -10,8 +10,9 @@ import numpy as np
 
 from design.catalogue.products import Lidar
 from design.errors import ProtocolError
-from firmware_io.lidar.sick.cola import Reader, Telegram, TelegramSplitter, Writer, framed
+from firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
 from firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
+from firmware_io.lidar.sick.values import Reader
 from firmware_io.twins.lidar_line import LidarLine, Sight
 
 _NEVER_NS = 1 << 62

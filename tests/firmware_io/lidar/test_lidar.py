@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.lidar import byte_stream
-from firmware_io.lidar.scip import driver as driver
-from firmware_io.lidar.scip import protocol
+from firmware_io.lidar import byte_stream, sensor_line
+from firmware_io.lidar.scip import dialogue, protocol
 from firmware_io.lidar.scip.driver import ScipLidar, open_scip
 from firmware_io.lidar.scip.raw_scan import to_laser_scan
 from firmware_io.twins import lidar_machine
@@ -213,7 +212,7 @@ def test_absent_ports_and_ports_in_use_are_told(tmp_path):
 
 
 def test_a_port_where_no_lidar_answers(monkeypatch):
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.02)
     master, slave = os.openpty()
     try:
         with pytest.raises(DeviceTimeoutError, match="no SCIP sensor answers"):
@@ -243,13 +242,16 @@ class SlowPort(byte_stream.SerialStream):
 def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     """A URG-04LX needs 216 kbit/s for ten scans; 115,200 is all that some adapters give."""
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
-    monkeypatch.setattr(driver, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.4)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.4)
     with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
-        assert lidar._stream.listens == lidar._stream.baud == 115_200
+        assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
         lidar.start()
-        assert lidar._stream.listens == lidar._stream.baud == (250_000 if fastest == 750_000 else 115_200)
+        assert (
+            lidar._dialogue.line.stream.listens
+            == lidar._dialogue.line.stream.baud
+            == (250_000 if fastest == 750_000 else 115_200)
+        )
         check(lidar.read_raw(), 682)
 
 
@@ -263,11 +265,10 @@ class BadLine(byte_stream.SerialStream):
 
 def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
-    monkeypatch.setattr(driver, "SerialStream", BadLine)
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.2)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.2)
     with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
         lidar.start()
-        assert lidar._stream.baud == 115_200
+        assert lidar._dialogue.line.stream.baud == 115_200
         check(lidar.read_raw(), 682)
 
 
@@ -300,16 +301,16 @@ class AsleepStream:
         return taken
 
 
-def test_a_reply_that_waits_for_a_late_host_counts():
-    lidar = object.__new__(driver.ScipLidar)
-    lidar.address, lidar._waiting, lidar._splitter = "wire", [], protocol.Splitter()
-    lidar._stream = AsleepStream(protocol.reply(b"PP", "00", protocol.text_lines([("MODL", "x" * 500)])))
-    assert lidar._next(time.monotonic() - 10.0)[0].echo == b"PP"
-    with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
-        lidar._next(time.monotonic() - 10.0)
-    lidar._stream = AsleepStream(b"x" * 100_000)
-    with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
-        lidar._next(time.monotonic() - 10.0)
+def test_a_reply_that_waits_for_a_late_host_counts(monkeypatch):
+    told = protocol.reply(b"PP", "00", protocol.text_lines([("MODL", "x" * 500)]))
+    monkeypatch.setattr(sensor_line, "open_stream", lambda _: AsleepStream(told))
+    line = sensor_line.SensorLine("wire", protocol.LONGEST_REPLY)
+    (found,), _ = line.hear(protocol.Splitter().feed, time.monotonic() - 10.0)
+    assert found.echo == b"PP"
+    for waiting in (b"", b"x" * 100_000):
+        line.stream = AsleepStream(waiting)
+        with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
+            line.hear(protocol.Splitter().feed, time.monotonic() - 10.0)
 
 
 class Chatter:
@@ -330,8 +331,8 @@ class Chatter:
 
 def test_endless_garbage_ends_in_a_timeout(monkeypatch):
     port = Chatter()
-    monkeypatch.setattr(driver, "open_stream", lambda _: port)
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.02)
+    monkeypatch.setattr(sensor_line, "open_stream", lambda _: port)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.02)
     with pytest.raises(DeviceTimeoutError):
         open_scip("somewhere")
     assert port.closed

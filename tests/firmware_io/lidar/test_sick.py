@@ -10,7 +10,8 @@ from design.catalogue.products import Lidar
 from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from firmware_io.lidar.families import open_lidar
 from firmware_io.lidar.sick import driver
-from firmware_io.lidar.sick.driver import RefusedError, open_sick
+from firmware_io.lidar.sick.dialogue import RefusedError
+from firmware_io.lidar.sick.driver import open_sick
 from firmware_io.twins.sick.cola_twin import SickMachine, SickTwin
 
 MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
@@ -154,7 +155,7 @@ def test_refusals_have_the_sensors_words(monkeypatch):
         with pytest.raises(DeviceError, match="cluster"):
             lidar.start(cluster=2)
         with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: it wants a login"):
-            lidar._ask(lidar._writer("sMN LMCstartmeas"))
+            lidar._dialogue.ask(lidar._dialogue.writer("sMN LMCstartmeas"))
         with monkeypatch.context() as other:
             other.setattr(driver, "_PASSWORD", 1)
             with pytest.raises(DeviceError, match="password was changed"):

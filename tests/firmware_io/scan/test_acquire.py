@@ -28,7 +28,7 @@ from design.motion import Spin, StopAndGo, Sweep
 from design.scene.ray_caster import cast
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.clouds.ply import read_ply
-from firmware_io.lidar.scip import driver
+from firmware_io.lidar.scip import dialogue
 from firmware_io.lidar.sick.scan_data import DIRT_WARNING
 from firmware_io.recording.recording import open_recording
 from firmware_io.recording.repair.repair import repair
@@ -482,7 +482,7 @@ def test_scan_and_doctor_tell_a_dirty_window(tmp_path, command, monkeypatch):
 
 
 def test_the_doctor_says_what_is_wrong_and_the_remedy(twins, command, monkeypatch):
-    monkeypatch.setattr(driver, "_ANSWER_S", 0.1)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.1)
     monkeypatch.setattr("firmware_io.device_ports.list_ports.comports", lambda: [])
     assert command("doctor")[0] == 1
     code, said, _ = command("doctor", "--lidar", twins.ports.servo, "--servo", "no-such-port")

@@ -1,0 +1,136 @@
+"""Questions to a SCIP lidar and what it answers, at whatever speed and in whatever version it listens."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+
+from design.errors import DeviceError, DeviceTimeoutError
+from firmware_io.lidar.byte_stream import FIRST_BAUD
+from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.sensor_line import SensorLine
+
+_ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
+_TRIES = 3  # a first request may be glued to what a client before us left half said
+_BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
+_FASTER_BAUDS = (250_000, 500_000, 750_000)
+
+
+class ScipDialogue:
+    """The talk with one sensor; it is opened with its laser put out.
+
+    Attributes:
+        line: that it goes over.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Open the port and put the laser out, whatever the sensor is doing.
+
+        Raises:
+            DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
+        """
+        self.line = SensorLine(address, protocol.LONGEST_REPLY)
+        self._bad_before = 0
+        self._begin()
+
+    @property
+    def bad(self) -> int:
+        """Replies that were thrown away: wrong sums, cut or merged lines."""
+        return self._bad_before + self._splitter.bad
+
+    def reopen(self, address: str) -> None:
+        """Begin anew, there or elsewhere; raises as opening does."""
+        self._bad_before = self.bad
+        self.line.reopen(address)
+        self._begin()
+
+    def ask(self, request: bytes, timeout_s: float | None = None) -> protocol.Reply:
+        """The reply to a request.
+
+        Raises:
+            DeviceTimeoutError: none came.
+            DeviceError: the sensor is gone.
+        """
+        return self.ask_timed(request, timeout_s)[0]
+
+    def ask_timed(self, request: bytes, timeout_s: float | None = None) -> tuple[protocol.Reply, int]:
+        """The reply to a request and when it came; what comes before it is older and dropped. Raises as `ask`."""
+        self._waiting.clear()
+        self.line.send(request + b"\n")
+        deadline_s = time.monotonic() + (_ANSWER_S if timeout_s is None else timeout_s)
+        while True:
+            told, arrival_ns = self.next(deadline_s)
+            if told.echo == request and not protocol.is_scan(told):
+                return told, arrival_ns
+
+    def insist(self, request: bytes, *statuses: str) -> None:
+        """Ask, and take no other status for an answer.
+
+        Raises:
+            DeviceError: it has another one; or as `ask` does.
+        """
+        told = self.ask(request)
+        if told.status not in statuses:
+            raise DeviceError(f"{self.line.name}: {told.echo.decode()}: status {told.status}: {told.told()}")
+
+    def next(self, deadline_s: float) -> tuple[protocol.Reply, int]:
+        """What it says next and when that came; raises as `SensorLine.hear` does."""
+        if not self._waiting:
+            replies, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
+            self._waiting.extend((told, arrival_ns) for told in replies)
+        return self._waiting.popleft()
+
+    def speed_up(self, bytes_s: float, without_speed: Callable[[], Iterable[str]]) -> None:
+        """Let a sensor on a real serial line talk fast enough for its scans, where sensor and adapter can.
+
+        Args:
+            bytes_s: of its scans.
+            without_speed: ports that are the sensors' own USB.
+        """
+        port = self.line.serial
+        if port is None or self.line.address in without_speed():
+            return
+        needed, usual = 10 * bytes_s, port.baud
+        for baud in _FASTER_BAUDS:
+            if needed <= usual or baud < needed:
+                continue
+            if not port.can(baud) or self.ask(b"SS%06d" % baud).status not in ("00", "03"):
+                continue
+            port.baud = baud
+            with suppress(DeviceTimeoutError):
+                self.insist(b"QT", "00")
+                return
+            port.baud = usual  # the line is not good for it: the sensor is at one of the two
+            with suppress(DeviceTimeoutError):
+                self.insist(b"QT", "00")
+                continue
+            self._quiet()
+
+    def _begin(self) -> None:
+        self._splitter = protocol.Splitter()
+        self._waiting: deque[tuple[protocol.Reply, int]] = deque()
+        with self.line.closed_on_error():
+            self._quiet()
+        self._splitter.bad = 0  # what was on its way when we came is nobody's fault
+
+    def _quiet(self) -> None:
+        """Stop whatever it does, at whatever speed and in whatever version of SCIP it listens."""
+        port = self.line.serial
+        for baud in _BAUDS if port is not None else (0,):
+            if port is not None and port.baud != baud:
+                port.baud = baud
+            for _ in range(_TRIES):
+                try:
+                    told = self.ask(b"QT", timeout_s=_ANSWER_S / 2)
+                except DeviceTimeoutError:
+                    continue
+                if told.status == "00":
+                    if port is not None and baud != FIRST_BAUD:
+                        self.insist(b"SS%06d" % FIRST_BAUD, "00", "03", "04")
+                        port.baud = FIRST_BAUD
+                    return
+                # SCIP 1.1 knows no QT; a sensor that is adjusting its time knows nothing but TM.
+                self.ask(protocol.SCIP_2 if len(told.status) == 1 else b"TM2")
+        raise DeviceTimeoutError(f"{self.line.address}: no SCIP sensor answers; check power, cable and port")

@@ -1,0 +1,158 @@
+"""Questions to a SICK lidar in the dialect of CoLa that it understands, and what it answers or refuses."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import TypeVar
+
+from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from firmware_io.lidar.sensor_line import SensorLine
+from firmware_io.lidar.sick.cola import (
+    LONGEST,
+    Telegram,
+    TelegramSplitter,
+    Writer,
+    error_code,
+    error_words,
+    framed,
+)
+from firmware_io.lidar.sick.values import Reader
+
+T = TypeVar("T")
+
+POLL_S = 0.1
+
+_ANSWER_S = 0.5
+_BUSY, _CONDITION = 0x0D, 0x04
+_UNKNOWN = (0x02, 0x03, 0x0B, 0x0C)
+_ANSWERS = {b"sRN": b"sRA", b"sWN": b"sWA", b"sMN": b"sAN", b"sEN": b"sEA"}
+
+
+class RefusedError(DeviceError):
+    """The sensor answered sFA.
+
+    Attributes:
+        code: its number, see `cola.ERRORS`.
+    """
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+    @property
+    def unknown(self) -> bool:
+        """Whether it does not know what it was asked for."""
+        return self.code in _UNKNOWN
+
+    @property
+    def untimely(self) -> bool:
+        """Whether it is in no state to do that."""
+        return self.code == _CONDITION
+
+
+class ColaDialogue:
+    """The talk with one sensor; it is opened with its telegrams stopped.
+
+    Attributes:
+        line: that it goes over.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Open the port, find the dialect, and stop its telegrams.
+
+        Raises:
+            DeviceError: no such port, it is in use, or what answers speaks no CoLa.
+        """
+        self.line = SensorLine(address, LONGEST)
+        self._bad_before = 0
+        self._begin()
+
+    @property
+    def bad(self) -> int:
+        """Telegrams that were thrown away."""
+        return self._bad_before + self._splitter.bad
+
+    def reopen(self) -> None:
+        """Begin anew; raises as opening does."""
+        self._bad_before = self.bad
+        self.line.reopen()
+        self._begin()
+
+    def writer(self, command: str) -> Writer:
+        """A request in the making: word and name."""
+        return Writer(command, binary=self._binary)
+
+    def ask(self, out: Writer) -> Reader:
+        """The values of the answer; a busy method is asked again.
+
+        Raises:
+            RefusedError: it is an sFA.
+            DeviceTimeoutError: none came.
+            DeviceError: the sensor is gone.
+        """
+        asked = out.telegram()
+        name = asked.name.decode()
+        deadline_s = time.monotonic() + _ANSWER_S
+        while True:
+            told = self._answer(asked, deadline_s)
+            if told.word != b"sFA":
+                return told.values()
+            code = self.checked(name, error_code, told)
+            if code != _BUSY or time.monotonic() > deadline_s:
+                raise RefusedError(f"{self.line.name}: {name}: {error_words(code)}", code)
+            time.sleep(POLL_S / 2)
+
+    def insist(self, out: Writer, expect: int) -> None:
+        """Ask, and take no other first value for an answer.
+
+        Raises:
+            DeviceError: it is another one; or as `ask` does.
+        """
+        name = out.telegram().name.decode()
+        got = self.checked(name, self.ask(out).number, "u8")
+        if got != expect:
+            what = "its password was changed, or this access is switched off" if name == "SetAccessMode" else "refused"
+            raise DeviceError(f"{self.line.name}: {name} answered {got}, not {expect}: {what}")
+
+    def checked(self, name: str, take: Callable[..., T], *of: object) -> T:
+        """What is taken from an answer.
+
+        Raises:
+            ProtocolError: it is not there, or none; with the names of sensor and request.
+        """
+        try:
+            return take(*of)
+        except ProtocolError as error:
+            raise ProtocolError(f"{self.line.name}: {name}: {error}") from error
+
+    def next(self, deadline_s: float) -> tuple[Telegram, int]:
+        """What it says next and when that came; raises as `SensorLine.hear` does."""
+        if not self._waiting:
+            telegrams, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
+            self._waiting.extend((told, arrival_ns) for told in telegrams)
+        return self._waiting.popleft()
+
+    def _answer(self, asked: Telegram, deadline_s: float) -> Telegram:
+        self._waiting.clear()
+        self.line.send(framed(asked))
+        while True:
+            told, _ = self.next(deadline_s)
+            if told.binary == asked.binary and (
+                told.word == b"sFA" or (told.word, told.name) == (_ANSWERS[asked.word], asked.name)
+            ):
+                return told
+
+    def _begin(self) -> None:
+        self._splitter = TelegramSplitter()
+        self._waiting: deque[tuple[Telegram, int]] = deque()
+        with self.line.closed_on_error():
+            for self._binary in (True, False):
+                try:
+                    self.ask(self.writer("sEN LMDscandata").number("u8", 0))
+                except DeviceTimeoutError:
+                    continue
+                self._splitter.bad = 0
+                return
+            raise DeviceTimeoutError(f"{self.line.address}: no SICK sensor answers; check power, cable and port")

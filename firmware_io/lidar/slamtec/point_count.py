@@ -1,0 +1,77 @@
+"""Points of an RPLIDAR's packets, with angles and times: they follow evenly, and their count is the clock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from firmware_io.lidar.arrival_line import ArrivalLine
+from firmware_io.lidar.slamtec import protocol
+from firmware_io.lidar.turn import Points
+
+_RATE_MAX = 0.05  # of points per second beside what it states: A1s measure 4 to 8 thousand
+
+
+class PointCount:
+    """What was measured since the stream began.
+
+    Attributes:
+        arrivals: the sensor's time, told by the count, on the host's clock.
+    """
+
+    def __init__(self, kind: int, point_ns: float, baud: int) -> None:
+        """Nothing was measured yet.
+
+        Args:
+            kind: type of the packets.
+            point_ns: between two points, as the sensor states it.
+            baud: of its line.
+        """
+        self._kind, self._point_ns = kind, point_ns
+        packet_ns = round(protocol.SIZES[kind] * 10 / baud * 1e9)
+        self.arrivals = ArrivalLine(smallest_delay_ns=packet_ns, rate_max=_RATE_MAX, grain_ns=point_ns)
+        self._before: protocol.SlamtecPacket | None = None
+        self._points = 0
+        self._span_deg = 0.0  # of a capsule; 0 before one was whole
+
+    def placed(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> list[Points]:
+        """The points that are known now.
+
+        Args:
+            packets: that came together, at least one, each with how many bytes were passed over before it.
+            arrival_ns: when they came.
+        """
+        if self._kind == protocol.NODES:
+            return [self._nodes(packets, arrival_ns)]
+        capsules = (self._capsule(packet, passed > 0, arrival_ns) for packet, passed in packets)
+        return [points for points in capsules if points is not None]
+
+    def _nodes(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> Points:
+        """Points with angles of their own; what was passed over was some of them."""
+        number = np.cumsum([1 + math.ceil(passed / protocol.SIZES[protocol.NODES]) for _, passed in packets])
+        sensor_ns = (self._points + number - 1) * self._point_ns
+        self._points += int(number[-1])
+        self.arrivals.add(float(sensor_ns[-1]), arrival_ns)
+        angle_deg = np.array([packet.start_deg for packet, _ in packets])
+        range_m = np.concatenate([packet.range_m for packet, _ in packets])
+        quality = np.concatenate([packet.quality for packet, _ in packets])
+        return Points(angle_deg, range_m, quality, sensor_ns)
+
+    def _capsule(self, packet: protocol.SlamtecPacket, after_garbage: bool, arrival_ns: int) -> Points | None:
+        """Its start ends the capsule before it, whose points are placed now; lost ones are told by the angle."""
+        many = protocol.POINTS[self._kind]
+        before, self._before = self._before, packet
+        points = None
+        if before is not None:
+            span_deg = (packet.start_deg - before.start_deg) % 360
+            lost = max(round(span_deg / self._span_deg) - 1, 0) if self._span_deg else 0
+            if lost == 0 and not after_garbage:
+                self._span_deg = span_deg
+                number = self._points + np.arange(-many, 0)
+                angle_deg = (before.start_deg + np.arange(many) * (span_deg / many) - before.offset_deg) % 360
+                points = Points(angle_deg, before.range_m, before.quality, number * self._point_ns)
+            self._points += many * lost
+        self._points += many
+        self.arrivals.add((self._points - 1) * self._point_ns, arrival_ns)
+        return points
