@@ -34,6 +34,7 @@ REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nod
 ROUGH = {"xatol": 0.1, "fatol": 1e-4}  # deg, and J: of all that are not built, as far as their stated errors reach
 FINE = {"xatol": 0.005, "fatol": 1e-7}
 FINEST_DEG = 0.01
+STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +214,7 @@ def refine_leaders(
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
             refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else rounds], required)
-            again = required.score(refined)
+            refined, again = _allowed(refined, leader.angles_deg, required)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
@@ -228,6 +229,16 @@ def refine_leaders(
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def _allowed(refined: Setting, leader: Setting, required: Requirements) -> tuple[Setting, Score | None]:
+    """A refined setting and its score; where all nodes refuse it, the next one on the way back to its leader."""
+    for share in STEPS_BACK:
+        setting = ((1 - share) * refined + share * leader).round(2) + 0.0
+        found = required.score(setting)
+        if found is not None:
+            return setting, found
+    return leader, None
 
 
 def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:

@@ -9,9 +9,9 @@ import pytest
 from design.catalogue.catalogue import load_catalogue
 from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import problem_of
-from design.objective.score import score, score_on
+from design.objective.score import Score, score, score_on
 from design.search import families
-from design.search.constraints import fan_reach
+from design.search.constraints import Requirements, fan_reach
 from design.search.search import search
 from design.sphere.directions import weighted_samples
 from design.sphere.outline import reach_about
@@ -89,6 +89,21 @@ def test_refined_and_rounded_it_still_has_no_hole_and_the_plain_optimum_is_told(
     allowed = search(problem, task.task.angles.model_copy(update={"holes": "allow"}))
     assert allowed.plain is None
     assert allowed.best[0].score.J == pytest.approx(found.plain.score.J, abs=3 * allowed.best[0].score.J_error)
+
+
+def test_a_minimum_that_all_nodes_refuse_is_left_for_the_nearest_place_on_the_way_back_to_its_leader():
+    """At the edge of what is allowed few nodes may pass what all of them do not: the whole refinement was lost then."""
+    leader, refined = np.zeros(4), np.array([4.0, -2.0, 1.0, 0.0])
+    kept = Score(J=-1.0, J_error=1e-4, J_lower=-1.1, least=1, blind_weight=0.0)
+
+    class Edge(Requirements):
+        def score(self, angles_deg):
+            return kept if angles_deg[0] <= 3.5 else None
+
+    edge = Edge(problem_of(loaded()), Limits(), True)
+    setting, found = families._allowed(refined, leader, edge)
+    assert found == kept and setting.tolist() == [3.4, -1.7, 0.85, 0.0]
+    assert families._allowed(refined + 9, leader + 9, edge)[1] is None
 
 
 def test_where_nothing_is_free_of_holes_the_smallest_share_is_told(monkeypatch):
