@@ -1,9 +1,9 @@
-"""Damaged replies through both codecs: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED]`.
+"""Damaged replies through every codec: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED] [PROTOCOL...]`.
 
-STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each protocol,
-each with a few flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed
-errors, whatever is accepted must have right sums, told by loops of this file, and nothing may hang. Anything else ends
-the run.
+STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each protocol (or of
+those that are named: SCIP, CoLa, LDROBOT, Slamtec, "servo 1.0", "servo 2.0", "servo STS"), each with a few flipped
+bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed errors, whatever is accepted
+must have right sums, told by loops of these files, and nothing may hang. Anything else ends the run.
 """
 
 from __future__ import annotations
@@ -14,11 +14,8 @@ import time
 from collections.abc import Callable
 from unittest.mock import patch
 
-import numpy as np
-
-from design.errors import DeviceError, ProtocolError
-from firmware_io.lidar.scip import parameters, protocol
-from firmware_io.lidar.sick import cola, scan_data
+from benchmarks.firmware_io.devices.damaged_lidars import LANGUAGES
+from design.errors import DeviceError
 from firmware_io.servo.bus import bus, serial_line
 from firmware_io.servo.bus.bus import ServoBus
 from firmware_io.servo.bus.packet_format import PacketFormat
@@ -27,8 +24,6 @@ from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from firmware_io.servo.feetech.packets import STS
 from firmware_io.twins.servo import dynamixel_packets, feetech_packets
 
-_SCIP_SCRAPS = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
-_COLA_SCRAPS = [b"\x02", b"\x03", b"\x02" * 4, b"\x02sSN ", b"sFA", b" ", b"FFFFFFFF", b"\x00\x00", b"-1", b"\xff"]
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
 _BLOCK = Register(36, 8)
 
@@ -57,76 +52,6 @@ def damaged(rng: random.Random, stream: bytes, scraps: list[bytes], accidents: i
                 other = rng.randrange(len(data) + 1)
                 data[at : at + run], data[other : other + run] = data[other : other + run], data[at : at + run]
     return bytes(data)
-
-
-def dialogue(rng: random.Random) -> bytes:
-    """What a sensor says: who it is, its time, and scans of several kinds with values of their own."""
-    pp = [("MODL", "URG-04LX(H)"), ("DMIN", "20"), ("DMAX", "5600"), ("ARES", "1024"), ("AMIN", "44")]
-    pp += [("AMAX", "725"), ("AFRT", "384"), ("SCAN", "600")]
-    said = protocol.reply(b"VV", "00", protocol.text_lines([("VEND", "Hokuyo"), ("SERI", "H07")]))
-    said += protocol.reply(b"PP", "00", protocol.text_lines(pp))
-    said += protocol.reply(b"TM1", "00", [protocol.summed(protocol.encode([rng.randrange(1 << 24)], 4))])
-    for intensity in (False, True, False):
-        window = protocol.Window(first_step=3, last_step=3 + rng.randrange(40), intensity=intensity)
-        values = [rng.randrange(1 << 18) for _ in range(window.size * (1 + intensity))]
-        lines = protocol.data_lines(rng.randrange(1 << 24), protocol.encode(values, 3))
-        said += protocol.reply(protocol.continuous(window, count=1), "99", lines)
-    return said
-
-
-def survive(stream: bytes) -> tuple[int, int]:
-    """Feed a stream in two pieces; scans accepted, and replies refused. Fails where one has no right to be there."""
-    splitter, middle, accepted, refused = protocol.Splitter(), len(stream) // 2, 0, 0
-    for told in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
-        for line in told.lines:
-            total = 0
-            for byte in line:
-                total += byte
-            assert line + bytes([total % 64 + 48]) in stream or line + b";" in stream, "accepted with a wrong sum"
-        for read in (protocol.information, protocol.measurement, protocol.stamp):
-            try:
-                taken = read(told)
-                if isinstance(taken, dict):
-                    parameters.parameters(taken)
-                elif isinstance(taken, protocol.Measurement):
-                    accepted += 1
-                    assert taken.value.size == taken.window.size, "a scan of another size than its echo says"
-            except ProtocolError:
-                refused += 1
-    return accepted, refused + splitter.bad
-
-
-def cola_dialogue(rng: random.Random) -> bytes:
-    """What a SICK sensor says in one of its dialects: who it is, a refusal, and scans with channels of their own."""
-    binary = rng.random() < 0.5
-    said = [cola.Writer("sRA DeviceIdent", binary=binary).text("LMS111").text("V1.00").telegram()]
-    said.append(cola.Telegram(b"sFA\x00\x04" if binary else b"sFA 4", binary))
-    for channels in (1, 2):
-        raw = np.array([rng.randrange(1 << 16) for _ in range(rng.randrange(1, 40))], np.uint16)
-        wide = tuple(scan_data.Channel(name, 1.0, 0.0, -450_000, 5000, raw) for name in ("DIST1", "RSSI1")[:channels])
-        stamp_us = rng.randrange(1 << 32)
-        numbers = (rng.randrange(1 << 32), 0, 1, 2, stamp_us, stamp_us, 0, 50.0, 36_000.0, ((7, 1),))
-        said.append(scan_data.telegram_of(scan_data.ScanData(*numbers, wide, ()), binary=binary))
-    return b"".join(map(cola.framed, said))
-
-
-def cola_survive(stream: bytes) -> tuple[int, int]:
-    """As `survive`, for a SICK sensor; CoLa A has no sum, so there only the frame is looked at."""
-    splitter, middle, accepted, refused = cola.TelegramSplitter(), len(stream) // 2, 0, 0
-    for told in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
-        total = 0
-        for byte in told.payload:
-            total ^= byte
-        there = told.payload + bytes([total]) if told.binary else b"\x02" + told.payload + b"\x03"
-        assert there in stream, "accepted with a wrong sum"
-        for read in (scan_data.scan_data, cola.error_code, lambda told: told.values().text()):
-            try:
-                taken = read(told)
-                if isinstance(taken, scan_data.ScanData):
-                    accepted += 1
-            except ProtocolError:
-                refused += 1
-    return accepted, refused + splitter.bad
 
 
 class Wire:
@@ -161,29 +86,23 @@ def plain(error: int, data: bytes) -> bytes:
     return packet + dynamixel_packets.crc16(packet).to_bytes(2, "little")
 
 
-def lidar(
-    streams: int,
-    seed: int,
-    language: str,
-    say: Callable[[random.Random], bytes],
-    hear: Callable[[bytes], tuple[int, int]],
-    scraps: list[bytes],
-) -> None:
+def lidar(streams: int, seed: int, name: str) -> None:
     """Damage dialogues, and print what became of them."""
+    language = LANGUAGES[name]
     rng, accepted, refused, slowest_s = random.Random(seed), 0, 0, 0.0
     began_s = time.perf_counter()
     for k in range(streams):
-        stream = damaged(rng, say(rng), scraps, 4, 70)
+        stream = damaged(rng, language.say(rng), language.scraps, 4, 70)
         fed_s = time.perf_counter()
         try:
-            good, bad = hear(stream)
+            good, bad = language.hear(stream)
         except BaseException:
-            print(f"{language} stream {k} of seed {seed}: {stream!r}")
+            print(f"{name} stream {k} of seed {seed}: {stream!r}")
             raise
         slowest_s = max(slowest_s, time.perf_counter() - fed_s)
         accepted, refused = accepted + good, refused + bad
     print(
-        f"{streams:,} damaged dialogues of a lidar, {language}: {accepted:,} scans accepted, all with right sums; "
+        f"{streams:,} damaged dialogues, {name}: {accepted:,} {language.unit} accepted, all with right sums; "
         f"{refused:,} replies refused with a typed error; slowest {1e3 * slowest_s:.0f} ms; "
         f"{time.perf_counter() - began_s:.0f} s"
     )
@@ -220,20 +139,25 @@ def servo(answers: int, seed: int, packets: PacketFormat, statuses: Statuses) ->
     )
 
 
-def main() -> None:
-    """All of them."""
-    streams = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    lidar(streams, seed, "SCIP", dialogue, survive, _SCIP_SCRAPS)
-    lidar(streams, seed, "CoLa", cola_dialogue, cola_survive, _COLA_SCRAPS)
-    servo(streams, seed, PROTOCOL_1, lambda error, data: (dynamixel_packets.status("1.0", 1, error, data),))
-    servo(
-        streams,
-        seed,
+SERVOS: dict[str, tuple[PacketFormat, Statuses]] = {
+    "servo 1.0": (PROTOCOL_1, lambda error, data: (dynamixel_packets.status("1.0", 1, error, data),)),
+    "servo 2.0": (
         PROTOCOL_2,
         lambda error, data: (dynamixel_packets.status("2.0", 1, error, data), plain(error, data)),
-    )
-    servo(streams, seed, STS, lambda error, data: (feetech_packets.status(1, error, data),))
+    ),
+    "servo STS": (STS, lambda error, data: (feetech_packets.status(1, error, data),)),
+}
+
+
+def main() -> None:
+    """All of them, or those that are named."""
+    streams = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    for name in sys.argv[3:] or [*LANGUAGES, *SERVOS]:
+        if name in LANGUAGES:
+            lidar(streams, seed, name)
+        else:
+            servo(streams, seed, *SERVOS[name])
 
 
 if __name__ == "__main__":

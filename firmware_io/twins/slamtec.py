@@ -148,18 +148,18 @@ class SlamtecMachine:
             return b""
         if command == 0x50:
             minor, major = _FIRMWARE[1], _FIRMWARE[0]
-            return _reply(0x04, bytes([self.identity.model, minor, major, 7]) + bytes(range(16)))
+            return reply(0x04, bytes([self.identity.model, minor, major, 7]) + bytes(range(16)))
         if command == 0x52:
-            return _reply(0x06, bytes([self.health]) + (0x8002 if self.health else 0).to_bytes(2, "little"))
+            return reply(0x06, bytes([self.health]) + (0x8002 if self.health else 0).to_bytes(2, "little"))
         if command == 0x59:
             microseconds = round(1e6 / self.identity.points_s)
-            return _reply(0x15, struct.pack("<HH", 500, microseconds))
+            return reply(0x15, struct.pack("<HH", 500, microseconds))
         if command == 0x84 and self.identity.modes:
             return self._configuration(payload)
         if command in (0x20, 0x82) and (command == 0x20) == (self.identity.stream == _STANDARD) and self.health < 2:
             self.scanning, self._from_ns, self._packet, self._first = object(), now_ns, 0, True
             size = 5 if self.identity.stream == _STANDARD else 84
-            return b"\xa5\x5a" + struct.pack("<IB", 1 << 30 | size, self.identity.stream)
+            return stream_begins(self.identity.stream, size)
         return b""
 
     def _configuration(self, payload: bytes) -> bytes:
@@ -170,7 +170,7 @@ class SlamtecMachine:
             0x75: bytes([self.identity.stream]),
             0x7C: struct.pack("<H", 0),
         }
-        return _reply(0x20, payload[:4] + values[key]) if key in values else b""
+        return reply(0x20, payload[:4] + values[key]) if key in values else b""
 
     def _seen_mm(self, time_ns: Times, angle_deg: Floats, most: int) -> Floats:
         range_m = self.sight(time_ns, -np.radians(angle_deg % 360))[0]
@@ -202,14 +202,14 @@ class SlamtecMachine:
             for k in (one, one + 1):
                 data += (seen[k] << 2 | (int(eighths[k]) >> 4) & 3).to_bytes(2, "little")
             data.append((int(eighths[one]) & 15) | (int(eighths[one + 1]) & 15) << 4)
-        return _summed(data)
+        return summed(data)
 
     def _dense(self, angle_deg: Floats, time_ns: Times) -> bytes:
         even_deg = angle_deg[0] + (angle_deg[-1] - angle_deg[0]) * np.arange(40) / 40
         data = self._start(angle_deg[0])
         for mm in np.rint(self._seen_mm(time_ns, even_deg, 65_535)).astype(int).tolist():
             data += mm.to_bytes(2, "little")
-        return _summed(data)
+        return summed(data)
 
     def _start(self, angle_deg: float) -> bytearray:
         word = math.floor(angle_deg * 64) % 23_040 | (0x8000 if self._first else 0)
@@ -217,11 +217,18 @@ class SlamtecMachine:
         return bytearray(word.to_bytes(2, "little"))
 
 
-def _reply(kind: int, data: bytes) -> bytes:
+def reply(kind: int, data: bytes) -> bytes:
+    """One answer behind its descriptor."""
     return b"\xa5\x5a" + struct.pack("<IB", len(data), kind) + data
 
 
-def _summed(data: bytearray) -> bytes:
+def stream_begins(kind: int, size: int) -> bytes:
+    """The descriptor of packets without end."""
+    return b"\xa5\x5a" + struct.pack("<IB", 1 << 30 | size, kind)
+
+
+def summed(data: bytearray) -> bytes:
+    """A capsule: its sum in two halves before it."""
     total = 0
     for byte in data:
         total ^= byte
