@@ -2,11 +2,11 @@
 
     uv run python -m benchmarks.firmware_io.faults [RUNS] [FAULT...]
 
-Each run is a scan of the emulated scanner (a UTM-30LX that an MX-64R spins at 180 deg/s, protocol 1.0, or the servo
-that a fault names: "stall, STS3215") which the fault hits a moment after the recording began. Measured are: what was
-raised; after which time the servo stood, also where it turns on later; how much of the recording before the fault is
-missing after `scanwright repair`; and, where the scan goes on, after which time (from the re-plug) scans are recorded
-again. Times are those of this machine; the bounds to hold are 1 s of recording and 3 s to recover.
+Each run is a scan of the emulated scanner (a UTM-30LX that an MX-64R spins at 180 deg/s, protocol 1.0, or the servo or
+lidar that a fault names: "stall, STS3215", "garbage, STL27L") which the fault hits a moment after the recording began.
+Measured are: what was raised; after which time the servo stood, also where it turns on later; how much of the recording
+before the fault is missing after `scanwright repair`; and, where the scan goes on, after which time (from the re-plug)
+scans are recorded again. Times are those of this machine; the bounds to hold are 1 s of recording and 3 s to recover.
 """
 
 from __future__ import annotations
@@ -94,6 +94,7 @@ SERVOS = {  # model and protocol
     "XL430-W250": ("XL430-W250", "2.0"),
     "STS3215": ("STS3215", "STS"),
 }
+LIDARS = ("STL27L", "RPLIDAR A2", "TiM561", "LMS 200")  # one of each family
 ALL = [
     *("servo unplugged, protocol 1.0", "servo unplugged, protocol 2.0"),
     *[name for name in (*INSIDE, *SIGNALS, FULL_DISK) if name != "servo unplugged"],
@@ -101,6 +102,11 @@ ALL = [
         f"{name}, {servo}"
         for servo in ("XL430-W250", "STS3215")
         for name in ("servo unplugged", "stall", "garbage", "servo brown-out", "kill -9")
+    ],
+    *[
+        f"{name}, {lidar}"
+        for lidar in LIDARS
+        for name in ("lidar unplugged", "lidar unplugged and back", "stall", "garbage", "lidar brown-out", "kill -9")
     ],
 ]
 
@@ -180,9 +186,10 @@ def outside(out: Path, twins: EmulatedScanner, number: int | None) -> Outcome:
 
 def trial(name: str, seed: int) -> Outcome:
     """One run of one fault with a fresh scanner."""
-    fault, _, servo = name.partition(", ")
-    model, protocol = SERVOS[servo or "protocol 1.0"]
-    angles = ANGLES.model_copy(update={"servo": model})
+    fault, _, device = name.partition(", ")
+    lidar = device if device in LIDARS else ANGLES.sensor
+    model, protocol = SERVOS[device if device in SERVOS else "protocol 1.0"]
+    angles = ANGLES.model_copy(update={"servo": model, "sensor": lidar})
     with (
         tempfile.TemporaryDirectory() as folder,
         emulated_scanner(angles, room(None), protocol=protocol, seed=seed) as twins,

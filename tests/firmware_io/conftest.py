@@ -1,11 +1,13 @@
 """What the tests of devices share."""
 
 import pytest
+from virtual_bus import VirtualBus
 
 from firmware_io.lidar.scip import dialogue, driver
 from firmware_io.lidar.sick import dialogue as cola_dialogue
 from firmware_io.lidar.sick import driver as sick_driver
-from firmware_io.servo.bus import bus, serial_line
+from firmware_io.servo import examine, fitness
+from firmware_io.servo.bus import bus, serial_line, unit
 
 
 @pytest.fixture(autouse=True)
@@ -17,3 +19,23 @@ def patience(monkeypatch):
     monkeypatch.setattr(sick_driver, "_SCAN_S", 10.0)
     monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
     monkeypatch.setattr(bus, "_LATE", 1)
+
+
+@pytest.fixture
+def virtual_bus(monkeypatch):
+    """Makes the bus that the next port to be opened leads to."""
+
+    def make(model, protocol=None, beside=()):
+        made = VirtualBus(model, protocol, beside)
+
+        def open_port(port, baud, timeout):
+            assert port == made.port
+            made.baudrate, made.timeout = baud, timeout
+            return made
+
+        monkeypatch.setattr(serial_line, "open_serial_port", open_port)
+        for module in (serial_line, unit, examine, fitness):
+            monkeypatch.setattr(module, "time", made)
+        return made
+
+    return make

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from types import TracebackType
 
-from design.errors import DeviceError, ProtocolError
+from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.device_ports import lidar_ports
 from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.lidar import StampAt, TimedScan
@@ -148,7 +148,10 @@ class ScipLidar:
             DeviceError: the sensor is gone.
         """
         self._request = b""
-        self._dialogue.insist(b"QT", "00")
+        try:
+            self._dialogue.insist(b"QT", "00")
+        except DeviceTimeoutError:  # the answer may have been glued to noise
+            self._dialogue.insist(b"QT", "00")
 
     def reconnect(self, timeout_s: float = 3.0) -> None:
         """Find the sensor again by its serial number, after an unplug or a reset, and scan on if it did.

@@ -290,8 +290,9 @@ class SlamtecLidar:
     def _drain(self) -> None:
         """What it had sent before it stopped."""
         end_s = time.monotonic() + _DRAIN_S
-        while time.monotonic() < end_s and self._line.stream.read(_SILENT_S):
-            pass
+        with self._line.told_when_gone():
+            while time.monotonic() < end_s and self._line.stream.read(_SILENT_S):
+                pass
 
 
 def _two_numbers(data: bytes) -> tuple[int, int]:

@@ -10,11 +10,9 @@ import tty
 from types import SimpleNamespace
 
 import pytest
-from patience import until
 
 from firmware_io import device_ports, serial_port
 from firmware_io.servo.families import all_tables
-from firmware_io.twins.servo import twin as servo_twin
 from firmware_io.twins.servo.dynamixel_packets import take
 from firmware_io.twins.servo.twin import ServoTwin
 
@@ -25,21 +23,6 @@ PING, READ, WRITE = 1, 2, 3
 def nothing_is_plugged_in(monkeypatch, tmp_path):
     monkeypatch.setattr(device_ports.list_ports, "comports", lambda: [])
     monkeypatch.chdir(tmp_path)
-
-
-@pytest.fixture
-def heard(monkeypatch):
-    """All bytes that the twin of a servo gets, in the order in which they come."""
-    said, read = bytearray(), servo_twin.os.read
-
-    def listening(fd, size):
-        data = read(fd, size)
-        if size == 4096:
-            said.extend(data)
-        return data
-
-    monkeypatch.setattr(servo_twin, "os", SimpleNamespace(**{**vars(servo_twin.os), "read": listening}))
-    return said
 
 
 def instructions(said, protocol):
@@ -63,25 +46,26 @@ def kept(twin):
 
 
 def table_of(twin):
-    return twin._servo.table
+    return twin.servo.table
 
 
 @pytest.mark.parametrize(
     ("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("AX-12A", "1.0"), ("STS3215", "STS")]
 )
-def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, heard, command):
-    with ServoTwin(model, protocol) as twin:
-        if model != "AX-12A":
-            spoil(twin)
-        torque = table_of(twin).torque.address
-        twin.memory[torque] = 1  # somebody's arm hangs on it
-        before = bytes(twin.memory.data)
-        code, said, _ = command("doctor", "--servo", twin.port)
-        assert bytes(twin.memory.data[: len(kept(twin)) + 2]) == before[: len(kept(twin)) + 2]
-        assert twin.memory[torque] == 1
-        delay = table_of(twin).return_delay_ns
-    assert set(instructions(heard, "1.0")) | set(instructions(heard, "2.0")) <= {PING, READ}
-    assert READ in instructions(heard, "2.0" if protocol == "2.0" else "1.0")  # the frames of the STS are those of 1.0
+def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, command, virtual_bus):
+    twin = virtual_bus(model, protocol)
+    if model != "AX-12A":
+        spoil(twin)
+    torque = table_of(twin).torque.address
+    twin.memory[torque] = 1  # somebody's arm hangs on it
+    before = bytes(twin.memory.data)
+    code, said, _ = command("doctor", "--servo", twin.port)
+    assert bytes(twin.memory.data[: len(kept(twin)) + 2]) == before[: len(kept(twin)) + 2]
+    assert twin.memory[torque] == 1
+    delay = table_of(twin).return_delay_ns
+    assert set(instructions(twin.heard, "1.0")) | set(instructions(twin.heard, "2.0")) <= {PING, READ}
+    frames = "2.0" if protocol == "2.0" else "1.0"  # the frames of the STS are those of 1.0
+    assert READ in instructions(twin.heard, frames)
     assert "has its torque on" in said
     assert code == 1  # there is no lidar
     if model != "AX-12A":
@@ -89,12 +73,12 @@ def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, heard, 
         assert "`scanwright doctor --fix --servo" in said
 
 
-def test_a_servo_that_answers_only_pings_is_not_told_to(heard, command):
-    with ServoTwin("MX-64R") as twin:
-        twin.memory[16] = 0
-        _, said, _ = command("doctor", "--servo", twin.port)
-        assert twin.memory[16] == 0
-    assert set(instructions(heard, "1.0")) | set(instructions(heard, "2.0")) <= {PING, READ}
+def test_a_servo_that_answers_only_pings_is_not_told_to(command, virtual_bus):
+    twin = virtual_bus("MX-64R")
+    twin.memory[16] = 0
+    _, said, _ = command("doctor", "--servo", twin.port)
+    assert twin.memory[16] == 0
+    assert set(instructions(twin.heard, "1.0")) | set(instructions(twin.heard, "2.0")) <= {PING, READ}
     assert "servo 1 answers pings only: its status_return_level (register 16) is 0; `scanwright doctor --fix" in said
 
 
@@ -123,63 +107,63 @@ def test_where_something_speaks_first_nothing_is_said(command):
 
 
 @pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")])
-def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path):
-    with ServoTwin(model, protocol) as twin:
-        spoil(twin)
-        before = kept(twin)
-        code, said, _ = command("doctor", "--fix", "--servo", twin.port)
-        (file,) = tmp_path.glob("servo-*.json")
-        assert kept(twin) != before
-        assert f"`scanwright doctor --restore {file.name}`" in said
-        for setting in json.loads(file.read_text())["settings"]:
-            name = rf"{setting['register']} \(register \d+\)"
-            assert re.search(rf"servo 1: {name}: {setting['before']} -> {setting['after']}$", said, re.MULTILINE)
-        assert "--fix` sets it" not in said  # the examination after it finds nothing
-        if protocol == "2.0":
-            assert "protocol 2.0 at 1000000 baud" in said
-        code, said, _ = command("doctor", "--restore", file)
-        assert code == 0
-        assert kept(twin) == before
+def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path, virtual_bus):
+    twin = virtual_bus(model, protocol)
+    spoil(twin)
+    before = kept(twin)
+    code, said, _ = command("doctor", "--fix", "--servo", twin.port)
+    (file,) = tmp_path.glob("servo-*.json")
+    assert kept(twin) != before
+    assert f"`scanwright doctor --restore {file.name}`" in said
+    for setting in json.loads(file.read_text())["settings"]:
+        name = rf"{setting['register']} \(register \d+\)"
+        assert re.search(rf"servo 1: {name}: {setting['before']} -> {setting['after']}$", said, re.MULTILINE)
+    assert "--fix` sets it" not in said  # the examination after it finds nothing
+    if protocol == "2.0":
+        assert "protocol 2.0 at 1000000 baud" in said
+    code, said, _ = command("doctor", "--restore", file)
+    assert code == 0
+    assert kept(twin) == before
     assert "return_delay_time" in said and "0 -> 200" in said
 
 
-def test_what_is_already_right_is_not_written(command, tmp_path, heard):
-    with ServoTwin("MX-64R") as twin:
-        twin.memory[5] = 0
-        _, said, _ = command("doctor", "--fix", "--servo", twin.port)
+def test_what_is_already_right_is_not_written(command, tmp_path, virtual_bus):
+    twin = virtual_bus("MX-64R")
+    twin.memory[5] = 0
+    _, said, _ = command("doctor", "--fix", "--servo", twin.port)
     assert "every setting is as it should be" in said
     assert not list(tmp_path.glob("servo-*"))
-    assert WRITE not in instructions(heard, "1.0")
+    assert WRITE not in instructions(twin.heard, "1.0")
 
 
 @pytest.mark.parametrize("protocol", ["1.0", "2.0"])
-def test_a_mute_servo_is_unmuted_by_a_fix_and_mute_again_after_the_restore(protocol, command, tmp_path):
+def test_a_mute_servo_is_unmuted_by_a_fix_and_mute_again_after_the_restore(protocol, command, tmp_path, virtual_bus):
     level = 16 if protocol == "1.0" else 68
-    with ServoTwin("MX-64R", protocol) as twin:
-        twin.memory[level] = 0
-        _, said, _ = command("doctor", "--fix", "--servo", twin.port)
-        assert twin.memory[level] == 2
-        assert f"status_return_level (register {level}): 0 -> 2" in said
-        (file,) = tmp_path.glob("servo-*.json")
-        code, said, _ = command("doctor", "--restore", file)
-        assert code == 0
-        until(lambda: twin.memory[level] == 0)  # nobody has waited for an answer
-        assert "2 -> 0; it was not read back" in said
+    twin = virtual_bus("MX-64R", protocol)
+    twin.memory[level] = 0
+    _, said, _ = command("doctor", "--fix", "--servo", twin.port)
+    assert twin.memory[level] == 2
+    assert f"status_return_level (register {level}): 0 -> 2" in said
+    (file,) = tmp_path.glob("servo-*.json")
+    code, said, _ = command("doctor", "--restore", file)
+    assert code == 0
+    assert twin.memory[level] == 0
+    assert "2 -> 0; it was not read back" in said
 
 
-def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monkeypatch):
-    with ServoTwin("MX-64R") as twin:
-        twin.memory[24] = 1
-        before = bytes(twin.memory.data[:36])
-        code, said, _ = command("doctor", "--fix", "--servo", twin.port)
-        assert bytes(twin.memory.data[:36]) == before
-        assert code == 1 and "has its torque on, and holds or turns something" in said
-        plugged = [SimpleNamespace(device=twin.port, vid=0x0403, pid=0x6014)]
-        monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
-        twin.memory[24] = 0
-        code, said, _ = command("doctor", "--fix")
-        assert bytes(twin.memory.data[:24]) == before[:24]
-        assert code == 1 and "--fix writes, so it does not guess: name the servo's port" in said
+def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monkeypatch, virtual_bus):
+    twin = virtual_bus("MX-64R")
+    twin.memory[24] = 1
+    before = bytes(twin.memory.data[:36])
+    code, said, _ = command("doctor", "--fix", "--servo", twin.port)
+    assert bytes(twin.memory.data[:36]) == before
+    assert code == 1 and "has its torque on, and holds or turns something" in said
+    plugged = [SimpleNamespace(device=twin.port, vid=0x0403, pid=0x6014)]
+    monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
+    twin.memory[24] = 0
+    code, said, _ = command("doctor", "--fix")
+    assert bytes(twin.memory.data[:24]) == before[:24]
+    assert code == 1 and "--fix writes, so it does not guess: name the servo's port" in said
     assert not list(tmp_path.glob("servo-*"))
 
 

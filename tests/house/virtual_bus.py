@@ -2,16 +2,13 @@
 
 from collections import deque
 
-import pytest
-
-from firmware_io.servo.bus import serial_line, unit
 from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo.machine import answers
 from firmware_io.twins.servo.models import machine_of
 
 
 class VirtualBus:
-    """The machines of `ServoTwin` behind a port of pyserial's shape, and the clock of both."""
+    """The machines of `ServoTwin` behind a port of pyserial's shape, the clock of both, and all that was sent."""
 
     port = "virtual"
     is_open = True
@@ -26,6 +23,7 @@ class VirtualBus:
             other.memory[other.table.id.address] = number
             self.servos.append(other)
         self.memory = self.servo.memory
+        self.heard = bytearray()
         self._coming = deque()  # when, and which byte
 
     def monotonic(self):
@@ -42,6 +40,7 @@ class VirtualBus:
         self.sleep(10.0)
 
     def write(self, data):
+        self.heard += data
         hearing = [s for s in self.servos if s.listens(self.now_ns) and abs(self.baudrate / s.baud - 1) < 0.03]
         buffer, byte_ns = bytearray(data), round(10e9 / self.baudrate)
         self.now_ns += len(data) * byte_ns
@@ -71,23 +70,3 @@ class VirtualBus:
 
     def close(self):
         self._coming.clear()
-
-
-@pytest.fixture
-def virtual_bus(monkeypatch):
-    """Makes the bus that the next port to be opened leads to."""
-
-    def make(model, protocol=None, beside=()):
-        bus = VirtualBus(model, protocol, beside)
-
-        def open_port(port, baud, timeout):
-            assert port == bus.port
-            bus.baudrate, bus.timeout = baud, timeout
-            return bus
-
-        monkeypatch.setattr(serial_line, "open_serial_port", open_port)
-        for module in (serial_line, unit):
-            monkeypatch.setattr(module, "time", bus)
-        return bus
-
-    return make

@@ -1,0 +1,123 @@
+"""A scan whose lidar fails, one lidar of each family, by a clock that goes forward only where somebody waits."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from virtual_line import VirtualLine
+
+from design.errors import DeviceError, DeviceFaultError
+from firmware_io.lidar import sensor_line
+from firmware_io.lidar.families import FAMILIES, family_of, open_lidar
+from firmware_io.lidar.ldrobot import driver as ldrobot
+from firmware_io.lidar.scip import dialogue as scip_dialogue
+from firmware_io.lidar.scip import driver as scip
+from firmware_io.lidar.sick import dialogue as cola
+from firmware_io.lidar.sick import driver as sick
+from firmware_io.lidar.slamtec import driver as slamtec
+from firmware_io.scan import acquire
+
+MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561")
+MOST_LOST_S = 1.0
+
+
+@pytest.fixture(autouse=True)
+def patience():
+    """As long as devices are waited for: here nobody is late."""
+
+
+def wall(_time_ns, bearing_rad):
+    return 2.0 + np.sin(bearing_rad), np.full(bearing_rad.size, 800.0)
+
+
+class Scanner:
+    """A lidar that scans, and what became of the servo."""
+
+    def __init__(self, line, lidar):
+        self.line, self.lidar, self.said, self.axis = line, lidar, [], []
+        self.scans = acquire._Scans(lidar, self.said.append)
+        self.scans.axis = SimpleNamespace(stop=lambda: not self.axis.append("stop"), go=lambda: self.axis.append("go"))
+
+    def next(self):
+        scan = self.scans.next()
+        seen = np.isfinite(scan.range_m)
+        if self.lidar.model != "RPLIDAR C1":  # whose two check bits let a flipped range through
+            np.testing.assert_allclose(scan.range_m[seen], 2.0 + np.sin(scan.bearing_rad[seen]), atol=2e-3)
+        assert seen.mean() > 0.9
+        return scan
+
+
+@pytest.fixture(params=MODELS)
+def scanner(request, monkeypatch):
+    line = VirtualLine(request.param, wall)
+    for module in (sensor_line, ldrobot, scip_dialogue, scip, cola, sick, slamtec, acquire):
+        monkeypatch.setattr(module, "time", line)
+    monkeypatch.setattr(sensor_line, "open_stream", line.open)
+    monkeypatch.setattr(scip, "lidar_ports", list)
+    with open_lidar("virtual", request.param) as lidar:
+        lidar.start()
+        made = Scanner(line, lidar)
+        for _ in range(6):
+            made.next()
+        yield made
+
+
+def test_every_family_is_here():
+    assert {family_of(model).name for model in MODELS} == {family.name for family in FAMILIES}
+
+
+def test_damaged_packets_cost_their_turns_and_no_more(scanner):
+    def flip(packet):
+        return packet[:40] + bytes([packet[40] ^ 8]) + packet[41:] if len(packet) > 40 else packet[:-1]
+
+    scanner.line.damage.extend([flip, lambda packet: packet[: len(packet) // 2], lambda packet: b"\x54\xa5" + packet])
+    before_ns = scanner.line.now_ns
+    scans = [scanner.next() for _ in range(10)]
+    assert scanner.lidar.bad_packets >= 1
+    usual_ns = 10e9 / scanner.lidar.scan_rate_hz
+    assert scans[-1].time_ns[-1] - before_ns < usual_ns + MOST_LOST_S * 1e9
+    assert scanner.axis == [] and scanner.said == []
+
+
+def test_after_a_brown_out_the_servo_stands_until_it_scans_again(scanner):
+    scanner.line.machine.power_cycle(scanner.line.now_ns)
+    before_ns = scanner.line.now_ns
+    for _ in range(5):
+        scan = scanner.next()
+    assert scanner.axis == ["stop", "go"] and scanner.scans.away == 1
+    assert "the servo has answered that it holds" in scanner.said[0]
+    assert before_ns < scan.stamp_ns < scanner.line.now_ns
+    assert scanner.line.now_ns - before_ns < 8e9  # a second or two of which it starts, three until it is missed
+
+
+def test_unplugged_and_back_it_scans_on(scanner, monkeypatch):
+    scanner.line.unplug()
+    pulled_ns, sleep = scanner.line.now_ns, scanner.line.sleep
+
+    def until_plugged(seconds):
+        sleep(seconds)
+        scanner.line.plugged |= scanner.line.now_ns > pulled_ns + 500_000_000
+
+    monkeypatch.setattr(scanner.line, "sleep", until_plugged)
+    scanner.next()
+    assert scanner.axis == ["stop", "go"]
+    assert scanner.line.now_ns - pulled_ns < (0.5 + MOST_LOST_S + 2.0) * 1e9
+
+
+def test_one_that_stays_away_is_a_typed_error_of_one_line(scanner):
+    scanner.line.unplug()
+    pulled_ns = scanner.line.now_ns
+    with pytest.raises(DeviceError, match=r"did not come back in 10\.0 s") as told:
+        scanner.next()
+    assert "\n" not in str(told.value) and not isinstance(told.value, DeviceFaultError)
+    assert scanner.axis == ["stop"]
+    assert scanner.line.now_ns - pulled_ns < 11e9
+    scanner.line.plugged = True  # so that leaving it is no error
+
+
+def test_noise_without_end_is_a_timeout(scanner, monkeypatch):
+    with monkeypatch.context() as noise:
+        noise.setattr(scanner.line, "read", lambda _: scanner.line.sleep(0.01) or b"\x00\xff\x54\xa5\x02" * 8)
+        noise.setattr(acquire, "_AWAY_S", 1.0)
+        with pytest.raises(DeviceError, match=r"did not come back in 1\.0 s"):
+            scanner.next()

@@ -1,0 +1,74 @@
+"""A lidar's machine behind a line whose clock goes forward only where somebody waits."""
+
+import time
+from collections import deque
+from pkgutil import resolve_name
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
+from design.errors import DeviceError
+from firmware_io.lidar.families import family_of
+
+_BUFFER_NS = 50_000_000  # of a line that nobody reads
+
+
+class VirtualLine:
+    """The machine of a twin behind a stream of the drivers' shape, and the clock of both."""
+
+    def __init__(self, model, sight):
+        lidar = load_catalogue().get(model, Lidar)
+        self.machine = resolve_name(family_of(model).twin)(lidar, sight, 0).machine
+        self.now_ns = time.monotonic_ns()  # at which the machine was made
+        self.plugged = True
+        self.damage = deque()  # what happens to the next packets
+        self._scanning = self.machine.scanning
+        self._received = b""
+        self._coming = deque()  # when, and what
+
+    def monotonic(self):
+        return self.now_ns / 1e9
+
+    def monotonic_ns(self):
+        return self.now_ns
+
+    def sleep(self, seconds):
+        self.now_ns += round(seconds * 1e9)
+
+    def unplug(self):
+        self.plugged = False
+        self._coming.clear()
+
+    def open(self, address):
+        if not self.plugged:
+            raise DeviceError(f"{address}: no such port")
+        return self
+
+    def write(self, data):
+        self._here()
+        told, self._received = self.machine.hear(self._received + data, self.now_ns)
+        if self.machine.scanning is not self._scanning:
+            self._scanning = self.machine.scanning
+            self._coming.clear()
+        if told:
+            self._coming.append((self.now_ns, told))
+
+    def read(self, timeout_s):
+        self._here()
+        end_ns = self.now_ns + max(round(timeout_s * 1e9), 0)
+        self.machine.leave_out(self.now_ns - _BUFFER_NS)
+        while not (self._coming and self._coming[0][0] <= end_ns) and self.machine.next_ns() <= end_ns:
+            for sent_ns, packet in self.machine.next_packets():
+                self._coming.append((sent_ns, self.damage.popleft()(packet) if self.damage else packet))
+        if not self._coming or self._coming[0][0] > end_ns:
+            self.now_ns = max(end_ns, self.now_ns + 1000)  # a look takes its time
+            return b""
+        sent_ns, data = self._coming.popleft()
+        self.now_ns = max(self.now_ns, sent_ns)
+        return data
+
+    def close(self):
+        self._coming.clear()
+
+    def _here(self):
+        if not self.plugged:
+            raise OSError("unplugged")
