@@ -7,7 +7,7 @@ that can go wrong by wrong input raises a `ScanwrightError` whose message is one
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -315,6 +315,7 @@ def import_bag(
     angle: str,
     angle_unit: Literal["deg", "rad"] | None = None,
     hold: bool = False,
+    also: Collection[str] = (),
 ) -> ImportSummary:
     """Bring somebody's ROS 1 or ROS 2 bag into the project's own form: MCAP, /scan and /joint_states.
 
@@ -326,13 +327,14 @@ def import_bag(
             transforms, or FILE.csv[:COLUMN].
         angle_unit: of that angle; transforms have none.
         hold: the motor stood still during each scan.
+        also: topics that come along as they are, such as /odom, /imu and /tf_static for `assemble`.
 
     Raises:
         RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
     """
     from firmware_io.recording.importer import import_bag
 
-    return import_bag(Path(bag), Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold)
+    return import_bag(Path(bag), Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also)
 
 
 def simulate(
@@ -385,6 +387,8 @@ def assemble(
     lag_s: float = 0.0,
     per: Literal["recording", "turn", "half"] = "recording",
     poses: str | None = None,
+    imu: str | None = None,
+    imu_rpy_deg: tuple[float, float, float] | None = None,
     smooth: bool = True,
     columns: Iterable[str] = ("intensity", "time_s", "joint_rad", "ring"),
     camera: TaskLike | None = None,
@@ -408,6 +412,9 @@ def assemble(
         lag_s: time by which the angle log is late.
         per: one cloud for the recording, or for each (half) turn.
         poses: where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).
+        imu: how it turned between two poses: a topic of `sensor_msgs/Imu`, or a CSV file with the gyro's wx wy wz.
+        imu_rpy_deg: roll, pitch and yaw of the IMU on the platform that the poses are of; from /tf_static of the
+            recording if not given.
         smooth: smooth the steps of the encoder where that helps.
         columns: of each point beside x y z.
         camera: a task whose [camera] the points are coloured with.
@@ -425,7 +432,9 @@ def assemble(
     """
     from firmware_io.assembly.assemble import BeamLimits, assemble_recording
     from firmware_io.assembly.finish import Finish, finish_clouds, seen_from
-    from firmware_io.assembly.pose_files import load_trajectory
+    from firmware_io.poses.gyro import oriented
+    from firmware_io.poses.gyro_files import imu_mount, load_gyro
+    from firmware_io.poses.pose_files import load_trajectory
 
     recording, angle_set, target = Path(recording), _angles(angles), Path(out)
     check_target(target)
@@ -433,6 +442,14 @@ def assemble(
     if organised and finish.thins:
         raise RecordingError(f"{target}: organised: every beam keeps its row, so none can go: leave out --organised")
     trajectory = None if poses is None else load_trajectory(poses, recording)
+    said_of_gyro: list[str] = []
+    if imu is not None:
+        if trajectory is None:
+            raise RecordingError("imu: a gyro goes from pose to pose; name the --poses too")
+        gyro = load_gyro(imu, recording)
+        trajectory, said_of_gyro = oriented(
+            trajectory, gyro, imu_mount(imu_rpy_deg, gyro, trajectory.platform, recording)
+        )
     paint = None
     if camera is not None:
         from firmware_io.colour.paint import painter
@@ -454,6 +471,7 @@ def assemble(
             columns=columns,
             beams=limits,
         )
+        summary = replace(summary, said=(*summary.said, *said_of_gyro))
         if paint is not None:
             painted = tuple(paint(cloud).line(cloud) for cloud in summary.clouds)
             summary = replace(summary, said=(*summary.said, *painted))

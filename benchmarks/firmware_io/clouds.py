@@ -34,8 +34,8 @@ from design.angles import Angles, AngleSet, load_angles
 from design.arrays import Floats
 from firmware_io.assembly.deskew import place
 from firmware_io.assembly.deskew_kernel import place_block
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.ply import PlyWriter
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import RecordingWriter
 from firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
 from scanwright.trials.axis import ways_between

@@ -24,10 +24,10 @@ from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.assembly.beam_outcome import Verdict, between_surfaces
 from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.assembly.turns import turn_starts
 from firmware_io.clouds.cloud import COLUMN_TYPES
 from firmware_io.clouds.ply import PlyWriter
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import Recording, open_recording
 from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
 
@@ -274,11 +274,12 @@ def _left_out(counts: Counter[int]) -> dict[str, int]:
 def _about_poses(poses: Trajectory | None) -> Iterator[str]:
     if poses is None:
         return
-    gap_s = np.diff(poses.time_ns) / 1e9
-    error_m, error_rad = poses.error()
-    off = "" if math.isnan(error_m) else f", going straight between them is off by {error_m * 1000:.2g} mm and "
-    off += f"{math.degrees(error_rad):.2g} deg at most" if off else ""
-    yield f"poses: {poses.time_ns.size:,}, usually {np.median(gap_s):.3g} s apart{off}"
+    alone = poses.measured or poses
+    gap_s = np.diff(alone.time_ns) / 1e9
+    error_m, error_rad = alone.error()
+    off = "" if math.isnan(error_m) else f", going straight between them is off by {error_m * 1000:.2g} mm"
+    off += f" and {math.degrees(error_rad):.2g} deg" if off and poses.measured is None else ""
+    yield f"poses: {alone.time_ns.size:,}, usually {np.median(gap_s):.3g} s apart{off}{' at most' if off else ''}"
     if gap_s.max() > 10 * np.median(gap_s):
         yield f"warning: between two poses lie up to {gap_s.max():.2f} s: the platform goes straight across"
     if np.abs(poses.position_m).max() > _FLOAT32_LIMIT_M:

@@ -22,7 +22,7 @@ from design import frames
 from design.angles import AngleSet
 from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.samples import AxisCurve, JointLog, Scan
 
 

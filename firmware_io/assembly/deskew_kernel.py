@@ -22,7 +22,7 @@ from design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
 from design.concurrency.parallel import in_chunks
 from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.trajectory import PosePieces, Trajectory, at_rest
+from firmware_io.poses.trajectory import PosePieces, Trajectory, at_rest
 from firmware_io.samples import AxisCurve, Block, JointLog, Scan, straight
 
 

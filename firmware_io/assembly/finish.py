@@ -18,10 +18,10 @@ from design.angles import AngleSet
 from design.arrays import Floats
 from design.errors import RecordingError
 from firmware_io.assembly.assemble import AssembleSummary
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds import filters
 from firmware_io.clouds.cloud import Cloud
 from firmware_io.clouds.formats import read_clouds, write_clouds
+from firmware_io.poses.trajectory import Trajectory
 
 SeenFrom = Callable[[Cloud], Float64[ndarray, "n 3"]]
 

@@ -28,7 +28,7 @@ from design.errors import RecordingError
 from firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow
 from firmware_io.assembly.deskew_kernel import place_block
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.trajectory import Trajectory, trajectory_of
+from firmware_io.poses.trajectory import Trajectory, trajectory_of
 from firmware_io.samples import JointSample, PoseSample, Scan, blocks
 
 LOOK_AHEAD_S = 0.35

@@ -16,7 +16,7 @@ from design.arrays import Pose
 from design.camera import Camera
 from design.errors import RecordingError
 from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.trajectory import Trajectory
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import Recording
 from firmware_io.samples import AxisCurve, straight
 

@@ -27,9 +27,9 @@ from design.arrays import Floats, Times
 from design.camera import Camera
 from design.errors import TaskError
 from design.task.task import LoadedTask
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.ply import PlyWriter, read_header, read_ply
 from firmware_io.colour.camera_views import CameraView, load_views, opened
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import Recording, open_recording
 
 COLOURS = ("red", "green", "blue", "alpha")

@@ -75,11 +75,11 @@ class Bag:
         """Message type of each topic."""
         return {connection.topic: connection.msgtype for connection in self._reader.connections}
 
-    def messages(self, topics: set[str]) -> Iterator[Message]:
-        """The messages of these topics, decoded, in the order of their recording.
+    def check(self, topics: set[str]) -> None:
+        """That the bag has these topics, all of them, and knows their types.
 
         Raises:
-            RecordingError: a topic is missing, its type unknown, or the bag damaged.
+            RecordingError: a topic is missing or its type unknown.
         """
         missing = [f"no topic '{name}'{suggest(name, self.topics)}" for name in sorted(topics - self.topics.keys())]
         if missing:
@@ -90,6 +90,14 @@ class Bag:
                     f"{self.path}: {topic}: the bag does not hold the definition of {self.topics[topic]}, and ROS 2 "
                     "does not come with it; record it again as MCAP, which holds definitions"
                 )
+
+    def messages(self, topics: set[str]) -> Iterator[Message]:
+        """The messages of these topics, decoded, in the order of their recording.
+
+        Raises:
+            RecordingError: a topic is missing, its type unknown, or the bag damaged.
+        """
+        self.check(topics)
         wanted = [connection for connection in self._reader.connections if connection.topic in topics]
         raw_messages = self._reader.messages(connections=wanted)
         for connection, receive_ns, raw in foreign_items(f"{self.path}: damaged bag", raw_messages):

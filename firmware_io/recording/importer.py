@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -29,7 +29,7 @@ from firmware_io.recording.angle_sources import (
 from firmware_io.recording.bag_clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
 from firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source
 from firmware_io.recording.metadata import held_by, note_in
-from firmware_io.recording.recording import MessageWriter, RecordingWriter
+from firmware_io.recording.recording import BEAMS_TOPIC, JOINT_TOPIC, SCAN_TOPIC, MessageWriter, RecordingWriter
 from firmware_io.samples import JointLog
 
 AngleUnit = Literal["deg", "rad"]
@@ -90,7 +90,14 @@ class _Survey:
 
 
 def import_bag(
-    bag: Path, out: Path, *, scan: str, angle: str, angle_unit: AngleUnit | None, hold: bool
+    bag: Path,
+    out: Path,
+    *,
+    scan: str,
+    angle: str,
+    angle_unit: AngleUnit | None,
+    hold: bool,
+    also: Collection[str] = (),
 ) -> ImportSummary:
     """Write the scans and angles of a bag as a recording.
 
@@ -104,6 +111,7 @@ def import_bag(
         hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
             the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
             so itself, and its log stays as it is.
+        also: topics that come along as they are, such as poses and an IMU for `assemble`.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -122,7 +130,10 @@ def import_bag(
     if angle_unit is None:
         raise RecordingError("angle unit: write deg or rad, as the bag has it")
     table = read_table(angle) if angle_source is None else None
+    if taken := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
+        raise RecordingError(f"also {min(taken)}: the recording has a topic of its own under this name")
     with open_bag(bag) as opened:
+        opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
         survey = _survey(opened, scan_source, angle_source, table)
         clock = one_clock(survey.scan_stamps, survey.angle_stamps)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
@@ -135,6 +146,8 @@ def import_bag(
         warnings = [said for said in (clock.said, survey.angle_said) if said]
         warnings += [*_unit_warnings(clock.angle_ns, survey.angle, log, angle_unit)]
         warnings += [*_angle_warnings(survey, angle_unit), *_scan_warnings(survey, clock)]
+        if also and clock.said:
+            warnings.append(f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times")
         if not in_time.all():
             warnings.append(
                 f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
@@ -156,7 +169,7 @@ def import_bag(
             "warnings": "\n".join(warnings),
         }
         with RecordingWriter(out, note) as writer:
-            _write(opened, scan_source, clock, log, writer)
+            _write(opened, scan_source, clock, log, writer, also)
     return ImportSummary(
         out=out,
         scans=clock.scan_ns.size,
@@ -286,12 +299,18 @@ def _scan_warnings(survey: _Survey, clock: OneClock) -> Iterator[str]:
         yield f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
 
 
-def _write(bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: MessageWriter) -> None:
-    """Second pass: copy the scans, with the joint samples between them by time."""
+def _write(
+    bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: MessageWriter, also: Collection[str]
+) -> None:
+    """Second pass: copy the scans, with the joint samples between them by time, and what comes along as received."""
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     written = 0
     scan_times = iter(clock.scan_ns.tolist())
-    for message in bag.messages({source.topic}):
+    for message in bag.messages({source.topic, *also}):
+        if message.topic in also:
+            writer.other(message.topic, bag.topics[message.topic], message.receive_ns, message.body)
+        if message.topic != source.topic:
+            continue
         laser_scan, _ = laser_scan_at(message.body, source, bag.path)
         if _fault(laser_scan):
             continue

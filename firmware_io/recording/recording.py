@@ -84,6 +84,19 @@ class MessageWriter:
         self._check(time_ns)
         self._add(JOINT_TOPIC, time_ns, ros_messages.encode_joint(time_ns, position_rad))
 
+    def other(self, topic: str, message_type: str, time_ns: int, message: object) -> None:
+        """Append a message of another topic, of a type that comes with ROS 2.
+
+        Raises:
+            RecordingError: it is of no such type.
+        """
+        self._check(time_ns)
+        if topic not in self._channels:
+            what = f"{self._path}: {topic}: {message_type} is no type that comes with ROS 2"
+            self._channels[topic] = foreign(what, self._channel, topic, message_type)
+        what = f"{self._path}: {topic}: a message that is no {message_type}"
+        self._add(topic, time_ns, foreign(what, ros_messages.encode_message, message, message_type))
+
     def flush(self) -> None:
         """Hand everything so far to the stream, in whole chunks."""
         self._writer.flush()  # type: ignore[no-untyped-call]

@@ -205,6 +205,11 @@ def decode_message(data: bytes, message_type: str) -> Any:
     return _store().deserialize_cdr(data, message_type)
 
 
+def encode_message(message: object, message_type: str) -> bytes:
+    """Inverse of `decode_message`, for a message of any ROS version."""
+    return bytes(_store().serialize_cdr(message, message_type))
+
+
 def stamp_ns(stamp: Any) -> int:
     """A ROS time as integer nanoseconds."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -48,11 +48,16 @@ def import_(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
     angle_unit: Annotated[AngleUnit | None, typer.Option(help="Unit of the angle; transforms have none.")] = None,
     hold: Annotated[bool, typer.Option("--hold", help="The motor stood still during each scan.")] = False,
+    also: Annotated[
+        list[str] | None, typer.Option(metavar="TOPIC", help="Comes along as it is, such as /odom, /imu, /tf_static.")
+    ] = None,
 ) -> None:
     """Bring somebody's ROS recording into the project's own: MCAP, /scan and /joint_states."""
     from scanwright import api
 
-    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit and angle_unit.value, hold=hold)
+    summary = api.import_bag(
+        bag, out, scan=scan, angle=angle, angle_unit=angle_unit and angle_unit.value, hold=hold, also=also or ()
+    )
     show(summary.lines())
 
 
@@ -89,6 +94,14 @@ def assemble(
             metavar="FILE|TOPIC",
             help="Where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).",
         ),
+    ] = None,
+    imu: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.csv|TOPIC", help="How it turned between poses: the gyro of a sensor_msgs/Imu."),
+    ] = None,
+    imu_rpy_deg: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="R P Y", help="How the IMU stands on the platform; from /tf_static if not given."),
     ] = None,
     straight: Annotated[
         bool, typer.Option("--straight", help="Take the angle straight between its samples, steps not smoothed.")
@@ -128,6 +141,8 @@ def assemble(
         lag_s=lag_s,
         per=per.value,
         poses=poses,
+        imu=imu,
+        imu_rpy_deg=imu_rpy_deg,
         smooth=not straight,
         columns=[name.strip() for name in columns.split(",") if name.strip()],
         camera=camera,

@@ -17,9 +17,9 @@ from design.errors import RecordingError
 from firmware_io.assembly.assemble import assemble_recording
 from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.deskew import deskew, place
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.assembly.turns import turn_starts
 from firmware_io.clouds.ply import read_ply
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.importer import import_bag
 from firmware_io.recording.recording import RecordingWriter
 from firmware_io.samples import JointLog, Scan
@@ -294,6 +294,32 @@ def test_a_wrong_mask_is_one_line(tmp_path, command, arrays, says):
     assert code == 2
     assert len(complaints) == 1
     assert re.search(says, complaints[0])
+
+
+def test_a_gyro_says_how_the_platform_turned_between_two_poses(tmp_path, command):
+    """Poses a second apart see nothing of a platform that turns to and fro about z in between; the gyro does."""
+    scans = [a_scan(0, 40, START + k * 50_000_000, range_m=np.full(40, 5, np.float32)) for k in range(19)]
+    write(tmp_path / "r.mcap", scans, a_log(0.0, 0.0))
+    (tmp_path / "angles.json").write_text(angle_set(0, 90, 0, -90).to_json())
+    seconds = np.arange(-1, 1.01, 0.005)
+    yaw_rad_s = 0.2 * 2 * np.pi * np.cos(2 * np.pi * seconds)
+    gyro = [f"{START + round(t * 1e9)},0,0,{rate}" for t, rate in zip(seconds, yaw_rad_s, strict=True)]
+    (tmp_path / "imu.csv").write_text("time_ns,wx,wy,wz\n" + "\n".join(gyro))
+    poses = [f"{START // 10**9 + k}.{START % 10**9:09} 0 0 0 0 0 0 1" for k in (-1, 0, 1)]
+    (tmp_path / "poses.tum").write_text("\n".join(poses))
+    words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
+    words += ["--imu", tmp_path / "imu.csv"]
+    posed = [*words, "--poses", tmp_path / "poses.tum"]
+    assert "name the --poses too" in command(*words)[2][0]
+    assert "say how it stands there by --imu-rpy-deg" in command(*posed)[2][0]
+    code, printed, complaints = command(*posed, "--imu-rpy-deg", 0, 0, 0)
+    assert (code, complaints) == (0, [])
+    assert "poses: 3, usually 1 s apart, going straight between them is off by 0 mm at most" in printed
+    assert "gyro: orientation between poses" in printed
+    rows = read_ply(tmp_path / "c.ply")
+    bearing = a_scan(0, 40).bearing_rad[rows["ring"]] + 0.2 * np.sin(2 * np.pi * rows["time_s"])
+    np.testing.assert_allclose(rows["x"], 5 * np.cos(bearing), atol=1e-3)
+    np.testing.assert_allclose(rows["y"], 5 * np.sin(bearing), atol=1e-3)
 
 
 def test_far_poses_and_gaps_between_them_are_told(tmp_path):

@@ -14,8 +14,8 @@ from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.deskew import place
 from firmware_io.assembly.deskew_kernel import _sin_cos, place_block
 from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.trajectory import Trajectory
 from firmware_io.clouds.ply import read_ply
+from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import RecordingWriter
 from firmware_io.samples import JointLog, Scan, blocks
 

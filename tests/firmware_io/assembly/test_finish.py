@@ -8,8 +8,8 @@ from design.angles import Angles, AngleSet
 from design.errors import RecordingError
 from firmware_io.assembly.beam_outcome import between_surfaces
 from firmware_io.assembly.finish import seen_from
-from firmware_io.assembly.trajectory import trajectory_of
 from firmware_io.clouds.cloud import Cloud
+from firmware_io.poses.trajectory import trajectory_of
 from firmware_io.samples import Scan, blocks
 from scanwright import api
 

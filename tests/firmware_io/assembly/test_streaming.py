@@ -19,8 +19,8 @@ from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.deskew_kernel import place_block
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.streaming import MOST_WAITING, Assembler
-from firmware_io.assembly.trajectory import trajectory_of
 from firmware_io.clouds.ply import read_ply
+from firmware_io.poses.trajectory import trajectory_of
 from firmware_io.recording.importer import import_bag
 from firmware_io.recording.recording import open_recording
 from firmware_io.samples import JointLog, JointSample, PoseSample, Scan, blocks

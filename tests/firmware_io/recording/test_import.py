@@ -13,6 +13,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from design.errors import RecordingError
+from firmware_io.poses.pose_files import load_trajectory
 from firmware_io.recording.importer import import_bag
 from firmware_io.recording.recording import open_recording
 
@@ -111,10 +112,10 @@ def ros1(tmp_path):
         yield maker
 
 
-def imported(maker, tmp_path, scan="/scan", angle="/joint", angle_unit="rad", hold=False):
+def imported(maker, tmp_path, scan="/scan", angle="/joint", angle_unit="rad", hold=False, also=()):
     maker.finish()
     out = tmp_path / "out.mcap"
-    summary = import_bag(maker.path, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold)
+    summary = import_bag(maker.path, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also)
     return summary, open_recording(out)
 
 
@@ -156,6 +157,27 @@ def test_degrees_that_jump_at_180_are_unwrapped(bag, tmp_path):
     bag.add("/scan", bag.scan(START), START)
     _, recording = imported(bag, tmp_path, angle="/deg:data", angle_unit="deg")
     np.testing.assert_allclose(np.degrees(recording.joint_log.position_rad), 100 * np.arange(10) + 0.5)
+
+
+def test_topics_that_shall_come_along_do(bag, tmp_path):
+    def odometry(k):
+        at = bag.make("geometry_msgs/msg/Point", x=float(k), y=2.0, z=3.0)
+        level = bag.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+        pose = bag.make("geometry_msgs/msg/Pose", position=at, orientation=level)
+        return bag.make("geometry_msgs/msg/PoseStamped", header=bag.header(START + k * SECOND), pose=pose)
+
+    for k in range(3):
+        bag.add("/scan", bag.scan(START + k * SECOND), START + k * SECOND)
+        bag.add("/pose", odometry(k), START + k * SECOND)
+        bag.add("/joint", bag.joint(START + k * SECOND, 0.1 * k), START + k * SECOND)
+        bag.add("/own", bag.make(SLICE, laserScan=bag.scan(START), stepAngle=1.0), START + k * SECOND)
+    recording = imported(bag, tmp_path, also=["/pose"])[1].path
+    poses = load_trajectory("/pose", recording)
+    assert poses.time_ns.tolist() == [START + k * SECOND for k in range(3)]
+    np.testing.assert_array_equal(poses.position_m, [[0, 2, 3], [1, 2, 3], [2, 2, 3]])
+    for also, says in (("/scan", "a topic of its own"), ("/odom", "no topic '/odom'"), ("/own", "no type that comes")):
+        with pytest.raises(RecordingError, match=says):
+            import_to(bag.path, tmp_path / "no.mcap", also=[also], scan="/scan", angle="/joint", angle_unit="rad")
 
 
 def add_float_angles(bag, count=5):

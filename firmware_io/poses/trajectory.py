@@ -53,11 +53,15 @@ class Trajectory:
         time_ns: shape (n,), n >= 2, strictly increasing.
         position_m: shape (n, 3).
         quaternion: x y z w, unit length, shape (n, 4).
+        platform: name of the frame that moves; "" where the poses do not tell.
+        measured: the poses alone, where a gyro put more orientations between them; None where these are they.
     """
 
     time_ns: Int64[ndarray, " n"]
     position_m: Float64[ndarray, "n 3"]
     quaternion: Float64[ndarray, "n 4"]
+    platform: str = ""
+    measured: Trajectory | None = None
 
     def __post_init__(self) -> None:
         count = self.time_ns.size
@@ -142,8 +146,10 @@ class Trajectory:
         return float(np.linalg.norm(miss_m, axis=1).max() / 4), float(miss.magnitude().max() / 4)
 
 
-def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]]) -> Trajectory:
+def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]], platform: str = "") -> Trajectory:
     """Poses as files and messages have them: x y z qx qy qz qw each, the quaternion printed with a few digits.
+
+    `platform` names the frame that moves.
 
     Raises:
         RecordingError: as for `Trajectory`.
@@ -157,6 +163,7 @@ def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]]) -> T
         np.array(time_ns, np.int64),
         np.ascontiguousarray(values[:, :3]),
         np.where(close, quaternion / np.where(close, norm, 1.0), quaternion),
+        platform,
     )
 
 

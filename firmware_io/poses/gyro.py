@@ -1,0 +1,166 @@
+"""Orientation between two poses, as a gyro says it.
+
+From each pose on the rates are integrated (the mean of two neighbouring samples turns from the one to the other). What
+that misses the next pose by is the gyro's bias, its noise and the error of the two poses; it is spread over the time
+between them, so that every pose keeps its orientation. Positions still go straight.
+
+Source: the strapdown integral of D. Titterton, J. Weston, Strapdown Inertial Navigation Technology (2nd ed.), ch. 11.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
+from scipy.spatial.transform import Rotation
+
+from design.arrays import Floats, Times
+from design.errors import RecordingError
+from firmware_io.poses.trajectory import Trajectory
+
+_LONG_GAP = 5.0  # this many usual gaps between two rates, and nobody knows what the platform did
+_NOISE_RAD = math.radians(0.2)  # what poses may be off without a word about the gyro
+_WORSE = 1.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gyro:
+    """Rates of turn over time.
+
+    Attributes:
+        time_ns: shape (n,), n >= 2, strictly increasing.
+        rate_rad_s: about the axes of the IMU, shape (n, 3).
+        frame: name of those axes; "" where it is not told.
+        left_out: samples that are no numbers, or of the time of another.
+
+    Raises:
+        RecordingError: fewer than two samples.
+    """
+
+    time_ns: Int64[ndarray, " n"]
+    rate_rad_s: Float64[ndarray, "n 3"]
+    frame: str = ""
+    left_out: int = 0
+
+    def __post_init__(self) -> None:
+        if self.time_ns.size < 2:
+            raise RecordingError(f"{self.time_ns.size} rates of turn: at least two are needed to integrate them")
+
+
+def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 3"]) -> tuple[Trajectory, list[str]]:
+    """Put the orientations that a gyro tells between the poses.
+
+    Args:
+        poses: of the platform.
+        gyro: of an IMU that stands still on it.
+        R_platform_imu: how it stands there.
+
+    Returns:
+        The same poses and what lies between them, and what a person should know of it. Between poses without gyro the
+        orientation goes about one axis as before.
+
+    Raises:
+        RecordingError: the gyro has no time in common with two neighbouring poses, is no denser than they are, or turns
+            otherwise than they do: other axes, another unit, another clock.
+    """
+    rate_rad_s = gyro.rate_rad_s @ R_platform_imu.T
+    told = _told(poses.time_ns, gyro.time_ns)
+    if not told.any():
+        raise RecordingError(
+            f"gyro {_span(gyro.time_ns)}, poses {_span(poses.time_ns)}: no two neighbouring poses with gyro between"
+        )
+    known = (gyro.time_ns >= poses.time_ns[0]) & (gyro.time_ns <= poses.time_ns[-1])
+    interval = np.searchsorted(poses.time_ns, gyro.time_ns, side="right") - 1
+    known &= told[interval.clip(0, told.size - 1)]
+    if np.sum(known) < 2 * np.sum(told):
+        raise RecordingError(f"gyro: {np.sum(known)} rates between {np.sum(told) + 1} poses: no denser than the poses")
+    time_ns = np.union1d(poses.time_ns, gyro.time_ns[known])
+    at = np.searchsorted(time_ns, poses.time_ns)
+    turned = _integrated(time_ns, _at(time_ns, gyro.time_ns, rate_rad_s))
+    pose = Rotation.from_quat(poses.quaternion)
+    between = turned[at[:-1]].inv() * turned[at[1:]]
+    step = pose[:-1].inv() * pose[1:]
+    miss = (between.inv() * step).as_rotvec()
+    said = _fits(between.as_rotvec()[told], step.as_rotvec()[told], np.diff(poses.time_ns)[told] / 1e9)
+    behind = (np.searchsorted(at, np.arange(time_ns.size), side="right") - 1).clip(0, told.size - 1)
+    part = (time_ns - poses.time_ns[behind]) / np.diff(poses.time_ns)[behind]
+    since = turned[at[behind]].inv() * turned
+    quaternion = (pose[behind] * since * Rotation.from_rotvec(part[:, None] * miss[behind])).as_quat()
+    quaternion[at] = poses.quaternion
+    after_s, known_s = (time_ns - time_ns[0]) / 1e9, (poses.time_ns - time_ns[0]) / 1e9
+    position_m = np.stack([np.interp(after_s, known_s, column) for column in poses.position_m.T], axis=1)
+    if not told.all():
+        said.append(
+            f"warning: {np.sum(~told)} of {told.size} ways from pose to pose have no gyro: one axis, as without"
+        )
+    if gyro.left_out:
+        said.append(f"left out {gyro.left_out} rates of the gyro: no numbers, or not later than the one before")
+    return Trajectory(time_ns, position_m, quaternion, poses.platform, measured=poses), said
+
+
+def _told(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
+    """Whether the gyro says all the way from each pose to the next one."""
+    gap_ns = np.diff(gyro_ns)
+    long = np.append(0, np.cumsum(gap_ns > _LONG_GAP * np.median(gap_ns)))
+    first = np.searchsorted(gyro_ns, pose_ns[:-1], side="right") - 1
+    last = np.searchsorted(gyro_ns, pose_ns[1:], side="left")
+    inside = (first >= 0) & (last < gyro_ns.size)
+    return inside & (long[first.clip(0)] == long[last.clip(max=gyro_ns.size - 1)])
+
+
+def _at(time_ns: Times, gyro_ns: Times, rate_rad_s: Floats) -> Floats:
+    """Rates at each time, straight between samples, shape (n, 3)."""
+    asked_s, known_s = (time_ns - time_ns[0]) / 1e9, (gyro_ns - time_ns[0]) / 1e9
+    return np.stack([np.interp(asked_s, known_s, column) for column in rate_rad_s.T], axis=1)
+
+
+def _integrated(time_ns: Times, rate_rad_s: Floats) -> Rotation:
+    """How far the platform has turned since the first time, one rotation for each."""
+    mean_rad_s = (rate_rad_s[1:] + rate_rad_s[:-1]) / 2
+    steps = Rotation.from_rotvec(mean_rad_s * (np.diff(time_ns) / 1e9)[:, None])
+    turned = Rotation.concatenate([Rotation.identity(), steps]).as_quat()
+    reach = 1
+    while reach < len(turned):  # products of 2, 4, 8 ... neighbours: all the running products in log2(n) passes
+        turned[reach:] = (Rotation.from_quat(turned[:-reach]) * Rotation.from_quat(turned[reach:])).as_quat()
+        reach *= 2
+    return Rotation.from_quat(turned)
+
+
+def _fits(gyro_rad: Floats, pose_rad: Floats, gap_s: Floats) -> list[str]:
+    """What the gyro misses the poses by, in words; all shape (k, 3) rotation vectors, `gap_s` apart."""
+    bias_rad_s = np.median((gyro_rad - pose_rad) / gap_s[:, None], axis=0)
+    left_rad = gyro_rad - bias_rad_s * gap_s[:, None] - pose_rad
+    missed_rad, turned_rad = _rms(left_rad), _rms(pose_rad)
+    if missed_rad > _WORSE * turned_rad + _NOISE_RAD:
+        raise RecordingError(
+            f"gyro: turns otherwise than the poses, from one to the next by {math.degrees(missed_rad):.2g} deg (rms), "
+            f"where the poses turn by {math.degrees(turned_rad):.2g}{_hint(gyro_rad, pose_rad)}"
+        )
+    return [
+        f"gyro: orientation between poses; bias {math.degrees(float(np.linalg.norm(bias_rad_s))):.2g} deg/s, beside it "
+        f"{math.degrees(missed_rad):.2g} deg (rms) off at the next pose, where the poses turn by "
+        f"{math.degrees(turned_rad):.2g}"
+    ]
+
+
+def _hint(gyro_rad: Floats, pose_rad: Floats) -> str:
+    """How the IMU would have to stand for its rates to be the poses', or in which unit they would have to be."""
+    faster = _rms(gyro_rad) / max(_rms(pose_rad), 1e-12)
+    if faster > 30:
+        return f"; its rates are {faster:.0f} times as fast: deg/s?"
+    R, _ = Rotation.align_vectors(pose_rad, gyro_rad)
+    if _rms(R.apply(gyro_rad) - pose_rad) < _rms(pose_rad) / 2:
+        roll, pitch, yaw = R.as_euler("xyz", degrees=True)
+        return f"; its axes fit turned by roll {roll:.0f}, pitch {pitch:.0f}, yaw {yaw:.0f} deg more"
+    return ": another platform, or another clock?"
+
+
+def _rms(vectors: Floats) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+
+
+def _span(time_ns: Times) -> str:
+    return f"{time_ns[0] / 1e9:.3f} to {time_ns[-1] / 1e9:.3f} s"

@@ -1,0 +1,130 @@
+"""The rates of a gyro, from a topic of the recording or from a CSV file, and how its IMU stands on the platform."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
+from scipy.spatial.transform import Rotation
+
+from design.errors import RecordingError, suggest
+from firmware_io.foreign import foreign
+from firmware_io.poses.gyro import Gyro
+from firmware_io.poses.tables import csv_rows
+from firmware_io.recording import ros_messages
+from firmware_io.recording.mcap_chunks import read_messages, read_topics
+
+IMU = "sensor_msgs/msg/Imu"
+STATIC = "/tf_static"
+_COLUMNS = {
+    f"w{axis}": {f"w{axis}", f"gyro_{axis}", f"w_rs_s_{axis}", f"angular_velocity_{axis}", f"omega_{axis}"}
+    for axis in "xyz"
+}
+
+
+def load_gyro(spec: str, recording: Path) -> Gyro:
+    """Read the rates that `spec` names.
+
+    Args:
+        spec: a `.csv` file with a header (time, wx wy wz [rad/s]), or a topic of `sensor_msgs/Imu` in the recording.
+        recording: where topics are.
+
+    Raises:
+        RecordingError: there is no such file or topic, or it holds no rates.
+    """
+    path = Path(spec)
+    if path.is_file():
+        return _sorted(spec, list(csv_rows(path, _COLUMNS)), "")
+    found = read_topics(recording)
+    if found.get(spec) != IMU:
+        known = {name for name, kind in found.items() if kind == IMU}
+        is_what = f"{found[spec]}, not {IMU}" if spec in found else f"neither a file nor a topic of {recording}"
+        raise RecordingError(f"imu {spec}: {is_what}{suggest(spec, known) if known else ', which has no Imu'}")
+    rows: list[tuple[int, tuple[float, ...]]] = []
+    frames: set[str] = set()
+    for _, data in read_messages(recording, {spec}):
+        message = foreign(f"{recording}: a message of {spec}", ros_messages.decode_message, data, IMU)
+        if message.angular_velocity_covariance[0] == -1:  # so a driver says that it does not measure it (REP 145)
+            raise RecordingError(f"{recording}: {spec}: this IMU measures no rate of turn")
+        rate = message.angular_velocity
+        rows.append((ros_messages.stamp_ns(message.header.stamp), (rate.x, rate.y, rate.z)))
+        frames.add(message.header.frame_id.lstrip("/"))
+    if len(frames) > 1:
+        raise RecordingError(f"{recording}: {spec} holds several IMUs: {', '.join(sorted(frames))}")
+    return _sorted(f"{recording}: {spec}", rows, next(iter(frames), ""))
+
+
+def imu_mount(
+    rpy_deg: tuple[float, float, float] | None, gyro: Gyro, platform: str, recording: Path
+) -> Float64[ndarray, "3 3"]:
+    """How an IMU stands on the platform: `R_platform_imu`.
+
+    Args:
+        rpy_deg: its roll, pitch and yaw, fixed axes of the platform; None to take it from the frames.
+        gyro: names the IMU's frame.
+        platform: the frame that the poses are of.
+        recording: whose /tf_static joins the two, where they are not the same.
+
+    Raises:
+        RecordingError: nothing tells how it stands.
+    """
+    if rpy_deg is not None:
+        if not all(map(math.isfinite, rpy_deg)):
+            raise RecordingError(f"imu-rpy-deg {rpy_deg}: three numbers")
+        return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
+    if gyro.frame and gyro.frame == platform:
+        return np.eye(3)
+    ask = "say how it stands there by --imu-rpy-deg"
+    if not gyro.frame or not platform:
+        who = "the IMU's frame" if platform else "the frame that the poses are of"
+        raise RecordingError(f"imu: {who} has no name, so nothing tells how the IMU stands on the platform: {ask}")
+    R = _way(_static(recording), platform, gyro.frame)
+    if R is None:
+        raise RecordingError(f"imu: no frames of {STATIC} join '{platform}' (the poses) and '{gyro.frame}': {ask}")
+    return R.as_matrix()
+
+
+def _sorted(what: str, rows: list[tuple[int, Any]], frame: str) -> Gyro:
+    time_ns = np.array([when for when, _ in rows], np.int64)
+    rate_rad_s = np.array([rate for _, rate in rows], float).reshape(-1, 3)
+    finite = np.isfinite(rate_rad_s).all(axis=1)
+    one_per_time, first = np.unique(time_ns[finite], return_index=True)
+    try:
+        return Gyro(one_per_time, rate_rad_s[finite][first], frame, time_ns.size - one_per_time.size)
+    except RecordingError as error:
+        raise RecordingError(f"{what}: {error}") from error
+
+
+def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
+    """Parent -> child -> `R_parent_child` of the frames that stand still, and the other way round."""
+    found: dict[str, dict[str, Rotation]] = {}
+    if read_topics(recording).get(STATIC) != ros_messages.TRANSFORMS:
+        return found
+    for _, data in read_messages(recording, {STATIC}):
+        what = f"{recording}: a message of {STATIC}"
+        message = foreign(what, ros_messages.decode_message, data, ros_messages.TRANSFORMS)
+        for one in message.transforms:
+            q = one.transform.rotation
+            parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
+            R = foreign(f"{recording}: {STATIC}: {child}", Rotation.from_quat, [q.x, q.y, q.z, q.w])
+            found.setdefault(parent, {})[child] = R
+            found.setdefault(child, {})[parent] = R.inv()
+    return found
+
+
+def _way(frames: dict[str, dict[str, Rotation]], begin: str, end: str) -> Rotation | None:
+    """`R_begin_end` along the frames between; None where none lead there."""
+    reached = {begin: Rotation.identity()}
+    waiting = deque([begin])
+    while waiting:
+        at = waiting.popleft()
+        for name, R in frames.get(at, {}).items():
+            if name not in reached:
+                reached[name] = reached[at] * R
+                waiting.append(name)
+    return reached.get(end)

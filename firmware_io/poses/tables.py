@@ -1,0 +1,86 @@
+"""Tables of other people's: a time in each line and numbers beside it, by the names of their columns."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+from design.errors import RecordingError
+from firmware_io.foreign import foreign
+
+Row = tuple[int, Sequence[float]]
+"""Time [ns], and the numbers beside it."""
+_UNITS = re.compile(r"\s*\[.*?\]\s*$")
+_EVER_NS = 2**63
+_TIME_DIGITS = 20  # a decimal may have a million more, and an int of it as many
+_SECONDS = {"t", "time", "time_s", "timestamp", "timestamp_s", "stamp"}
+_NANOSECONDS = {"time_ns", "timestamp_ns", "stamp_ns"}
+
+
+def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
+    """Times and numbers of a CSV file whose first line names its columns.
+
+    Args:
+        path: of the file. Its time is in seconds, or in nanoseconds where the column's name or unit says so.
+        columns: what each wanted column may be called, in the order of the numbers.
+
+    Raises:
+        RecordingError: the file cannot be read, lacks a column, or a line is no numbers.
+    """
+    lines = csv.reader(lines_of(path))
+    header = [word.strip().lstrip("#").strip().lower() for word in next(lines, [])]
+    names = [_UNITS.sub("", word) for word in header]
+    places = [_column(path, names, name, known) for name, known in columns.items()]
+    when = _column(path, names, "time", _SECONDS | _NANOSECONDS)
+    digits = 0 if names[when] in _NANOSECONDS or "[ns]" in header[when] else 9
+    for number, words in enumerate(lines, 2):
+        if words:
+            if len(words) < len(names):
+                raise RecordingError(f"{path}:{number}: {len(words)} values, the header names {len(names)}")
+            yield row_of(path, number, words[when], digits, [words[place] for place in places])
+
+
+def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -> Row:
+    """One line, its time [ns] to the last digit.
+
+    Args:
+        path: for errors.
+        number: of the line.
+        time: as it stands there.
+        digits: how many decimal places of the time are nanoseconds.
+        values: as they stand there.
+
+    Raises:
+        RecordingError: something is no number, or no time of nanoseconds below 2^63.
+    """
+    try:
+        # a float64 rounds the seconds of today to 256 ns
+        when = Decimal(time)
+        if not when.is_finite():
+            raise ValueError
+        if when.adjusted() > _TIME_DIGITS or abs(when.scaleb(digits)) >= _EVER_NS:
+            raise RecordingError(f"{path}:{number}: time {time[:40]}: a number of nanoseconds below 2^63")
+        return int(when.scaleb(digits).to_integral_value()), [float(value) for value in values]
+    except (InvalidOperation, ValueError, OverflowError) as error:
+        raise RecordingError(f"{path}:{number}: not a line of numbers: {time}, {', '.join(values)}") from error
+
+
+def lines_of(path: Path) -> list[str]:
+    """The lines of a text.
+
+    Raises:
+        RecordingError: the file cannot be read.
+    """
+    return foreign(f"{path}: cannot read", path.read_text, encoding="utf-8").splitlines()
+
+
+def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
+    found = [column for column, heading in enumerate(names) if heading in known]
+    if len(found) != 1:
+        raise RecordingError(
+            f"{path}: {len(found)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
+        )
+    return found[0]
