@@ -9,12 +9,13 @@ the axis; a runout of horn, flange, shaft and sleeve is one number, since it is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
 from cad.layout.direct.loads import ALUMINIUM, STEEL, ShaftMetal, supported
 from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import Weight
+from cad.layout.loads import Weight, rated_moment_nm
 from design.scanner import Scanner
 
 TRUED_MM = 0.05  # on the indicator over a turn: the flange is tapped within the play of its screws
@@ -25,6 +26,7 @@ CAGE_SET_MM = 0.02  # that the cage springs off the sleeve's middle when its scr
 WARMER_K = 20.0  # than when it was set
 PLASTIC_GROWS_PER_K = 70e-6  # PLA and PETG; the case is taken not to grow
 SHARE = 0.5  # of the horn's rating that the worst case may use
+SURELY = 0.9  # of that, as long as the rotor is not weighed
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +78,24 @@ def worst_moment_nm(scanner: Scanner, stack: DirectStack, weight: Weight) -> dic
         metal.name: sum(each.moment_nm for each in contributions(scanner, stack, weight, metal))
         for metal in (ALUMINIUM, STEEL)
     }
+
+
+def thickest_waist(scanner: Scanner, stack: DirectStack, weight: Weight, waists_mm: Sequence[float]) -> float:
+    """The first of these diameters whose worst moment the horn bears in every metal; the last one where none does.
+
+    Args:
+        scanner: with a horn that its maker rates.
+        stack: with a bearing.
+        weight: of the heaviest rotor; a lighter one may lean on the horn a little more, so `SURELY` is kept free.
+        waists_mm: in the order of preference.
+    """
+    cage, rated = cage_of(scanner, stack), rated_moment_nm(scanner)
+    if cage is None or rated is None:
+        return waists_mm[-1]
+    stiffness, off_m = stiffness_n_per_m(cage), sum(offsets_mm(cage).values()) / 1000
+    for waist_mm in waists_mm:
+        thick = replace(stack, waist_mm=waist_mm)
+        shared = [supported(weight, thick, stiffness, metal) for metal in (ALUMINIUM, STEEL)]
+        if max(one.horn_moment_nm + off_m * one.misaligned_nm_per_m for one in shared) <= SURELY * SHARE * rated:
+            return waist_mm
+    return waists_mm[-1]

@@ -6,11 +6,10 @@ import math
 from dataclasses import replace
 
 from cad.layout.direct.loads import bearing_for, heaviest
-from cad.layout.direct.misalignment import SHARE, worst_moment_nm
+from cad.layout.direct.misalignment import thickest_waist
 from cad.layout.direct.stack import DirectStack
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from cad.layout.hub import HUB_WALL
-from cad.layout.loads import rated_moment_nm
 from cad.layout.names import SERVO_SHAFT
 from cad.screws import SCREWS
 from design.catalogue.products import Servo
@@ -21,7 +20,6 @@ SHAFT_PLAIN = 12.0  # without a ring
 SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
 SHAFT_MIN = 8.0
 WAISTS_MM = tuple(tenths / 10 for tenths in range(70, 49, -1))  # the last one outlasts a stalled MX-64
-SURELY = 0.9  # of what the horn may bear: a lighter rotor may lean on it a little more than the heaviest one
 
 
 def direct_stack(scanner: Scanner) -> DirectStack:
@@ -53,19 +51,7 @@ def direct_stack(scanner: Scanner) -> DirectStack:
     if covered_screws(scanner.lidar, stack):
         axis = leaning_least(R)
         stack = replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
-    return replace(stack, waist_mm=_waist_mm(scanner, stack))
-
-
-def _waist_mm(scanner: Scanner, stack: DirectStack) -> float:
-    """The thickest waist that the horn bears with the heaviest linkage: it bends and twists least."""
-    rated = rated_moment_nm(scanner)
-    if stack.bearing is None or rated is None:
-        return WAISTS_MM[-1]
-    weight = heaviest(scanner, stack)
-    thick = (replace(stack, waist_mm=waist) for waist in WAISTS_MM)
-    most = SURELY * SHARE * rated
-    bears = (one.waist_mm for one in thick if max(worst_moment_nm(scanner, one, weight).values()) <= most)
-    return next(bears, WAISTS_MM[-1])
+    return replace(stack, waist_mm=thickest_waist(scanner, stack, heaviest(scanner, stack), WAISTS_MM))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

@@ -15,7 +15,7 @@ from cad.assembly.masses import link_bodies, rotor_weight
 from cad.checks.remarks import findings_of, left_out_of
 from cad.geometry.mesh import checked_mesh
 from cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, supported
+from cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, heaviest, supported
 from cad.layout.direct.misalignment import contributions, offsets_mm, worst_moment_nm
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.direct.stack import WAIST
@@ -263,6 +263,17 @@ def test_all_that_is_out_of_line_leaves_half_of_the_horns_rating(servo, angles):
     assert listed[0].off_mm is None and sum(each.moment_nm for each in listed) == pytest.approx(
         next(iter(worst.values()))
     )
+
+
+def test_the_waist_is_as_thick_as_the_horn_bears_with_the_heaviest_rotor():
+    """A thin one twists under what is out of balance, which changes over a turn."""
+    scanner = SCANNERS["ground_ahead"]
+    stack = direct_stack(scanner)
+    bears = 0.9 * scanner.servo.radial_load_n * 0.010 / 2
+    thicker = replace(stack, waist_mm=stack.waist_mm + 0.1)
+    worst = [max(worst_moment_nm(scanner, one, heaviest(scanner, stack)).values()) for one in (stack, thicker)]
+    assert worst[0] <= bears < worst[1]
+    assert stack.waist_mm > 5.0
 
 
 def test_a_stiff_waist_would_put_the_misalignment_on_the_horn():
