@@ -4,6 +4,9 @@ It takes the chain apart so that a beam costs no matrix: the joint turns about t
 platform, between two of its poses, about one axis that a constant rotation lays on z. What is left is a range times a
 direction (a table, constant in the rotation frame), a turn about z and a constant transform, and where the platform
 moves a second such pair. The arithmetic is float64 in vector registers, the ranges in and the points out are float32.
+
+What is compiled is kept on disk by file and line, with the places of the classes that it takes (`PosePieces`): whoever
+moves one of them must shift a line here, or an old cache asks for a module that is gone.
 """
 
 from __future__ import annotations
