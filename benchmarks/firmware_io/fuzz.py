@@ -1,9 +1,9 @@
 """Damaged replies through every codec: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED] [PROTOCOL...]`.
 
 STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each protocol (or of
-those that are named: SCIP, CoLa, LDROBOT, Slamtec, "servo 1.0", "servo 2.0", "servo STS"), each with a few flipped
-bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed errors, whatever is accepted
-must have right sums, told by loops of these files, and nothing may hang. Anything else ends the run.
+those that are named: SCIP, CoLa, LMS2xx, LDROBOT, Slamtec, "servo 1.0", "servo 2.0", "servo STS"), each with a few
+flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed errors, whatever is
+accepted must have right sums, told by loops of these files, and nothing may hang. Anything else ends the run.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from design.errors import DeviceError, suggest
 from firmware_io.installed import with_installed
 from firmware_io.lidar.ldrobot.driver import open_ldrobot
 from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
+from firmware_io.lidar.lms2xx.driver import open_lms2xx
 from firmware_io.lidar.scip.driver import open_scip
 from firmware_io.lidar.sick.driver import open_sick
 from firmware_io.lidar.slamtec.driver import open_slamtec
@@ -24,6 +25,7 @@ FAMILIES = (
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
     LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "firmware_io.twins.slamtec:slamtec_twin"),
     LidarFamily("sick", "SICK (CoLa A and B)", open_sick, "firmware_io.twins.sick.cola_twin:sick_twin"),
+    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, "firmware_io.twins.sick.lms_twin:lms_twin"),
 )
 
 

@@ -10,16 +10,19 @@ import numpy as np
 
 from design.errors import ProtocolError
 from firmware_io.lidar.ldrobot import protocol as ldrobot
+from firmware_io.lidar.lms2xx import protocol as lms
 from firmware_io.lidar.scip import parameters, protocol
 from firmware_io.lidar.sick import cola, scan_data
 from firmware_io.lidar.slamtec import protocol as slamtec
 from firmware_io.lidar.slamtec.point_count import PointCount
 from firmware_io.twins import ldrobot as ldrobot_twins
 from firmware_io.twins import slamtec as slamtec_twins
+from firmware_io.twins.sick import lms_twin as lms_twins
 
 _SCIP = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
 _COLA = [b"\x02", b"\x03", b"\x02" * 4, b"\x02sSN ", b"sFA", b" ", b"FFFFFFFF", b"\x00\x00", b"-1", b"\xff"]
 _LDROBOT = [b"\x54\x2c", b"\x54", b"\x2c\x54", b"\x00" * 8, b"\xff" * 4]
+_LMS = [b"\x02", b"\x02\x80", b"\x06", b"\x15", b"\xb0", b"\x02\x80\xff\xff", b"\xff"]
 _SLAMTEC = [b"\xa5\x5a", b"\xa5", b"\xa5\x5a\x54\x00\x00\x40\x82", b"\xa0\x50", b"\xff" * 5, b"\x02\x01"]
 
 
@@ -113,6 +116,30 @@ def ldrobot_survive(stream: bytes) -> tuple[int, int]:
     return accepted, splitter.bad
 
 
+def lms_dialogue(rng: random.Random) -> bytes:
+    """What an LMS 2xx says: that it heard, who it is, its variant, and scans in both units."""
+    said = b"\x06" + lms_twins.write_telegram(b"\xbaLMS200;30106;V02.30\x10")
+    said += b"\x06" + lms_twins.write_telegram(b"\xbb\x01\xb4\x00\x32\x00\x10")
+    for unit in (0x40, 0x00):
+        count = rng.randrange(1, 40)
+        said += lms_twins.write_telegram(bytes([0xB0, count, unit]) + rng.randbytes(2 * count) + b"\x10")
+    return said
+
+
+def lms_survive(stream: bytes) -> tuple[int, int]:
+    """As `scip_survive`, for an LMS 2xx."""
+    splitter, middle, accepted, refused = lms.LmsSplitter(), len(stream) // 2, 0, 0
+    for told in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
+        there = lms_twins.write_telegram(bytes([told.command]) + told.values, told.address)
+        assert there in stream, "accepted with a wrong sum"
+        for read in (lms.scan, lms.accepted_variant):
+            try:
+                accepted += isinstance(read(told), lms.LmsScan)
+            except ProtocolError:
+                refused += 1
+    return accepted, refused + splitter.bad
+
+
 def slamtec_dialogue(rng: random.Random) -> bytes:
     """What an RPLIDAR says: who it is, its health, one of its modes, and a stream in that."""
     kind = rng.choice((slamtec.NODES, slamtec.CAPSULES, slamtec.DENSE))
@@ -180,6 +207,7 @@ class Language:
 LANGUAGES = {
     "SCIP": Language(scip_dialogue, scip_survive, "scans", _SCIP),
     "CoLa": Language(cola_dialogue, cola_survive, "scans", _COLA),
+    "LMS2xx": Language(lms_dialogue, lms_survive, "scans", _LMS),
     "LDROBOT": Language(ldrobot_dialogue, ldrobot_survive, "packets", _LDROBOT),
     "Slamtec": Language(slamtec_dialogue, slamtec_survive, "points", _SLAMTEC),
 }

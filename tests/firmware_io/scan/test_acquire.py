@@ -260,6 +260,7 @@ def residuals_m(cloud, angles, scene):
 SWEEP = {"mode": "sweep", "limits_deg": [-45, 45], "period_s": 6.0}  # at 30.6 deg/s, 1.05 steps of 0.293 deg in 10 ms
 CHEAP = {"servo": "STS3215"}
 SICK = {"sensor": "LMS111"}
+INTERLACED = {"sensor": "LMS 200"}  # scans of 181 and of 180 beams in turn
 SWEEPING = {"sensor": "URG-04LX", "servo": "AX-12A", "motion": SWEEP}
 
 
@@ -276,6 +277,7 @@ CAPSULES = {"sensor": "RPLIDAR S1"}
         (ALL_AROUND, 2, 12_000),
         (CAPSULES, 2, 12_000),
         (SICK, 2, 40_000),
+        (INTERLACED, 1, 15_000),
     ],
 )
 def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):

@@ -10,6 +10,7 @@ from design.errors import DeviceError, DeviceFaultError
 from firmware_io.lidar import sensor_line
 from firmware_io.lidar.families import FAMILIES, family_of, open_lidar
 from firmware_io.lidar.ldrobot import driver as ldrobot
+from firmware_io.lidar.lms2xx import driver as lms2xx
 from firmware_io.lidar.scip import dialogue as scip_dialogue
 from firmware_io.lidar.scip import driver as scip
 from firmware_io.lidar.sick import dialogue as cola
@@ -17,7 +18,7 @@ from firmware_io.lidar.sick import driver as sick
 from firmware_io.lidar.slamtec import driver as slamtec
 from firmware_io.scan import acquire
 
-MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561")
+MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS 200")
 MOST_LOST_S = 1.0
 
 
@@ -50,7 +51,8 @@ class Scanner:
 @pytest.fixture(params=MODELS)
 def scanner(request, monkeypatch):
     line = VirtualLine(request.param, wall)
-    for module in (sensor_line, ldrobot, scip_dialogue, scip, cola, sick, slamtec, acquire):
+    line.machine.baud = 500_000  # of those that have a speed: no such line here
+    for module in (sensor_line, ldrobot, lms2xx, scip_dialogue, scip, cola, sick, slamtec, acquire):
         monkeypatch.setattr(module, "time", line)
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     monkeypatch.setattr(scip, "lidar_ports", list)

@@ -1,0 +1,290 @@
+"""A SICK LMS 200 or LMS 291 on its serial line: a field of 180 deg, interlaced from two turns of its mirror.
+
+A telegram holds whole and half degrees, which it measures in two turns, one after the other: each is handed out as a
+scan of its own. It has no clock that it tells: telegrams follow each other evenly, and counting them is the clock.
+Written from documents; no sensor has been at the other end yet.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
+from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from firmware_io.lidar.arrival_line import ArrivalLine
+from firmware_io.lidar.lidar import StampAt, TimedScan
+from firmware_io.lidar.lms2xx import protocol
+from firmware_io.lidar.sensor_line import SensorLine, until_back
+from firmware_io.samples import Scan
+
+FAMILY = "lms2xx"
+
+_ANSWER_S = 0.5
+_MODE_S = 3.0  # it stops its stream, or answers at its new speed, after some turns
+_SCAN_S = 1.0
+_TRIES = 2
+_FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
+_BAUDS = (9600, _FAST_BAUD, _USUAL_BAUD, 19_200)  # 9600 after power-up
+_TURN_S = 1 / 75  # of its mirror
+_RATE_MAX = 1e-2  # of its motor [assumed]
+_GRAIN_NS = 1e6
+
+
+class LmsLidar:
+    """An LMS 2xx; `LidarDriver` says what its methods promise.
+
+    Attributes:
+        address: where it was found.
+        serial_number: empty, as it tells none.
+        firmware: version, as the sensor writes it.
+    """
+
+    def __init__(self, address: str, model: str | None = None) -> None:
+        """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself.
+
+        Raises:
+            DeviceError: no such port, it is in use, another model answers, or none.
+        """
+        self.address = address
+        self.serial_number = self.firmware = ""
+        self._bad_before = self._bad_scans = 0
+        self._splitter = protocol.LmsSplitter()
+        self._skip = 0
+        self._scanning = False
+        self._received = self._first_ns = self._last_ns = 0
+        self._begin_anew()
+        self._line = SensorLine(address, 2 * protocol.LONGEST)
+        self._recognise(model)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._line.leave(self.stop, error)
+
+    @property
+    def model(self) -> str:
+        """Name of its type."""
+        return self._lidar.name
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Turns of its mirror per second."""
+        return self._lidar.scan_rate_hz * self._interlaced
+
+    @property
+    def dropped(self) -> int:
+        """Turns that are missing between those that were read, by the time that went by."""
+        if not self._received:
+            return 0
+        due = round((self._last_ns - self._first_ns) / self._period_ns) + 1
+        return max(due - self._received, 0) * self._interlaced
+
+    @property
+    def bad_packets(self) -> int:
+        """Telegrams that were thrown away."""
+        return self._bad_before + self._bad_scans + self._splitter.bad
+
+    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
+        """Scan until `stop`, as finely as the catalogue says, at the speed that the port can.
+
+        Raises:
+            DeviceError: intensity or clusters, which it has not; it refuses, or is gone.
+        """
+        if intensity or cluster != 1:
+            what = "intensity" if intensity else f"cluster = {cluster}"
+            raise DeviceError(f"{self._line.name}: {what}: a {self.model} tells ranges only, each beam's: leave it out")
+        step_centideg = round(36_000 / self._lidar.steps_per_turn)
+        told = self._ask(protocol.variant(180, step_centideg), protocol.VARIANT, _MODE_S)
+        if protocol.accepted_variant(told) != (180, step_centideg):
+            raise DeviceError(f"{self._line.name}: it refuses 180 deg in steps of {step_centideg / 100:g} deg")
+        self._speed_up()
+        self._mode(protocol.STREAM)
+        self._skip = skip
+        self._received = self._skipped = 0
+        self._begin_anew()
+        self._scanning = True
+
+    def read(self, timeout_s: float | None = None) -> TimedScan:
+        """The next turn of its mirror; it is waited for for a second if nothing else is said.
+
+        Raises:
+            DeviceTimeoutError: none came in time.
+            DeviceFaultError: it reports a fault.
+            DeviceError: it was unplugged, or was not started.
+        """
+        if not self._scanning:
+            raise DeviceError(f"{self._line.name}: not started")
+        deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
+        while not self._waiting:
+            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
+            for told in heard:
+                if told.command == protocol.SCAN:
+                    self._take(told, arrival_ns)
+        return self._waiting.popleft()
+
+    def stop(self) -> None:
+        """Stop its stream; its laser stays on as long as it has power.
+
+        Raises:
+            DeviceError: the sensor is gone.
+        """
+        self._scanning = False
+        self._mode(protocol.ON_REQUEST)
+
+    def reconnect(self, timeout_s: float = 3.0) -> None:
+        """Open it again where it was, after an unplug or a reset, and scan on if it did.
+
+        Raises:
+            DeviceError: it did not turn up in time.
+        """
+        scanning = self._scanning
+
+        def connect() -> None:
+            self._line.reopen()
+            self._recognise(self.model)
+            if scanning:
+                with self._line.closed_on_error():
+                    self.start(skip=self._skip)
+
+        try:
+            until_back(self._line.name, timeout_s, connect)
+        finally:
+            self._scanning = scanning
+
+    def _recognise(self, model: str | None) -> None:
+        """Stop its stream, at whatever speed, and hear who it is; the line is closed where no one answers."""
+        self._bad_before += self._splitter.bad
+        self._splitter = protocol.LmsSplitter()
+        with self._line.closed_on_error():
+            for baud in _BAUDS if self._line.serial is not None else (_FAST_BAUD,):
+                if self._line.serial is not None:
+                    self._line.serial.baud = baud
+                self._baud = baud
+                for _ in range(_TRIES):
+                    try:
+                        self._mode(protocol.ON_REQUEST, _ANSWER_S)
+                        told = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
+                    except DeviceTimeoutError:
+                        continue
+                    self._accept(told.values[:-1].decode("ascii", "replace"), model)
+                    self._splitter.bad = 0  # what was on its way when we came is nobody's fault
+                    return
+            raise DeviceTimeoutError(f"{self.address}: no SICK LMS 2xx answers; check power, cable and port")
+
+    def _accept(self, said: str, model: str | None) -> None:
+        lidars = [one for one in load_catalogue() if isinstance(one, Lidar) and one.family == FAMILY]
+        found = next((one for one in lidars if said.startswith(one.name.replace(" ", ""))), None)
+        if found is None or model not in (None, found.name):
+            wanted = model or "LMS that is known"
+            raise DeviceError(f"{self._line.name}: it calls itself '{said.strip()}': not a {wanted}")
+        self._lidar, self.firmware = found, said.rpartition(";")[2].strip()
+        self._interlaced = max(round(_TURN_S**-1 / found.scan_rate_hz), 1)
+        self._period_ns = 1e9 * self._interlaced * _TURN_S
+
+    def _speed_up(self) -> None:
+        """The fastest speed that both ends can: what is slower than its scans loses turns."""
+        port = self._line.serial
+        if port is None:
+            return
+        for baud in (_FAST_BAUD, _USUAL_BAUD):
+            if port.baud == baud:
+                return
+            if port.can(baud):
+                self._mode(protocol.BAUD_MODES[baud])
+                port.baud = self._baud = baud
+                return
+
+    def _mode(self, mode: int, timeout_s: float = _MODE_S) -> None:
+        told = self._ask(protocol.telegram(protocol.MODE, bytes([mode])), protocol.MODE, timeout_s)
+        if told.values[:1] != b"\0":
+            raise DeviceError(f"{self._line.name}: it refuses mode {mode:02X}")
+
+    def _ask(self, request: bytes, command: int, timeout_s: float = _ANSWER_S) -> protocol.LmsTelegram:
+        self._line.send(request)
+        deadline_s = time.monotonic() + timeout_s
+        while True:
+            heard, _ = self._line.hear(self._splitter.feed, deadline_s)
+            for told in heard:
+                if told.command == command | protocol.ANSWER:
+                    return told
+            if time.monotonic() > deadline_s:  # it streams on, and answers nothing
+                raise DeviceTimeoutError(f"{self._line.name}: no answer to {command:02X}")
+
+    def _begin_anew(self) -> None:
+        """What comes next does not continue what came."""
+        self._waiting: deque[TimedScan] = deque()
+        self._number = 0
+        self._arrivals: ArrivalLine | None = None
+
+    def _take(self, told: protocol.LmsTelegram, arrival_ns: int) -> None:
+        try:
+            taken = protocol.scan(told)
+        except ProtocolError:
+            self._bad_scans += 1
+            return
+        beams = self._lidar.last_step - self._lidar.first_step + 1
+        if taken.range_m.size != beams:
+            self._bad_scans += 1
+            return
+        if taken.status & 7 >= protocol.FATAL:
+            fault = f"it reports a fault (status {taken.status:02X})"
+            raise DeviceFaultError(f"{self._line.name}: {fault}: look at its lamps")
+        if not self._received:
+            self._first_ns = arrival_ns
+        elif arrival_ns - self._last_ns > 1.5 * self._period_ns:
+            self._begin_anew()  # telegrams are lost, or late: which of the two nobody can tell
+        self._last_ns = arrival_ns
+        self._received += 1
+        self._number += 1
+        if self._arrivals is None:
+            telegram_ns = round((2 * beams + 10) * 10 / self._baud * 1e9)
+            self._arrivals = ArrivalLine(smallest_delay_ns=telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
+        over_ns = self._number * self._period_ns  # when its last turn has passed the end of the field
+        self._arrivals.add(over_ns, arrival_ns)
+        for turn in range(self._interlaced):
+            self._skipped += 1
+            if self._skipped > self._skip:
+                self._skipped = 0
+                before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
+                self._waiting.append(self._turn(taken, turn, self._arrivals, over_ns - before_ns, arrival_ns))
+
+    def _turn(
+        self, taken: protocol.LmsScan, turn: int, line: ArrivalLine, begin_ns: float, arrival_ns: int
+    ) -> TimedScan:
+        """The beams of one turn, which begins at -90 deg at `begin_ns`."""
+        bearing_rad = self._lidar.bearings_rad()[turn :: self._interlaced]
+        first_ns = begin_ns + (bearing_rad[0] + np.pi / 2) / (2 * np.pi) * _TURN_S * 1e9
+        step_rad = float(bearing_rad[1] - bearing_rad[0])
+        scan = Scan(
+            stamp_ns=line.host_ns(first_ns),
+            angle_min_rad=float(bearing_rad[0]),
+            angle_increment_rad=step_rad,
+            time_increment_s=step_rad / (2 * np.pi) * _TURN_S,
+            scan_time_s=_TURN_S * (self._skip + 1),
+            range_min_m=self._lidar.range_min_mm / 1e3,
+            range_max_m=self._lidar.range_max_mm / 1e3,
+            range_m=taken.range_m[turn :: self._interlaced],
+            intensity=np.empty(0, np.float32),
+        )
+        warning = "its window is dirty: clean it" if taken.status & protocol.POLLUTED else ""
+        if not warning and self._baud < _FAST_BAUD:
+            warning = f"at {self._baud} baud most of its turns are lost: take an adapter that can {_FAST_BAUD}"
+        return TimedScan(scan, arrival_ns, line.uncertainty_ns, warning)
+
+
+def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:
+    """Open the lidar at a serial port or HOST:PORT.
+
+    Raises:
+        DeviceError: no such port, it is in use, or no LMS 2xx answers.
+    """
+    return LmsLidar(address, model)

@@ -1,0 +1,168 @@
+"""Telegrams of SICK's LMS 2xx, as pure functions of bytes; no port, no clock. Numbers are little-endian.
+
+    request   02  00  length  command values  crc          length: of command and values
+    answer    06  02  80  length  command + 80  values  status  crc
+
+Written from documents: SICK's telegram listing as users of it cite it, and the frames and checksum of the program
+sicktoolbox. Nobody has compared it with a sensor here.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32
+from numpy import ndarray
+
+from design.errors import ProtocolError
+
+MODE, STATUS_ASKED, TYPE, VARIANT = 0x20, 0x31, 0x3A, 0x3B
+ANSWER = 0x80
+SCAN = 0xB0
+STREAM, ON_REQUEST = 0x24, 0x25
+BAUD_MODES = {9600: 0x42, 19_200: 0x41, 38_400: 0x40, 500_000: 0x48}
+ACKNOWLEDGED, REFUSED = 0x06, 0x15
+
+POLLUTED = 0x80
+FATAL = 3  # severity in the three lowest bits: 0 well, 1 information, 2 warning, 3 error, 4 fatal error
+LONGEST = 812
+_STX = 0x02
+_OVERHEAD = 6  # start, address, length, sum
+_FIRST_CODE = 0x1FF7  # what is not less is no range: too far, dazzled, too weak
+
+
+@dataclass(frozen=True, slots=True)
+class LmsTelegram:
+    """One checked telegram.
+
+    Attributes:
+        address: 0 to a sensor, 80 from one that stands alone.
+        command: what is asked or answered.
+        values: what follows it; of an answer the last byte is the sensor's status.
+    """
+
+    address: int
+    command: int
+    values: bytes
+
+    @property
+    def status(self) -> int:
+        """Of the sensor that answers."""
+        return self.values[-1] if self.values else 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LmsScan:
+    """The ranges of one telegram.
+
+    Attributes:
+        range_m: NaN where nothing came back, shape (n,), in order of bearing.
+        status: of the sensor, see FATAL and POLLUTED.
+    """
+
+    range_m: Float32[ndarray, " n"]
+    status: int
+
+
+def crc16(data: bytes) -> int:
+    """The sum of a telegram, over all before it."""
+    crc = before = 0
+    for byte in data:
+        crc = (crc << 1 ^ (0x8005 if crc & 0x8000 else 0)) & 0xFFFF
+        crc ^= byte | before << 8
+        before = byte
+    return crc
+
+
+def telegram(command: int, values: bytes = b"", address: int = 0) -> bytes:
+    """The bytes on the line."""
+    body = struct.pack("<BBHB", _STX, address, 1 + len(values), command) + values
+    return body + struct.pack("<H", crc16(body))
+
+
+def variant(angle_deg: int, step_centideg: int) -> bytes:
+    """The request for a field of 100 or 180 deg in steps of 100, 50 or 25 hundredths of a degree."""
+    return telegram(VARIANT, struct.pack("<HH", angle_deg, step_centideg))
+
+
+def accepted_variant(told: LmsTelegram) -> tuple[int, int] | None:
+    """Field [deg] and step [0.01 deg] that it has now; None where it refuses.
+
+    Raises:
+        ProtocolError: it is no answer to VARIANT.
+    """
+    if told.command != VARIANT | ANSWER or len(told.values) != 6:
+        raise ProtocolError(f"LMS 2xx: {len(told.values)} bytes about its variant, not 6")
+    done, angle_deg, step_centideg, _ = struct.unpack("<BHHB", told.values)
+    return (angle_deg, step_centideg) if done == 1 else None
+
+
+def scan(told: LmsTelegram) -> LmsScan:
+    """The ranges of a telegram that is a whole scan.
+
+    Raises:
+        ProtocolError: it is none, a part of one, of an unknown unit, or cut.
+    """
+    if told.command != SCAN or len(told.values) < 3:
+        raise ProtocolError(f"LMS 2xx: telegram {told.command:02X}: no scan")
+    head = told.values[0] | told.values[1] << 8
+    count, partial, unit = head & 0x3FF, head >> 13 & 1, head >> 14
+    if partial or unit not in (0, 1):
+        raise ProtocolError(f"LMS 2xx: a scan of kind {head >> 10:06b}: not whole, or neither in cm nor in mm")
+    if len(told.values) != 2 + 2 * count + 1:
+        raise ProtocolError(f"LMS 2xx: {len(told.values) - 3} bytes for {count} ranges")
+    raw = np.frombuffer(told.values, "<u2", count, 2) & 0x1FFF
+    range_m = np.where((raw > 0) & (raw < _FIRST_CODE), raw * (1e-3 if unit else 1e-2), np.nan)
+    return LmsScan(range_m.astype(np.float32), told.status)
+
+
+class LmsSplitter:
+    """Cuts telegrams out of a stream, whatever is between them.
+
+    Attributes:
+        bad: runs of bytes that were nothing; what says only that a request came is none.
+    """
+
+    def __init__(self) -> None:
+        self.bad = 0
+        self._rest = b""
+        self._lost = False
+
+    def feed(self, data: bytes) -> list[LmsTelegram]:
+        """The telegrams that these bytes complete."""
+        self._rest += data
+        found: list[LmsTelegram] = []
+        at = 0
+        while at < len(self._rest):
+            size = _announced(self._rest[at : at + 4])
+            if size is not None and at + size > len(self._rest):
+                break
+            one = self._rest[at : at + (size or 0)]
+            if size and crc16(one[:-2]) == one[-2] | one[-1] << 8:
+                found.append(LmsTelegram(one[1], one[4], one[5:-2]))
+                self._lost = False
+                at += size
+                continue
+            if self._rest[at] not in (ACKNOWLEDGED, REFUSED):
+                self.bad += not self._lost
+                self._lost = True
+            at += 1
+        self._rest = self._rest[at:]
+        return found
+
+    @property
+    def rest(self) -> bytes:
+        """What is no whole telegram yet."""
+        return self._rest
+
+
+def _announced(head: bytes) -> int | None:
+    """Bytes of the telegram that begins so, as far as it is known; None where none does."""
+    if head[0] != _STX:
+        return None
+    if len(head) < 4:
+        return _OVERHEAD + 1
+    size = _OVERHEAD + (head[2] | head[3] << 8)
+    return size if head[1] in (0x00, 0x80) and _OVERHEAD < size <= LONGEST else None

@@ -1,0 +1,218 @@
+"""SICK LMS 2xx: bytes against published ones, the driver against the twin by a clock of their own."""
+
+import numpy as np
+import pytest
+from hypothesis import given, seed, settings
+from hypothesis import strategies as st
+from virtual_line import VirtualLine
+
+from design.catalogue.catalogue import load_catalogue
+from design.errors import DeviceError, DeviceFaultError, ProtocolError
+from firmware_io.lidar import byte_stream, sensor_line
+from firmware_io.lidar.families import open_lidar
+from firmware_io.lidar.lms2xx import driver, protocol
+from firmware_io.twins.sick.lms_twin import LmsTwin, lms_twin, write_telegram
+
+# As users of the telegram listing write them, with their sums.
+REQUESTS = [
+    (protocol.telegram(protocol.MODE, b"\x24"), "02 00 02 00 20 24 34 08"),
+    (protocol.telegram(protocol.MODE, b"\x25"), "02 00 02 00 20 25 35 08"),
+    (protocol.telegram(protocol.STATUS_ASKED), "02 00 01 00 31 15 12"),
+    (protocol.telegram(protocol.TYPE), "02 00 01 00 3A 1E 12"),
+    (protocol.telegram(protocol.MODE, b"\x42"), "02 00 02 00 20 42 52 08"),
+    (protocol.telegram(protocol.MODE, b"\x48"), "02 00 02 00 20 48 58 08"),
+]
+
+
+@pytest.mark.parametrize(("ours", "published"), REQUESTS)
+def test_requests_are_those_that_are_published(ours, published):
+    assert ours == bytes.fromhex(published)
+    assert write_telegram(ours[4:-2], address=0) == ours  # the twin's sum is another program
+
+
+def telegrams(ranges, kind=0x4000, status=0x10):
+    payload = b"\xb0" + (len(ranges) | kind).to_bytes(2, "little") + np.array(ranges, "<u2").tobytes()
+    return write_telegram(payload + bytes([status]))
+
+
+def test_ranges_are_in_the_unit_that_they_say_and_codes_are_none():
+    (told,) = protocol.LmsSplitter().feed(telegrams([1234, 0, 0x1FF7, 0x1FFE, 0x2000 | 500]))
+    np.testing.assert_array_equal(protocol.scan(told).range_m, np.float32([1.234, np.nan, np.nan, np.nan, 0.5]))
+    (told,) = protocol.LmsSplitter().feed(telegrams([1234], kind=0))
+    assert protocol.scan(told).range_m[0] == np.float32(12.34)
+    for kind in (0x2000, 0x8000, 0x4002):  # a part of a scan, an unknown unit, another count
+        (told,) = protocol.LmsSplitter().feed(telegrams([1234], kind=kind))
+        with pytest.raises(ProtocolError):
+            protocol.scan(told)
+
+
+@seed(19)
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_damaged_streams_give_telegrams_or_nothing(data):
+    whole = telegrams([1000 + k for k in range(20)])
+    stream = bytearray(b"\x06" + whole * 3)
+    for _ in range(data.draw(st.integers(0, 12))):
+        at = data.draw(st.integers(0, len(stream) - 1))
+        kind = data.draw(st.integers(0, 2))
+        if kind == 0:
+            stream[at] = data.draw(st.integers(0, 255))
+        elif kind == 1:
+            del stream[at : at + data.draw(st.integers(1, 60))]
+        else:
+            stream[at:at] = data.draw(st.binary(max_size=60))
+        stream = stream or bytearray(b"\x02")
+    splitter = protocol.LmsSplitter()
+    for told in splitter.feed(bytes(stream)):
+        try:
+            protocol.scan(told)
+        except ProtocolError:
+            continue
+    # whatever came before, an undamaged telegram is found behind as much as one may be long
+    assert splitter.feed(bytes(protocol.LONGEST) + whole)[-1].values[-1] == 0x10
+
+
+# The driver
+
+
+class Wall:
+    """A smooth wall with a gap, and when it was looked at in which direction."""
+
+    def __init__(self):
+        self.time_ns, self.bearing_rad = [], []
+
+    def __call__(self, time_ns, bearing_rad):
+        self.time_ns.append(time_ns)
+        self.bearing_rad.append(bearing_rad)
+        return np.where(np.abs(bearing_rad) > 1.4, np.inf, 2.0 + np.sin(bearing_rad)), np.zeros(time_ns.size)
+
+    def error_ns(self, scan):
+        """Of each beam's time: how far from the nearest look in that direction."""
+        time_ns, bearing_rad = np.concatenate(self.time_ns), np.concatenate(self.bearing_rad)
+        off = []
+        for told_ns, told_rad in list(zip(scan.time_ns, scan.bearing_rad, strict=True))[::20]:
+            looks_ns = time_ns[np.abs(bearing_rad - told_rad) < 1e-6]
+            off.append(np.abs(looks_ns - told_ns).min())
+        return np.array(off)
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """A lidar on its line, and what it looks at."""
+    with_lidar = []
+
+    def make(model="LMS 200", **state):
+        wall = Wall()
+        line = VirtualLine(model, wall)
+        for name, value in state.items():
+            setattr(line.machine, name, value)
+        for module in (sensor_line, driver):
+            monkeypatch.setattr(module, "time", line)
+        monkeypatch.setattr(sensor_line, "open_stream", line.open)
+        lidar = open_lidar("virtual", model)
+        with_lidar.append(lidar)
+        return lidar, line, wall
+
+    yield make
+    for lidar in with_lidar:
+        lidar.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("model", ["LMS 200", "LMS 291"])
+@pytest.mark.parametrize("millimetres", [True, False])
+def test_each_turn_of_the_mirror_is_a_scan_at_its_time(opened, model, millimetres):
+    lidar, line, wall = opened(model, millimetres=millimetres)
+    assert (lidar.model, lidar.firmware, lidar.serial_number, lidar.scan_rate_hz) == (model, "V02.30", "", 75.0)
+    line.machine.baud = 500_000
+    lidar.start()
+    scans = [lidar.read().scan for _ in range(60)]
+    assert [scan.range_m.size for scan in scans[:4]] == [181, 180, 181, 180]
+    bearing_rad = load_catalogue().products[model].bearings_rad()
+    for whole, half in zip(scans[::2], scans[1::2], strict=True):
+        np.testing.assert_allclose(whole.bearing_rad, bearing_rad[::2], atol=1e-9)
+        np.testing.assert_allclose(half.bearing_rad, bearing_rad[1::2], atol=1e-9)
+    for scan in scans:
+        seen = np.isfinite(scan.range_m)
+        assert np.array_equal(seen, np.abs(scan.bearing_rad) <= 1.4)
+        expected_m = 2.0 + np.sin(scan.bearing_rad[seen])
+        np.testing.assert_allclose(scan.range_m[seen], expected_m, atol=6e-4 if millimetres else 6e-3)
+    for scan in scans[10:]:
+        assert wall.error_ns(scan).max() < 300_000  # its motor turns a thousandth too fast
+    assert (lidar.bad_packets, lidar.dropped) == (0, 0)
+
+
+def test_lost_and_damaged_telegrams_are_counted_and_never_handed_out(opened):
+    lidar, line, wall = opened()
+    line.machine.baud = 500_000
+    lidar.start()
+    for _ in range(10):
+        lidar.read()
+    line.damage.extend([lambda told: told[:300] + bytes([told[300] ^ 4]) + told[301:], lambda told: told[:-40]])
+    scans = [lidar.read().scan for _ in range(20)]
+    for scan in scans:
+        seen = np.isfinite(scan.range_m)
+        np.testing.assert_allclose(scan.range_m[seen], 2.0 + np.sin(scan.bearing_rad[seen]), atol=6e-4)
+        assert wall.error_ns(scan).max() < 1_500_000
+    assert lidar.bad_packets >= 1 and lidar.dropped == 4
+
+
+def test_a_slow_line_loses_turns_and_says_so(opened):
+    lidar, _, wall = opened()
+    lidar._baud = 9600
+    lidar.start()
+    timed = [lidar.read() for _ in range(8)]
+    assert "at 9600 baud most of its turns are lost" in timed[-1].warning
+    assert lidar.dropped > 100
+    assert wall.error_ns(timed[-1].scan).max() < 10_000_000
+
+
+def test_a_fault_and_a_dirty_window_are_told(opened):
+    lidar, line, _ = opened()
+    line.machine.baud = 500_000
+    lidar.start()
+    line.machine.status = 0x90
+    assert [lidar.read().warning for _ in range(4)][-1] == "its window is dirty: clean it"
+    line.machine.status = 0x13
+    with pytest.raises(DeviceFaultError, match="fault"):
+        for _ in range(4):
+            lidar.read()
+
+
+def test_what_it_cannot_is_said(opened):
+    lidar, _, _ = opened()
+    for wish in ({"intensity": True}, {"cluster": 2}):
+        with pytest.raises(DeviceError, match="tells ranges only"):
+            lidar.start(**wish)
+    with pytest.raises(DeviceError, match="not started"):
+        lidar.read()
+    lidar.start(skip=1)
+    assert {lidar.read().scan.range_m.size for _ in range(4)} == {180}
+    with pytest.raises(DeviceError, match=r"calls itself 'LMS200;30106;V02\.30': not a LMS 291"):
+        open_lidar("virtual", "LMS 291")
+
+
+class SlowPort(byte_stream.SerialStream):
+    """A real line, whose sensor hears what is sent at its own speed only."""
+
+    machine = None
+
+    def can(self, baud):
+        return baud <= 115_200
+
+    def write(self, data):
+        if self.baud == self.machine.baud:
+            super().write(data)
+
+
+def test_the_speed_of_a_serial_line_is_found_and_raised_as_far_as_the_adapter_can(monkeypatch):
+    monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
+    with lms_twin(load_catalogue().products["LMS 200"], Wall()) as twin:
+        assert isinstance(twin, LmsTwin)
+        monkeypatch.setattr(SlowPort, "machine", twin.machine)
+        twin.machine.baud = 19_200
+        monkeypatch.setattr(driver, "_ANSWER_S", 0.3)
+        with open_lidar(twin.port, "LMS 200") as lidar:
+            lidar.start()
+            assert twin.machine.baud == 38_400
+            assert "38400 baud" in lidar.read(20.0).warning
+        assert twin.machine.scanning is None
