@@ -78,8 +78,9 @@ def view_recording(recording: Path, angles: Path, say: Say, *, port: int = PORT,
             channels.begin()
             scans, _ = replay(recording, channels, rate=rate)
             channels.close()
-            say(f"showed {scans:,} scans; again for the next one who listens, Ctrl-C to end")
+            say(f"showed {scans:,} scans; Ctrl-C to end")
             _until(lambda: not channels.heard)
+            say("nobody listens any more: all again for the next one who does")
 
 
 def _until(condition: Callable[[], bool]) -> None:
