@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 # cross-sections of IEC 60228, and what a single wire in a loose bundle is trusted with: from memory, cautious
 WIRES_A = ((0.25, 2.0), (0.5, 5.0), (0.75, 7.5), (1.0, 10.0), (1.5, 15.0), (2.5, 20.0))
 FUSES_A = (1.0, 2.0, 3.0, 4.0, 5.0, 7.5, 10.0, 15.0, 20.0)  # blades, ISO 8820-3
@@ -21,9 +23,10 @@ def fuse_for(peak_a: float) -> float:
     return _least(FUSES_A, OVER_PEAK * peak_a)
 
 
-def wire_for(fuse_a: float) -> float:
-    """Smallest cross-section [mm2] that a fuse protects."""
-    return next(mm2 for mm2, amps in WIRES_A if amps >= fuse_a)
+def wire_for(fuse_a: float, thick_enough: Callable[[float], bool] = lambda _: True) -> float:
+    """Smallest cross-section [mm2] that a fuse protects and that is thick enough, else the largest."""
+    protected = [mm2 for mm2, amps in WIRES_A if amps >= fuse_a]
+    return next(filter(thick_enough, protected), protected[-1])
 
 
 def wire_a(mm2: float) -> float:

@@ -65,11 +65,24 @@ class _Load:
     volts: float  # that it is fed with
     lasting_a: float
     peak_a: float
+    bounds_v: tuple[float, float] | None = None
+    behind_ring: bool = False
+
+    @property
+    def set_v(self) -> float:
+        """What its converter is set to: what is lost on the way comes off, so rather the middle of what it bears."""
+        if self.volts == SUPPLY_V or self.bounds_v is None:
+            return self.volts
+        return max(self.volts, round(sum(self.bounds_v) / 2, 1))
+
+    def lost_v(self, mm2: float) -> float:
+        """On its leads, and in the ring."""
+        return wire_drop_v(self.peak_a, mm2, LEADS_M) + (2 * self.peak_a * RING_OHM if self.behind_ring else 0.0)
 
     @property
     def from_supply(self) -> float:
         """Amperes at the supply for one of its own."""
-        return 1.0 if self.volts == SUPPLY_V else self.volts / SUPPLY_V / CONVERTER
+        return 1.0 if self.volts == SUPPLY_V else self.set_v / SUPPLY_V / CONVERTER
 
 
 def network_of(scanner: Scanner) -> Network:
@@ -81,7 +94,7 @@ def network_of(scanner: Scanner) -> Network:
     lidar, servo, ring = scanner.lidar, scanner.servo, scanner.slip_ring
     loads = [_servo_load(servo), _computer_load()]
     if lidar.link != "usb-powered":
-        loads.insert(0, _lidar_load(lidar))
+        loads.insert(0, _lidar_load(lidar, behind_ring=ring is not None))
     branches = [_branch(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
     return Network(
@@ -89,16 +102,17 @@ def network_of(scanner: Scanner) -> Network:
         wires=tuple(_wires(scanner, loads, branches, circuits)),
         circuits=circuits,
         branches=tuple(branches),
-        drops=tuple(_drops(scanner, loads, branches)),
+        drops=tuple(_drops(loads, branches)),
         supply_a=supply_for(sum(branch.peak_a for branch in branches)),
         risks=() if ring is None or lidar.link is None else (RISKS[lidar.link],),
         unknown=tuple(_unknown(scanner)),
     )
 
 
-def _lidar_load(lidar: Lidar) -> _Load:
+def _lidar_load(lidar: Lidar, *, behind_ring: bool) -> _Load:
     peak = lidar.peak_a or UNKNOWN_A
-    return _Load("lidar", lidar.name, fed_with(lidar.supply_v), lidar.current_a or peak, peak)
+    volts = fed_with(lidar.supply_v)
+    return _Load("lidar", lidar.name, volts, lidar.current_a or peak, peak, lidar.supply_v, behind_ring)
 
 
 def _servo_load(servo: Servo) -> _Load:
@@ -106,7 +120,7 @@ def _servo_load(servo: Servo) -> _Load:
     stall = servo.stall_a or UNKNOWN_A
     volts = fed_with(servo.supply_v)
     peak = stall * volts / servo.rated_v
-    return _Load("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak)
+    return _Load("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, servo.supply_v)
 
 
 def _computer_load() -> _Load:
@@ -124,7 +138,9 @@ def fed_with(supply_v: tuple[float, float] | None) -> float:
 def _branch(number: int, load: _Load) -> Branch:
     peak = load.peak_a * load.from_supply
     fuse = fuse_for(peak)
-    return Branch(f"F{number}", load.title, load.lasting_a * load.from_supply, peak, fuse, wire_for(fuse))
+    least_v = 0.0 if load.bounds_v is None else load.bounds_v[0]
+    mm2 = wire_for(fuse, lambda mm2: load.set_v - load.lost_v(mm2) >= least_v)
+    return Branch(f"F{number}", load.title, load.lasting_a * load.from_supply, peak, fuse, mm2)
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
@@ -177,7 +193,7 @@ def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
     for load in loads:
         if load.volts != SUPPLY_V:
             title = f"{CHANGER[load.volts]} for the {load.name}"
-            size = (f"at least {load.peak_a:.2g} A",)
+            size = (f"at least {load.peak_a:.2g} A, set to {load.set_v:g} V",)
             boxes.append(Box(f"{load.name} converter", title, size, ("in +", "in -"), ("out +", "out -"), 3))
     signals = SIGNALS[servo.bus or "ttl"]
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
@@ -258,18 +274,12 @@ def _wires(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
     return wires
 
 
-def _drops(scanner: Scanner, loads: list[_Load], branches: list[Branch]) -> list[Drop]:
-    found = []
-    ranges = {"lidar": scanner.lidar.supply_v, "servo": scanner.servo.supply_v}
-    for load, branch in zip(loads, branches, strict=True):
-        bounds = ranges.get(load.name)
-        if bounds is None:
-            continue
-        lost = wire_drop_v(load.peak_a, branch.mm2, LEADS_M)
-        if load.name == "lidar" and scanner.slip_ring is not None:
-            lost += 2 * load.peak_a * RING_OHM
-        found.append(Drop(load.title, load.volts - lost, *bounds))
-    return found
+def _drops(loads: list[_Load], branches: list[Branch]) -> list[Drop]:
+    return [
+        Drop(load.title, load.set_v - load.lost_v(branch.mm2), *load.bounds_v)
+        for load, branch in zip(loads, branches, strict=True)
+        if load.bounds_v is not None
+    ]
 
 
 def _unknown(scanner: Scanner) -> list[str]:

@@ -17,9 +17,9 @@ import numpy as np
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.arrival_line import ArrivalLine
 from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.lms2xx import protocol
+from firmware_io.lidar.lms2xx.telegram_count import TelegramCount
 from firmware_io.lidar.sensor_line import SensorLine, until_back
 from firmware_io.samples import Scan
 
@@ -32,8 +32,7 @@ _TRIES = 2
 _FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
 _BAUDS = (9600, _FAST_BAUD, _USUAL_BAUD, 19_200)  # 9600 after power-up
 _TURN_S = 1 / 75  # of its mirror
-_RATE_MAX = 1e-2  # of its motor [assumed]
-_GRAIN_NS = 1e6
+_PATIENCE = 8  # telegrams: a fifth of a second
 
 
 class LmsLidar:
@@ -57,8 +56,9 @@ class LmsLidar:
         self._splitter = protocol.LmsSplitter()
         self._skip = 0
         self._scanning = False
-        self._received = self._first_ns = self._last_ns = 0
-        self._begin_anew()
+        self._lost_before = self._skipped = 0
+        self._waiting: deque[TimedScan] = deque()
+        self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
         self._recognise(model)
 
@@ -83,10 +83,7 @@ class LmsLidar:
     @property
     def dropped(self) -> int:
         """Turns that are missing between those that were read, by the time that went by."""
-        if not self._received:
-            return 0
-        due = round((self._last_ns - self._first_ns) / self._period_ns) + 1
-        return max(due - self._received, 0) * self._interlaced
+        return self._lost_before + self._count.lost * self._interlaced if self._count else self._lost_before
 
     @property
     def bad_packets(self) -> int:
@@ -109,8 +106,13 @@ class LmsLidar:
         self._speed_up()
         self._mode(protocol.STREAM)
         self._skip = skip
-        self._received = self._skipped = 0
-        self._begin_anew()
+        self._skipped = 0
+        self._lost_before = self.dropped
+        self._waiting.clear()
+        beams = self._lidar.last_step - self._lidar.first_step + 1
+        telegram_ns = round((2 * beams + 10) * 10 / self._baud * 1e9)
+        patience = _PATIENCE if self._baud == _FAST_BAUD else 1  # on a slow line every one is behind lost ones
+        self._count = TelegramCount(self._interlaced * _TURN_S * 1e9, telegram_ns, patience)
         self._scanning = True
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
@@ -188,7 +190,6 @@ class LmsLidar:
             raise DeviceError(f"{self._line.name}: it calls itself '{said.strip()}': not a {wanted}")
         self._lidar, self.firmware = found, said.rpartition(";")[2].strip()
         self._interlaced = max(round(_TURN_S**-1 / found.scan_rate_hz), 1)
-        self._period_ns = 1e9 * self._interlaced * _TURN_S
 
     def _speed_up(self) -> None:
         """The fastest speed that both ends can: what is slower than its scans loses turns."""
@@ -219,12 +220,6 @@ class LmsLidar:
             if time.monotonic() > deadline_s:  # it streams on, and answers nothing
                 raise DeviceTimeoutError(f"{self._line.name}: no answer to {command:02X}")
 
-    def _begin_anew(self) -> None:
-        """What comes next does not continue what came."""
-        self._waiting: deque[TimedScan] = deque()
-        self._number = 0
-        self._arrivals: ArrivalLine | None = None
-
     def _take(self, told: protocol.LmsTelegram, arrival_ns: int) -> None:
         try:
             taken = protocol.scan(told)
@@ -238,34 +233,24 @@ class LmsLidar:
         if taken.status & 7 >= protocol.FATAL:
             fault = f"it reports a fault (status {taken.status:02X})"
             raise DeviceFaultError(f"{self._line.name}: {fault}: look at its lamps")
-        if not self._received:
-            self._first_ns = arrival_ns
-        elif arrival_ns - self._last_ns > 1.5 * self._period_ns:
-            self._begin_anew()  # telegrams are lost, or late: which of the two nobody can tell
-        self._last_ns = arrival_ns
-        self._received += 1
-        self._number += 1
-        if self._arrivals is None:
-            telegram_ns = round((2 * beams + 10) * 10 / self._baud * 1e9)
-            self._arrivals = ArrivalLine(smallest_delay_ns=telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
-        over_ns = self._number * self._period_ns  # when its last turn has passed the end of the field
-        self._arrivals.add(over_ns, arrival_ns)
-        for turn in range(self._interlaced):
-            self._skipped += 1
-            if self._skipped > self._skip:
-                self._skipped = 0
-                before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
-                self._waiting.append(self._turn(taken, turn, self._arrivals, over_ns - before_ns, arrival_ns))
+        assert self._count is not None
+        for held, over_ns, came_ns in self._count.add(taken, arrival_ns):
+            for turn in range(self._interlaced):
+                self._skipped += 1
+                if self._skipped > self._skip:
+                    self._skipped = 0
+                    before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
+                    self._waiting.append(self._turn(held, turn, self._count, over_ns - before_ns, came_ns))
 
     def _turn(
-        self, taken: protocol.LmsScan, turn: int, line: ArrivalLine, begin_ns: float, arrival_ns: int
+        self, taken: protocol.LmsScan, turn: int, count: TelegramCount, begin_ns: float, arrival_ns: int
     ) -> TimedScan:
         """The beams of one turn, which begins at -90 deg at `begin_ns`."""
         bearing_rad = self._lidar.bearings_rad()[turn :: self._interlaced]
         first_ns = begin_ns + (bearing_rad[0] + np.pi / 2) / (2 * np.pi) * _TURN_S * 1e9
         step_rad = float(bearing_rad[1] - bearing_rad[0])
         scan = Scan(
-            stamp_ns=line.host_ns(first_ns),
+            stamp_ns=count.arrivals.host_ns(first_ns),
             angle_min_rad=float(bearing_rad[0]),
             angle_increment_rad=step_rad,
             time_increment_s=step_rad / (2 * np.pi) * _TURN_S,
@@ -278,7 +263,7 @@ class LmsLidar:
         warning = "its window is dirty: clean it" if taken.status & protocol.POLLUTED else ""
         if not warning and self._baud < _FAST_BAUD:
             warning = f"at {self._baud} baud most of its turns are lost: take an adapter that can {_FAST_BAUD}"
-        return TimedScan(scan, arrival_ns, line.uncertainty_ns, warning)
+        return TimedScan(scan, arrival_ns, count.arrivals.uncertainty_ns, warning)
 
 
 def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:

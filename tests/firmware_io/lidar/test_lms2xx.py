@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import virtual_line
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from virtual_line import VirtualLine
@@ -156,6 +157,20 @@ def test_lost_and_damaged_telegrams_are_counted_and_never_handed_out(opened):
     assert lidar.bad_packets >= 1 and lidar.dropped == 4
 
 
+@pytest.mark.parametrize(("buffer_ns", "lost"), [(10**9, 0), (0, 8)], ids=["late", "lost"])
+def test_what_is_late_is_not_lost_and_both_keep_their_times(opened, monkeypatch, buffer_ns, lost):
+    lidar, line, wall = opened()
+    line.machine.baud = 500_000
+    monkeypatch.setattr(virtual_line, "_BUFFER_NS", buffer_ns)
+    lidar.start()
+    for _ in range(40):
+        assert wall.error_ns(lidar.read().scan).max() < 1_000_000
+    line.sleep(0.12)  # the computer does something else
+    for _ in range(40):
+        assert wall.error_ns(lidar.read().scan).max() < 1_000_000
+    assert lidar.dropped == lost
+
+
 def test_a_slow_line_loses_turns_and_says_so(opened):
     lidar, _, wall = opened()
     lidar._baud = 9600
@@ -179,7 +194,8 @@ def test_a_fault_and_a_dirty_window_are_told(opened):
 
 
 def test_what_it_cannot_is_said(opened):
-    lidar, _, _ = opened()
+    lidar, line, _ = opened()
+    line.machine.baud = 500_000
     for wish in ({"intensity": True}, {"cluster": 2}):
         with pytest.raises(DeviceError, match="tells ranges only"):
             lidar.start(**wish)

@@ -83,6 +83,7 @@ def test_damaged_packets_cost_their_turns_and_no_more(scanner):
 
 def test_after_a_brown_out_the_servo_stands_until_it_scans_again(scanner):
     scanner.line.machine.power_cycle(scanner.line.now_ns)
+    scanner.line.machine.baud = 500_000
     before_ns = scanner.line.now_ns
     for _ in range(5):
         scan = scanner.next()

@@ -1,0 +1,66 @@
+"""Telegrams that follow each other evenly: their count is the clock, and tells late ones from lost ones."""
+
+from __future__ import annotations
+
+import math
+
+from firmware_io.lidar.arrival_line import ArrivalLine
+from firmware_io.lidar.lms2xx.protocol import LmsScan
+
+_RATE_MAX = 1e-2  # of its motor [assumed]
+_GRAIN_NS = 1e6
+
+
+class TelegramCount:
+    """Which telegram each one is since the stream began.
+
+    Attributes:
+        arrivals: the sensor's time, told by the count, on the host's clock.
+        lost: telegrams that are missing between those that came.
+    """
+
+    def __init__(self, period_ns: float, telegram_ns: int, patience: int) -> None:
+        """Nothing came yet.
+
+        Args:
+            period_ns: from telegram to telegram.
+            telegram_ns: that one takes on the line.
+            patience: telegrams after which one that is late is believed to be behind lost ones.
+        """
+        self.lost = 0
+        self._period_ns, self._telegram_ns, self._patience = period_ns, telegram_ns, patience
+        self.arrivals = ArrivalLine(smallest_delay_ns=telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
+        self._held: list[tuple[LmsScan, int]] = []
+        self._number = 0
+
+    def add(self, scan: LmsScan, arrival_ns: int) -> list[tuple[LmsScan, float, int]]:
+        """The scans that are known by now, each with the sensor's time of its end [ns] and its arrival."""
+        self._held.append((scan, arrival_ns))
+        numbers = self._numbers()
+        if numbers[-1] > self._number + len(numbers) and len(numbers) < self._patience:
+            return []
+        known = []
+        for number, (held, came_ns) in zip(numbers, self._held, strict=True):
+            self.lost += number - self._number - 1
+            self._number = number
+            self.arrivals.add(number * self._period_ns, came_ns)
+            known.append((held, number * self._period_ns, came_ns))
+        self._held = []
+        return known
+
+    def _numbers(self) -> list[int]:
+        """Of the telegrams that are held: each is one more than that before, more where some were lost between.
+
+        Which number fits an arrival says the line; but one that comes late, with others close behind it, looks as if
+        some had been lost before it. As none comes early, the least that any of those behind it allows is right.
+        """
+        least = [self._number + 1 + k for k in range(len(self._held))]
+        if not self._number:
+            return least
+        numbers: list[int] = []
+        above = math.inf
+        for at_least, (_, came_ns) in zip(reversed(least), reversed(self._held), strict=True):
+            late_ns = came_ns - self._telegram_ns - self.arrivals.host_ns(at_least * self._period_ns)
+            above = min(above - 1, at_least + max(round(late_ns / self._period_ns), 0))
+            numbers.append(int(above))
+        return numbers[::-1]
