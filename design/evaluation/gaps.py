@@ -142,10 +142,19 @@ def _families(
     ratio = np.cos(polar_rad) / slope
     met = np.abs(ratio) <= 1
     sigma = np.arccos(np.clip(ratio, -1, 1))
-    step = np.diff(bearings_rad).max() / 2
-    low, high = bearings_rad.min() - step, bearings_rad.max() + step
     both = np.stack([nearest + sigma, nearest - sigma])
-    return met & ((both - low) % (2 * np.pi) <= high - low), both
+    return met & _in_fan(bearings_rad, both), both
+
+
+def _in_fan(bearings_rad: Float[ndarray, " beams"], asked_rad: Float[ndarray, "2 n"]) -> Bool[ndarray, "2 n"]:
+    """Whether a beam is no farther than half of the usual step: a fan may have a hole, where the housing stands."""
+    turn = 2 * np.pi
+    beams_rad = np.sort(bearings_rad % turn)
+    around_rad = np.concatenate([beams_rad[-1:] - turn, beams_rad, beams_rad[:1] + turn])
+    asked_rad = asked_rad % turn
+    behind = np.searchsorted(around_rad, asked_rad, "right")
+    nearest_rad = np.minimum(asked_rad - around_rad[behind - 1], around_rad[behind] - asked_rad)
+    return nearest_rad <= np.median(np.diff(np.sort(bearings_rad))) / 2 * (1 + 1e-9)
 
 
 def _between_families(

@@ -46,6 +46,19 @@ def test_half_a_turn_against_a_simulated_one(uniform, angles_deg):
     assert gaps(uniform, angles).half_turn_misses == pytest.approx(missed.mean(), abs=0.012)
 
 
+@pytest.mark.parametrize("angles_deg", SETTINGS[:4])
+def test_the_hole_of_a_fan_is_not_taken_for_seen(uniform, angles_deg):
+    bearings = uniform.bearings_rad[np.abs(uniform.bearings_rad - 0.3) > np.radians(25)]
+    holed = replace(uniform, bearings_rad=bearings)
+    angles = np.radians(angles_deg)
+    directions = spiral(6000)
+    lines = ScanLines(1440, 2 * np.pi / 1440)
+    radius = np.radians(0.3)
+    full = seen(bearings, lines, angles, directions, radius)
+    missed = full & ~seen(bearings, ScanLines(720, lines.step_rad), angles, directions, radius)
+    assert gaps(holed, angles).half_turn_misses == pytest.approx(missed.mean(), abs=0.012)
+
+
 @pytest.mark.parametrize("angles_deg", SETTINGS[:5])
 def test_seen_twice_against_lines_that_come_by(uniform, angles_deg):
     """A direction is seen twice where its small ball is entered in two separate parts of the turn."""
