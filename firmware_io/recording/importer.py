@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -306,21 +307,39 @@ def _write(
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     written = 0
     scan_times = iter(clock.scan_ns.tolist())
-    for message in bag.messages({source.topic, *also}):
-        if message.topic in also:
-            writer.other(message.topic, bag.topics[message.topic], message.receive_ns, message.body)
-        if message.topic != source.topic:
-            continue
-        laser_scan, _ = laser_scan_at(message.body, source, bag.path)
-        if _fault(laser_scan):
-            continue
+
+    def write_scan(laser_scan: Any, beams: ros_messages.Beams | None) -> None:
+        nonlocal written
         scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
         if _endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
+        if beams is not None:
+            scan = replace(scan, beam_bearing_rad=beams[0], beam_offset_ns=beams[1])
         while written < len(samples) and samples[written][0] <= scan.stamp_ns:
             writer.joint(*samples[written])
             written += 1
         writer.scan(scan)
+
+    beams_topic = f"{source.topic}{BEAMS_TOPIC.removeprefix(SCAN_TOPIC)}"
+    own = {beams_topic} if bag.topics.get(beams_topic) == ros_messages.POINT_CLOUD else set[str]()
+    beams: dict[int, ros_messages.Beams] = {}  # by the stamp of their scan
+    waiting: list[tuple[Any, int]] = []  # scans whose beams may come next: at one time bags have no order
+    for message in bag.messages({source.topic, *own, *also}):
+        if message.topic in also:
+            writer.other(message.topic, bag.topics[message.topic], message.receive_ns, message.body)
+        if message.topic in own:
+            with suppress(ValueError):  # somebody else's cloud
+                stamp_ns, beams_of_one = ros_messages.beams_in(message.body)
+                beams[stamp_ns] = beams_of_one
+        elif message.topic == source.topic:
+            laser_scan, stamp_ns = laser_scan_at(message.body, source, bag.path)
+            if not _fault(laser_scan):
+                waiting.append((laser_scan, stamp_ns))
+        while waiting and (not own or len(waiting) > 1 or waiting[0][1] in beams):
+            laser_scan, stamp_ns = waiting.pop(0)
+            write_scan(laser_scan, beams.pop(stamp_ns, None))
+    for laser_scan, stamp_ns in waiting:
+        write_scan(laser_scan, beams.pop(stamp_ns, None))
     for time_ns, position_rad in samples[written:]:
         writer.joint(time_ns, position_rad)
 

@@ -153,7 +153,11 @@ def decode_beams(data: bytes) -> tuple[int, Beams]:
     Raises:
         ValueError: its rows are of something else.
     """
-    message = decode_message(data, POINT_CLOUD)
+    return beams_in(decode_message(data, POINT_CLOUD))
+
+
+def beams_in(message: Any) -> tuple[int, Beams]:
+    """The same of a message that is decoded already; raises as `decode_beams`."""
     if [(field.name, field.offset, field.datatype) for field in message.fields] != _BEAM_FIELDS:
         raise ValueError("rows that are no beams")
     rows = np.frombuffer(message.data.tobytes(), _BEAM)

@@ -9,7 +9,8 @@ import pytest
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
+from firmware_io.recording.recording import RecordingWriter, open_recording
+from firmware_io.samples import Scan
 
 SETUP = Setup(beams=30, sweeps=((180.0, 90.0),))
 
@@ -34,6 +35,36 @@ def test_a_recording_comes_back_from_its_bag(made, tmp_path, command, name):
     for one, other in zip(before.scans(), after.scans(), strict=True):
         np.testing.assert_array_equal(one.time_ns, other.time_ns)
         np.testing.assert_array_equal(one.range_m, other.range_m)
+        np.testing.assert_array_equal(one.bearing_rad, other.bearing_rad)
+
+
+@pytest.mark.parametrize("name", ["room.bag", "room", "room.mcap"])
+def test_turns_of_beams_of_their_own_come_back_with_them(tmp_path, command, name):
+    rng, second = np.random.default_rng(7), 10**9
+    scans = [
+        Scan(
+            stamp_ns=10 * second + k * second // 10, angle_min_rad=0.0, angle_increment_rad=-1.2,
+            time_increment_s=0.016, scan_time_s=0.1, range_min_m=0.1, range_max_m=12.0,
+            range_m=rng.uniform(1, 5, 5 + k).astype(np.float32), intensity=np.empty(0, np.float32),
+            beam_bearing_rad=-np.cumsum(rng.uniform(0.5, 1.5, 5 + k)),
+            beam_offset_ns=np.cumsum(rng.integers(1, 10**7, 5 + k)),
+        )
+        for k in range(4)
+    ]  # fmt: skip
+    source = tmp_path / "turns.mcap"
+    with RecordingWriter(source, {"source": "test", "hold": "false"}) as writer:
+        for scan in scans:
+            writer.joint(scan.stamp_ns, scan.stamp_ns / second)
+            writer.scan(scan)
+        writer.joint(11 * second, 11.0)
+    if name == "room.mcap":
+        source.rename(tmp_path / name)
+    else:
+        assert command("convert", source, tmp_path / name)[0] == 0
+    back = tmp_path / "back.mcap"
+    import_bag(tmp_path / name, back, scan="/scan", angle="/joint_states", angle_unit="rad", hold=False)
+    for one, other in zip(scans, open_recording(back).scans(), strict=True):
+        np.testing.assert_array_equal(one.time_ns, other.time_ns)
         np.testing.assert_array_equal(one.bearing_rad, other.bearing_rad)
 
 
