@@ -1,6 +1,6 @@
 """Control tables of the Dynamixel.
 
-Sources are ROBOTIS' e-manual pages ax/ax-12a, mx/mx-28, mx/mx-64, their second editions for protocol 2.0, mx/mx-106-2,
+Sources are ROBOTIS' e-manual pages ax/ax-12a, mx/mx-28, mx/mx-64, mx/mx-106, their second editions for protocol 2.0,
 x/xl330-m288, x/xl430-w250, x/xh430-w350, x/xm430-w350 and x/xm540-w270; numbers of models and currents agree with the
 parameters of ROBOTIS' hardware interface for ROS 2. Load is the current as a share of the stall current at 12 V (XL330:
 5 V); the XL430 and MX-28 measure none and tell their duty.
@@ -36,6 +36,7 @@ _FAULTS_2 = {0: "voltage", 2: "overheating", 3: "motor encoder", 4: "electrical 
 
 def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rpm: float) -> ControlTable:
     ax = model == "AX-12A"
+    drive_mode = ((Register(10, 1, name="drive_mode"), 0),) if model == "MX-106" else ()  # it can follow another one
     clockwise = Register(6, 2, name="cw_angle_limit")
     counterclockwise = Register(8, 2, name="ccw_angle_limit")
     step_rad = math.radians(step_deg)
@@ -55,6 +56,7 @@ def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rp
         neutral=()
         if ax
         else (
+            *drive_mode,
             (Register(20, 2, sign="twos", name="multi_turn_offset"), 0),
             (Register(22, 1, name="resolution_divider"), 1),
         ),
@@ -125,6 +127,7 @@ TABLES = (
     _protocol_1("AX-12A", 12, step_deg=300 / 1024, last=1023, speed_rpm=0.111),
     _protocol_1("MX-28", 29, step_deg=360 / 4096, last=4095, speed_rpm=0.114),
     _protocol_1("MX-64R", 310, step_deg=360 / 4096, last=4095, speed_rpm=0.114),
+    _protocol_1("MX-106", 320, step_deg=360 / 4096, last=4095, speed_rpm=0.114),
     _protocol_2("MX-28", 30, load=_LOAD),
     _protocol_2("MX-64R", 311, load=_current(3.36, 4.1)),
     _protocol_2("MX-106", 321, load=_current(3.36, 5.2)),

@@ -69,10 +69,12 @@ _AX = [
     *_protocol_1(12, baud=1, last=1023, hot=70, volts=(60, 140), firmware=24),
     *(rw(26, 1, 1), rw(27, 1, 1), rw(28, 1, 32, 254), rw(29, 1, 32, 254), rw(48, 2, 32, 1023)),
 ]
+_CURRENT = (rw(68, 2, 2048, 4095), rw(70, 1, 0, 1), rw(71, 2, 0, 2047))
 ITEMS: dict[int, list[TableItem]] = {  # by model number
     12: _AX,
     29: _mx(29, 36),
-    310: [*_mx(310, 36), rw(68, 2, 2048, 4095), rw(70, 1, 0, 1), rw(71, 2, 0, 2047)],
+    310: [*_mx(310, 36), *_CURRENT],
+    320: [*_mx(320, 36), *_CURRENT, rw(10, 1, 0, 3)],
     30: _protocol_2(30, speed=380, acceleration=True, firmware=42),
     311: _protocol_2(311, speed=435, current=1941, acceleration=True, firmware=42),
     321: _protocol_2(321, speed=360, current=2047, acceleration=True, firmware=42),

@@ -29,7 +29,7 @@ from firmware_io.twins.servo.machine import answers
 from firmware_io.twins.servo.models import machine_of
 from firmware_io.twins.servo.twin import ServoTwin
 
-MODELS = [("MX-64R", "1.0"), ("MX-28", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
+MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
 MODELS += [("STS3215", "STS")]
 FAMILIES = [("MX-64R", "1.0"), ("MX-64R", "2.0"), ("STS3215", "STS")]
 MODELS_2 = [table.model for table in TABLES if table.protocol == "2.0"]
