@@ -8,7 +8,7 @@ from firmware_io.lidar.arrival_line import ArrivalLine
 from firmware_io.lidar.lms2xx.protocol import LmsScan
 
 _RATE_MAX = 1e-2  # of its motor [assumed]
-_GRAIN_NS = 1e6
+_GRAIN_NS = 3e5  # that its telegrams wander [assumed]
 
 
 class TelegramCount:

@@ -12,6 +12,7 @@ from design.errors import DeviceError, DeviceFaultError, ProtocolError
 from firmware_io.lidar import byte_stream, sensor_line
 from firmware_io.lidar.families import open_lidar
 from firmware_io.lidar.lms2xx import driver, protocol
+from firmware_io.scan.acquire import CLOCK_GOOD_NS
 from firmware_io.twins.sick.lms_twin import LmsTwin, lms_twin, write_telegram
 
 # As users of the telegram listing write them, with their sums.
@@ -140,6 +141,7 @@ def test_each_turn_of_the_mirror_is_a_scan_at_its_time(opened, model, millimetre
     for scan in scans[10:]:
         assert wall.error_ns(scan).max() < 300_000  # its motor turns a thousandth too fast
     assert (lidar.bad_packets, lidar.dropped) == (0, 0)
+    assert lidar.read().uncertainty_ns < CLOCK_GOOD_NS  # which a scan waits for
 
 
 def test_lost_and_damaged_telegrams_are_counted_and_never_handed_out(opened):
