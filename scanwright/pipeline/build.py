@@ -15,6 +15,7 @@ from design.concurrency.second_process import second_process
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
+from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
     from cad.findings import PartFinding
@@ -189,6 +190,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         records.write_task(work, asked)
         records.write_search(work, result)
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *exported.left_out])
+        write_package(work)
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
         records.write_report(work)
