@@ -9,19 +9,13 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TransformStamped
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2, PointField
 
 from design.arrays import Pose
-from firmware_io.assembly.streaming import ScanPoints
 from firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
-from firmware_io.ros.point_rows import POINT, point_rows
 from firmware_io.samples import Scan
-
-_FIELDS = [
-    PointField(name=name, offset=place[1], datatype=POINT_FIELD_TYPES[place[0].str], count=1)
-    for name, place in (POINT.fields or {}).items()
-]
 
 
 def time_of(time_ns: int) -> Any:
@@ -52,12 +46,16 @@ def joint_state(position_rad: float, stamp_ns: int) -> Any:
     return message
 
 
-def point_cloud(line: ScanPoints, frame: str, stamp_ns: int) -> Any:
-    """`sensor_msgs/PointCloud2` of one scan, a row for every beam."""
-    rows = point_rows(line)
-    message = PointCloud2(height=1, width=rows.size, fields=_FIELDS, is_bigendian=False, is_dense=False)
+def point_cloud(rows: NDArray[np.void], frame: str, stamp_ns: int) -> Any:
+    """`sensor_msgs/PointCloud2` of structured rows, shape (height, width)."""
+    height, width = rows.shape
+    fields = [
+        PointField(name=name, offset=place[1], datatype=POINT_FIELD_TYPES[place[0].str], count=1)
+        for name, place in (rows.dtype.fields or {}).items()
+    ]
+    message = PointCloud2(height=height, width=width, fields=fields, is_bigendian=False, is_dense=False)
     message.header.stamp, message.header.frame_id = time_of(stamp_ns), frame
-    message.point_step, message.row_step = POINT.itemsize, POINT.itemsize * rows.size
+    message.point_step, message.row_step = rows.itemsize, rows.itemsize * width
     message.data = array("B", rows.tobytes())
     return message
 

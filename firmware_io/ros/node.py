@@ -2,7 +2,8 @@
 
     scan               sensor_msgs/LaserScan      in `laser`; the stamp is the time of the first beam
     joint_states       sensor_msgs/JointState     `spin_joint`, as the encoder said it
-    points             sensor_msgs/PointCloud2    one message a scan, in `world`, de-skewed; a row for every beam
+    points             sensor_msgs/PointCloud2    one message a scan, in `world` or `rot`, or a turn, in `world`; de-skewed,
+                                                  a row for every beam
     robot_description  std_msgs/String            the URDF with the frames in use, if the build has one; kept
     tf, tf_static      tf2_msgs/TFMessage         world servo rot laser, where ROS 2 has tf2_msgs
     diagnostics        diagnostic_msgs/DiagnosticArray    once a second, where ROS 2 has diagnostic_msgs
@@ -20,10 +21,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from threading import Event, Thread
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import rclpy
+from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -40,9 +42,12 @@ from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.streaming import Assembler, ScanPoints
 from firmware_io.ros import messages
 from firmware_io.ros.drive import Interrupted
+from firmware_io.ros.point_rows import in_rot, point_rows, turn_rows
 from firmware_io.ros.robot_frames import fixed_frames
+from firmware_io.ros.turns import Turns
 from firmware_io.samples import JointSample, Scan
 
+PointsFrame = Literal["world", "rot"]
 _DIAGNOSED_S = 1.0
 _SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
 _FOUND_S = 1.0  # without a further subscription
@@ -59,6 +64,8 @@ class PublishedScanner:
         urdf: its description with the frames of `angles`; None for none.
         smooth: smooth the steps of the encoder in `points`.
         publish_tf: whether nobody else does.
+        per_turn: one message of points a turn, not a scan.
+        points_frame: frame of the points; `rot` of single scans only.
     """
 
     angles: AngleSet
@@ -66,6 +73,8 @@ class PublishedScanner:
     urdf: str | None
     smooth: bool = True
     publish_tf: bool = True
+    per_turn: bool = False
+    points_frame: PointsFrame = "world"
 
 
 class ScannerNode:
@@ -105,6 +114,7 @@ class ScannerNode:
     def begin(self) -> None:
         """A new run of the devices: nothing of an earlier one is assembled with it."""
         self._assembler = Assembler(self._scanner.angles, own_body=self._scanner.own_body, smooth=self._scanner.smooth)
+        self._turns = Turns()
         self._changed.clear()
 
     def joint(self, time_ns: int, position_rad: float) -> None:
@@ -141,7 +151,8 @@ class ScannerNode:
     def close(self) -> None:
         """Publish the scans that still wait for their angles."""
         for line in self._assembler.finish():
-            self._publish_points(line)
+            self._place(line)
+        self._publish_turns(self._turns.finish())
 
     def await_subscriber(self) -> None:
         """Wait until somebody listens, and has found all the topics: what is published before is lost to them."""
@@ -183,11 +194,24 @@ class ScannerNode:
 
     def _push(self, thing: Scan | JointSample) -> None:
         for line in self._assembler.push(thing):
-            self._publish_points(line)
+            self._place(line)
 
-    def _publish_points(self, line: ScanPoints) -> None:
+    def _place(self, line: ScanPoints) -> None:
         self._beams += line.scan.range_m.size
-        self._points.publish(messages.point_cloud(line, "world", line.scan.stamp_ns + self._wall_minus_ns))
+        if self._scanner.per_turn:
+            self._publish_turns(self._turns.push(line))
+            return
+        if self._scanner.points_frame == "rot":
+            line = in_rot(line, self._scanner.angles)
+        self._publish_points(point_rows(line)[np.newaxis], line.scan.stamp_ns)
+
+    def _publish_turns(self, turns: list[list[ScanPoints]]) -> None:
+        for lines in turns:
+            self._publish_points(turn_rows(lines), lines[0].scan.stamp_ns)
+
+    def _publish_points(self, rows: NDArray[np.void], stamp_ns: int) -> None:
+        frame = self._scanner.points_frame
+        self._points.publish(messages.point_cloud(rows, frame, stamp_ns + self._wall_minus_ns))
 
     def _set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for one in parameters:

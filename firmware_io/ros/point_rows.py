@@ -1,27 +1,59 @@
-"""The points of a scan as `sensor_msgs/PointCloud2` holds them: a row for every beam, NaN where it became no point.
+"""Points as `sensor_msgs/PointCloud2` holds them: a row for every beam, NaN where it became no point.
 
-Fields are named as drivers of 3D lidars name them, so that what reads those reads this: x y z [m], intensity, t
-(nanoseconds after the stamp of the message, which is the time of the first beam) and ring (the beam's index).
+Fields are named as drivers of 3D lidars name them, so that what reads those reads this: x y z [m], intensity, ring (the
+beam's index), and the time after the stamp of the message, which is that of its first beam: `t` in nanoseconds of a
+scan, `time` in seconds of a turn, which lasts longer than 32 bits of nanoseconds.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from design.angles import AngleSet
 from firmware_io.assembly.streaming import ScanPoints
 
 POINT = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("t", "<u4"), ("ring", "<u2")],
+)
+TURN_POINT = np.dtype(
+    [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("time", "<f8"), ("ring", "<u2")],
 )
 
 
 def point_rows(line: ScanPoints) -> NDArray[np.void]:
     """The rows of one scan, shape (beams,), of `POINT`; intensity is NaN from a sensor that measures none."""
     rows = np.empty(line.scan.range_m.size, POINT)
+    _fill(rows, line)
+    rows["t"] = line.scan.time_ns - line.scan.stamp_ns
+    return rows
+
+
+def turn_rows(lines: Sequence[ScanPoints]) -> NDArray[np.void]:
+    """The rows of the scans of a turn, shape (scans, beams), of `TURN_POINT`; rows behind a last beam are NaN."""
+    rows = np.empty((len(lines), max(line.scan.range_m.size for line in lines)), TURN_POINT)
+    for name in ("x", "y", "z", "intensity", "time"):
+        rows[name] = np.nan
+    rows["ring"] = np.arange(rows.shape[1])
+    for row, line in zip(rows, lines, strict=True):
+        beams = row[: line.scan.range_m.size]
+        _fill(beams, line)
+        beams["time"] = (line.scan.time_ns - lines[0].scan.stamp_ns) / 1e9
+    return rows
+
+
+def in_rot(line: ScanPoints, angles: AngleSet) -> ScanPoints:
+    """The same scan in the frame `rot` as it stands at the first beam, the time of the stamp."""
+    T_rot_world = np.linalg.inv(angles.T_world_rot(float(line.joint_rad[0])))
+    points_m = line.points_m.astype(np.float64) @ T_rot_world[:3, :3].T + T_rot_world[:3, 3]
+    return replace(line, points_m=points_m.astype(np.float32))
+
+
+def _fill(rows: NDArray[np.void], line: ScanPoints) -> None:
     for column, name in enumerate("xyz"):
         rows[name] = line.points_m[:, column]
     rows["intensity"] = line.scan.intensity if line.scan.intensity.size else np.nan
-    rows["t"] = line.scan.time_ns - line.scan.stamp_ns
     rows["ring"] = np.arange(rows.size)
-    return rows

@@ -26,6 +26,20 @@ class StampAt(Enum):
     rear = "rear"
 
 
+class PointsPer(Enum):
+    """What makes one message of points."""
+
+    scan = "scan"
+    turn = "turn"
+
+
+class PointsIn(Enum):
+    """In which frame points are published."""
+
+    world = "world"
+    rot = "rot"
+
+
 ServoId = Annotated[
     int | None, typer.Option(min=0, max=252, metavar="ID", help="Number of the servo, where several share its bus.")
 ]
@@ -149,6 +163,12 @@ def ros2(
     straight: Annotated[
         bool, typer.Option("--straight", help="Points straight between angles: later by one angle, not 0.35 s.")
     ] = False,
+    points_per: Annotated[PointsPer, typer.Option(help="A message of points for each scan, or for each turn.")] = (
+        PointsPer.scan
+    ),
+    points_in: Annotated[PointsIn, typer.Option(help="Frame of the points; a turn has none that turns.")] = (
+        PointsIn.world
+    ),
     no_tf: Annotated[bool, typer.Option("--no-tf", help="Leave the frames to robot_state_publisher.")] = False,
     lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
@@ -162,18 +182,19 @@ def ros2(
         "rclpy",
         "sensor_msgs",
     )
-    from firmware_io.ros.serve import serve_devices, serve_recording
+    from firmware_io.ros.serve import Points, serve_devices, serve_recording
     from firmware_io.scan.plan import plan_scan
 
     given = ros_args or []
+    points = Points(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
     try:
         if recording is not None:
-            serve_recording(out, recording, given, Progress(), rate=rate, smooth=not straight, publish_tf=not no_tf)
+            serve_recording(out, recording, given, Progress(), points, rate=rate)
             return
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
         show(plan.lines())
         with on_duty():
-            serve_devices(out, plan, given, Progress(), smooth=not straight, publish_tf=not no_tf)
+            serve_devices(out, plan, given, Progress(), points)
     except KeyboardInterrupt as stop:
         for line in ("stopped", *notes_of(stop)):
             complain(line)

@@ -79,6 +79,40 @@ def test_somebody_elses_program_rebuilds_the_cloud_of_a_recording(tmp_path, doma
     np.testing.assert_array_equal(found["said"], np.stack([rows[axis] for axis in "xyz"], axis=1))
 
 
+def test_turns_and_other_names_are_to_be_had(tmp_path, domain):
+    """A message a turn, organised, under a name of the robot's; all of them are the cloud of the recording."""
+    setup = Setup(beams=100, sweeps=((90.0, 180.0), (-90.0, 180.0)), step_deg=360 / 4096)
+    recording = write(tmp_path / "r.mcap", simulate(FURNISHED, setup, Truth()))
+    (tmp_path / "angles.json").write_text(ANGLES.to_json())
+    whole = assemble_recording(recording, ANGLES, tmp_path / "r.ply", smooth=False, organised=True, per="turn")
+    names = ("--ros-args", "-r", "points:=front/cloud", "-r", "__ns:=/robot")
+    collecting = started(
+        HERE / "collect_points.py", 2, tmp_path / "f.npz", *names, domain=domain, stdout=subprocess.PIPE
+    )
+    assert collecting.stdout.readline() == "listening\n"
+    words = ("ros2", tmp_path, "--recording", recording, "--straight", "--points-per", "turn")
+    ended(started("-m", "scanwright", *words, "--", *names, domain=domain))
+    ended(collecting)
+    found = np.load(tmp_path / "f.npz")
+    assert found["frames"].tolist() == ["world"] * len(whole.clouds)
+    clouds = [found[f"cloud_{k}"] for k in range(len(whole.clouds))]
+    assert {cloud.shape[1] for cloud in clouds} == {100}
+    rows = np.concatenate([read_ply(path) for path in whole.clouds])
+    said = np.concatenate([cloud.ravel() for cloud in clouds])
+    for axis in "xyz":
+        np.testing.assert_array_equal(said[axis], rows[axis])
+    scan = rows["time_s"].reshape(-1, 100)
+    assert np.concatenate([cloud["time"][:, 0] for cloud in clouds]).max() <= scan.max()
+
+
+def test_points_of_a_turn_have_no_place_in_a_frame_that_turns(tmp_path, domain):
+    (tmp_path / "angles.json").write_text(ANGLES.to_json())
+    words = ("ros2", tmp_path, "--recording", tmp_path / "r.mcap", "--points-per", "turn", "--points-in", "rot")
+    refused = started("-m", "scanwright", *words, domain=domain, stderr=subprocess.PIPE)
+    assert "a turn has no place in a frame that turns" in refused.communicate(timeout=BOUND_S)[1]
+    assert refused.returncode == 2
+
+
 def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_path, domain):
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     with subprocess.Popen(

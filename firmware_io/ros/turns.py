@@ -1,0 +1,71 @@
+"""Scans gathered to whole turns of the axis, while they come: the turns of `assemble --per turn`.
+
+A turn ends when the axis has gone a further 360 deg, or where it turns back; a scan belongs where its first beam does.
+That an axis turns back is known a degree later, and the scans of that degree then open the next turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+from firmware_io.assembly.streaming import ScanPoints
+
+BACK_RAD = math.radians(1.0)  # turning back by less is noise or backlash
+MOST_BEAMS = 10_000_000
+"""A turn is given out before its end rather than that it holds more: an axis may stand for ever."""
+
+
+class Turns:
+    """Gathers placed scans; none is lost, none is given out twice."""
+
+    def __init__(self) -> None:
+        """Begin with the first scan."""
+        self._lines: list[ScanPoints] = []
+        self._beams = 0
+        self._way = 0
+        self._begin_rad = self._extreme_rad = math.nan
+        self._extreme = 0  # place in the turn of the scan that went farthest
+
+    def push(self, line: ScanPoints) -> list[list[ScanPoints]]:
+        """Take a scan in, and give out the turns that it ends."""
+        done = []
+        joint_rad = float(line.joint_rad[0]) if line.joint_rad.size else math.nan
+        if not math.isnan(joint_rad):
+            if back := self._turned_back(joint_rad):
+                done.append(self._cut(self._extreme + 1, self._extreme_rad))
+                self._way = -back
+            if math.isnan(self._begin_rad):
+                self._begin_rad = self._extreme_rad = joint_rad
+            whole, turned_rad = 2 * math.pi, abs(joint_rad - self._begin_rad)
+            if turned_rad >= whole:
+                turns = math.copysign(whole * (turned_rad // whole), joint_rad - self._begin_rad)
+                done.append(self._cut(len(self._lines), self._begin_rad + turns))
+            self._follow(joint_rad)
+        if self._lines and self._beams + line.scan.range_m.size > MOST_BEAMS:
+            done.append(self._cut(len(self._lines), self._begin_rad))
+        self._lines.append(line)
+        self._beams += line.scan.range_m.size
+        return [turn for turn in done if turn]
+
+    def finish(self) -> list[list[ScanPoints]]:
+        """The turn that has begun."""
+        turn = self._cut(len(self._lines), math.nan)
+        return [turn] if turn else []
+
+    def _turned_back(self, joint_rad: float) -> int:
+        """The way (1 or -1) that the axis went until it turned back, as this angle shows; 0 where it did not."""
+        return self._way if self._way and (self._extreme_rad - joint_rad) * self._way > BACK_RAD else 0
+
+    def _follow(self, joint_rad: float) -> None:
+        ahead_rad = joint_rad - self._extreme_rad
+        if not self._way and abs(ahead_rad) > BACK_RAD:
+            self._way = 1 if ahead_rad > 0 else -1
+        if self._way and ahead_rad * self._way >= 0:
+            self._extreme, self._extreme_rad = len(self._lines), joint_rad
+
+    def _cut(self, count: int, begin_rad: float) -> list[ScanPoints]:
+        """Give out the first scans; the rest open a turn that begins at an angle."""
+        turn, self._lines = self._lines[:count], self._lines[count:]
+        self._beams = sum(line.scan.range_m.size for line in self._lines)
+        self._begin_rad, self._extreme = begin_rad, len(self._lines) - 1
+        return turn
