@@ -2,8 +2,8 @@
 
     scan               sensor_msgs/LaserScan      in `laser`; the stamp is the time of the first beam
     joint_states       sensor_msgs/JointState     `spin_joint`, as the encoder said it
-    points             sensor_msgs/PointCloud2    one message a scan, in `world` or `rot`, or a turn, in `world`; de-skewed,
-                                                  a row for every beam
+    points             sensor_msgs/PointCloud2    one message a scan, in `world` or `rot`, or a turn, in `world`;
+                                                  de-skewed, a row for every beam
     robot_description  std_msgs/String            the URDF with the frames in use, if the build has one; kept
     tf, tf_static      tf2_msgs/TFMessage         world servo rot laser, where ROS 2 has tf2_msgs
     diagnostics        diagnostic_msgs/DiagnosticArray    once a second, where ROS 2 has diagnostic_msgs
