@@ -4,7 +4,8 @@
 
 Angle pairs of the lidar are `default_rng(1).uniform(-90, 90, (300, 2))`, those of the prototype study; every one gets
 a random place of the axis. For each setting: all parts and all checks of `scanwright check`; a failed check counts with
-its kind, a setting that cannot be built with its reason. Ctrl-C ends a run early and tells what it has measured.
+its kind, a setting that cannot be built with its reason. Masses are of printed parts, filled; a part or a check that
+only some settings have is counted over these. Ctrl-C ends a run early and tells what it has measured.
 """
 
 from __future__ import annotations
@@ -69,8 +70,8 @@ def main(count: int = 300, sensor: str = "UTM-30LX", servo: str = "MX-64R") -> N
     print(f"{sensor} on {servo}: {done} settings, {len(rows)} built, {passed} pass every check, {len(refused)} refused")
     print("  failed: ", ", ".join(f"{kind} {n}" for kind, n in failed.most_common()) or "none")
     print("  warned: ", ", ".join(f"{kind} {n}" for kind, n in warned.most_common()) or "none")
-    for name in rows[0]:
-        low, middle, high, top = np.quantile([row.get(name, np.nan) for row in rows], [0, 0.5, 0.95, 1])
+    for name in dict.fromkeys(name for row in rows for name in row):
+        low, middle, high, top = np.quantile([row[name] for row in rows if name in row], [0, 0.5, 0.95, 1])
         print(f"  {name:<20} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
 
 
@@ -83,10 +84,16 @@ def _measured(scanner: Scanner) -> tuple[dict[str, float], list[Check]]:
     assembly = make_parts(scanner)
     checks, _ = run_checks(scanner, assembly, lambda _: None)
     found = {check.kind: check.value for check in checks if check.value is not None}
-    linkage = of_solid(assembly.made["alignment_linkage"], scanner.printer.density_g_cm3)
+    density = scanner.printer.density_g_cm3
+    printed = {
+        f"{name}_g": 1000 * of_solid(solid, density).mass_kg
+        for name, solid in assembly.made.items()
+        if not assembly.parts[name].metal
+    }
     values = {
         "h_mm": assembly.layout.stack.h,
-        "linkage_g": 1000 * linkage.mass_kg,
+        **printed,
+        "printed_g": sum(printed.values()),
         "rotor_g": 1000 * link_bodies(scanner, assembly)["rot"].mass_kg,
         "bearing": float(assembly.layout.stack.bearing is not None),
         "sub_plate": float(assembly.layout.stack.sub_plate is not None),
