@@ -65,7 +65,7 @@ def _yields(scanner: Scanner, stack: DirectStack) -> list[Check]:
         at_most(
             "waist_torque",
             stall,
-            metal.yields_pa * math.pi * (metal.waist * stack.waist_mm / 1000) ** 3 / 16,
+            metal.twisted_off_nm(stack.waist_diameter),
             "N m",
             SERVO_SHAFT,
             f"{what} {metal.name}",

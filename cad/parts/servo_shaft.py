@@ -15,7 +15,7 @@ import cadquery as cq
 
 from cad import outlines, solids
 from cad.layout.direct.loads import ALUMINIUM, STEEL
-from cad.layout.direct.stack import GROOVES, WAIST, DirectStack
+from cad.layout.direct.stack import GROOVES, DirectStack
 from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
 from cad.layout.hub import Hub
 from cad.layout.joints import horn_centres, screws
@@ -93,12 +93,12 @@ def cross_words(stack: Hub) -> tuple[str, ...]:
 
 def _waist(stack: DirectStack) -> cq.Solid:
     """What is turned off: its ends slope at 45 deg, an edge would crack."""
-    radius, waist = stack.shaft_diameter / 2, stack.waist_mm / 2
+    radius, waist = stack.shaft_diameter / 2, stack.waist_diameter / 2
     slope = radius - waist
     low = stack.horn + stack.collar_height
-    high = low + WAIST + slope
+    thin = low + stack.waist_length
     outer = radius + 1.0
-    return solids.lathe([[outer, low], [waist, low], [waist, low + WAIST], [outer, high + 1.0]])
+    return solids.lathe([[outer, low], [waist, low], [waist, thin], [outer, thin + slope + 1.0]])
 
 
 def _groove(stack: DirectStack) -> cq.Solid:
@@ -115,10 +115,10 @@ def _waist_words(stack: DirectStack) -> tuple[str, ...]:
     if stack.bearing is None:
         return ()
     bottom, width = GROOVES[stack.retaining_ring]
-    in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_mm:.2f}"
+    in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_diameter:.2f}"
     return (
-        f"Waist {WAIST:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}, nothing else bends enough and yields late "
-        "enough. No other metal.",
+        f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}, nothing else bends enough "
+        "and yields late enough. No other metal.",
         f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
     )

@@ -18,7 +18,6 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.loads import ALUMINIUM_PA
 from design.arrays import Array
 
-SLICES = 400  # of the shaft's length: bend within 1e-4
 POISSON = 0.33
 SHEAR_SHARE = 0.9  # of a round section that carries shear
 
@@ -59,9 +58,9 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
         cage_n_per_m: sideways stiffness of the cage that holds the bearing, 0 without one.
     """
     length = (stack.hub_bottom - stack.horn) / 1000
-    z = (np.arange(SLICES) + 0.5) / SLICES * length
-    dz = length / SLICES
-    radius = stack.radius_at(1000 * z, stack.waist_mm) / 1000
+    above_horn, thick = stack.slices(1000 * length, stack.waist_diameter)
+    z, dz = above_horn / 1000, thick / 1000
+    radius = stack.radius_at(above_horn, stack.waist_diameter) / 1000
     area, second_moment = math.pi * radius**2, math.pi / 4 * radius**4
     shear_pa = modulus_pa / (2 + 2 * POISSON)
     lever = length - z

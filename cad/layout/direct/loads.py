@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from cad.layout.direct.stack import DirectStack
 from cad.layout.loads import (
     ALUMINIUM_G_CM3,
@@ -31,7 +29,6 @@ LINKAGE_OFF_AXIS_MM = 20.0
 JOURNAL_WALL = 1.8  # of the bearing's sleeve between bore and wires
 WIRE_DEPTH = 6.0  # least depth of the channel for the ring's wires
 HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
-SLICES = 1000  # of the shaft's length: shares within 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +49,15 @@ class ShaftMetal:
     yields_pa: float
     grows_per_k: float
 
+    def twisted_off_nm(self, waist_diameter: float) -> float:
+        """Torque at which a waist yields that is of this diameter in aluminium."""
+        return self.yields_pa * math.pi * (self.waist * waist_diameter / 1000) ** 3 / 16
+
 
 # 0.2 % proof stress of 430 MPa (EN 755-2, bars) and 900 MPa (EN ISO 683-2, to 16 mm), by von Mises
 ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6, 23e-6)
-STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.77, 0.577 * 900e6, 12e-6)
+# as stiff as aluminium: (70 / 206) ** 0.25
+STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.76, 0.577 * 900e6, 12e-6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +111,12 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
         metal: what the shaft is of.
     """
     b = (stack.bearing_middle - stack.horn) / 1000
-    z = (np.arange(SLICES) + 0.5) / SLICES * b
-    EI = metal.modulus_pa * math.pi / 4 * (stack.radius_at(1000 * z, metal.waist * stack.waist_mm) / 1000) ** 4
+    waist = metal.waist * stack.waist_diameter
+    above_horn, thick = stack.slices(1000 * b, waist)
+    z = above_horn / 1000
+    EI = metal.modulus_pa * math.pi / 4 * (stack.radius_at(above_horn, waist) / 1000) ** 4
     moment = weight.across_n * (weight.lever_m - z) + weight.along_n * weight.off_axis_m
-    bend, reach = b / SLICES / EI, b - z
+    bend, reach = thick / 1000 / EI, b - z
     give = float((bend * reach**2).sum()) + 1 / cage_n_per_m
     R = float((bend * reach * moment).sum()) / give
     over = (stack.hub_bottom - stack.bearing_middle) / 1000

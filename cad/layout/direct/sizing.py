@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cad.layout.direct.loads import bearing_for, heaviest
-from cad.layout.direct.misalignment import thickest_waist
+from cad.layout.direct.loads import bearing_for
+from cad.layout.direct.misalignment import with_waist
 from cad.layout.direct.stack import DirectStack
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from cad.layout.hub import HUB_WALL
@@ -19,7 +19,6 @@ from design.scanner import Scanner
 SHAFT_PLAIN = 12.0  # without a ring
 SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
 SHAFT_MIN = 8.0
-WAISTS_MM = tuple(tenths / 10 for tenths in range(70, 49, -1))  # the last one outlasts a stalled MX-64
 
 
 def direct_stack(scanner: Scanner) -> DirectStack:
@@ -42,7 +41,8 @@ def direct_stack(scanner: Scanner) -> DirectStack:
         flange_thickness=flange_thickness,
         collar_radius=collar_radius,
         collar_height=collar_height,
-        waist_mm=WAISTS_MM[-1],
+        waist_length=0.0,
+        waist_diameter=shaft,
         bearing=None,
         sub_plate=None,
     )
@@ -51,7 +51,7 @@ def direct_stack(scanner: Scanner) -> DirectStack:
     if covered_screws(scanner.lidar, stack):
         axis = leaning_least(R)
         stack = replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
-    return replace(stack, waist_mm=thickest_waist(scanner, stack, heaviest(scanner, stack), WAISTS_MM))
+    return stack if bearing is None else with_waist(scanner, stack)
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

@@ -28,7 +28,6 @@ from cad.layout.hub import HUB_GAP, Hub
 from design.arrays import Array
 
 RING_GAP = 3.0
-WAIST = 32.0  # length of the shaft's waist: it bends where horn and bearing are not quite in line
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
 # DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
 GROOVES = {
@@ -58,6 +57,7 @@ WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
 STRIP = 0.3  # under the top of a ring's stator that its drawing does not vouch for
 CAGE_LIP = 1.5  # under the bearing's outer ring, thick and wide
+SLICES = 100  # of each piece of the shaft between two edges: bend within 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,8 @@ class DirectStack(Hub):
     flange_thickness: float
     collar_radius: float
     collar_height: float
-    waist_mm: float  # diameter of the waist, in aluminium
+    waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
+    waist_diameter: float  # in aluminium
 
     @property
     def bearing_middle(self) -> float:
@@ -118,27 +119,40 @@ class DirectStack(Hub):
         """Height of the servo's horn face."""
         if self.bearing is None:
             return self.ring_bottom - RING_GAP - self.collar_height
-        return self.ring_bottom - max(0.0, APART - self.ring_length) - WAIST - self.collar_height
+        return self.ring_bottom - max(0.0, APART - self.ring_length) - self.waist_length - self.collar_height
 
     @property
     def retaining_ring(self) -> int:
         """Size of the ring that keeps the bearing's sleeve up: the shaft's, or the next smaller one."""
         return max(size for size in GROOVES if size <= self.shaft_diameter)
 
-    def radius_at(self, above_horn: Array, waist_mm: float) -> Array:
+    def radius_at(self, above_horn: Array, waist_diameter: float) -> Array:
         """Radius of the shaft at heights above the horn; the pocket of the horn's boss is left out.
 
         Args:
             above_horn: heights, any shape.
-            waist_mm: diameter of its waist.
+            waist_diameter: of its waist, in the metal at hand.
         """
         z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
         radius = np.full(z.shape, shaft)
         if self.bearing is not None:
-            above = z - self.collar_height - WAIST
-            radius = np.minimum(shaft, waist_mm / 2 + np.maximum(above, 0.0))
+            above = z - self.collar_height - self.waist_length
+            radius = np.minimum(shaft, waist_diameter / 2 + np.maximum(above, 0.0))
         radius = np.where(z < self.collar_height, max(self.collar_radius, shaft), radius)
         return np.where(z < self.flange_thickness, np.maximum(self.flange_radius, radius), radius)
+
+    def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
+        """Middles and thicknesses of slices of the shaft above the horn; none of them spans an edge of it.
+
+        Args:
+            length: of the piece above the horn.
+            waist_diameter: of its waist, in the metal at hand.
+        """
+        waist = self.collar_height + self.waist_length
+        slope = (self.shaft_diameter - waist_diameter) / 2
+        edges = np.clip([0.0, self.flange_thickness, self.collar_height, waist, waist + slope, length], 0.0, length)
+        pieces, within = np.diff(edges)[:, None], (np.arange(SLICES) + 0.5) / SLICES
+        return (edges[:-1, None] + pieces * within).ravel(), np.repeat(pieces / SLICES, SLICES)
 
     @property
     def shadow_half_angle(self) -> float:

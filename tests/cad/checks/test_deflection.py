@@ -10,7 +10,6 @@ from cad.checks.deflection import sag_of, split
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import mesh_of
 from cad.layout.direct.loads import hanging
-from cad.layout.direct.stack import WAIST
 from cad.layout.loads import ALUMINIUM_PA, weight_of
 from cad.solids import box, upright
 from cad.statics import elastic
@@ -98,7 +97,7 @@ def test_a_waist_bends_more_and_a_stiff_cage_holds(made):
     stack = made.result.assembly.layout.stack
     assert stack.bearing is not None
     free, held, clamped = (shaft_bend(stack, cage_n_per_m=k).compliance for k in (0.0, 1e6, 1e12))
-    waist = WAIST / 1000 / (ALUMINIUM_PA * math.pi / 4 * (stack.waist_mm / 2000) ** 4)
+    waist = stack.waist_length / 1000 / (ALUMINIUM_PA * math.pi / 4 * (stack.waist_diameter / 2000) ** 4)
     assert free[1, 1] > waist
     assert free[0, 0] > held[0, 0] > clamped[0, 0] > 0
     reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])
