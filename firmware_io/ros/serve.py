@@ -21,7 +21,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class Publishing:
     """How the node publishes.
 
     Attributes:
@@ -44,7 +44,7 @@ class Points:
             raise RecordingError("--points-in rot: a turn has no place in a frame that turns; say --points-per scan")
 
 
-def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Points) -> None:
+def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Publishing) -> None:
     """Publish what the devices say until Ctrl-C; they are stopped on every way out.
 
     Args:
@@ -64,7 +64,7 @@ def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, 
 
 
 def serve_recording(
-    out: Path, recording: Path, ros_args: Sequence[str], say: Say, points: Points, *, rate: float = 1.0
+    out: Path, recording: Path, ros_args: Sequence[str], say: Say, points: Publishing, *, rate: float = 1.0
 ) -> None:
     """Publish a recording at its own pace, with its clock on /clock; the other arguments as for `serve_devices`.
 
@@ -81,7 +81,7 @@ def serve_recording(
         node.flush()
 
 
-def _scanner(out: Path, points: Points, held: bool) -> PublishedScanner:
+def _scanner(out: Path, points: Publishing, held: bool) -> PublishedScanner:
     in_use = angles_in_use(out)
     return PublishedScanner(
         angles=in_use.angles,

@@ -182,11 +182,11 @@ def ros2(
         "rclpy",
         "sensor_msgs",
     )
-    from firmware_io.ros.serve import Points, serve_devices, serve_recording
+    from firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from firmware_io.scan.plan import plan_scan
 
     given = ros_args or []
-    points = Points(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
+    points = Publishing(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
     try:
         if recording is not None:
             serve_recording(out, recording, given, Progress(), points, rate=rate)
