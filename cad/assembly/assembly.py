@@ -9,6 +9,7 @@ import cadquery as cq
 
 from cad.assembly.bought import BodySpec
 from cad.geometry.mesh import TriMesh, mesh_of
+from cad.geometry.print_pose import PrintPose, print_pose
 from cad.layout.layout import Layout
 from cad.parts.part_spec import Colour, PartSpec
 
@@ -31,6 +32,7 @@ class Assembly:
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def spec(self, name: str) -> PartSpec | BodySpec:
         """What is known of a part or a body."""
@@ -65,6 +67,12 @@ class Assembly:
     def meshes(self) -> dict[str, TriMesh]:
         """Of all parts by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
+
+    def print_pose(self, name: str) -> PrintPose:
+        """How a part is printed: decided once, before its label, for checks, print files, sheet and plates."""
+        if name not in self._poses:
+            self._poses[name] = print_pose(self.mesh(name), self.layout.scanner.printer.bed_mm)
+        return self._poses[name]
 
     def outlines(self) -> dict[str, TriMesh]:
         """Of all parts by name, as they look from outside while they turn."""

@@ -24,6 +24,7 @@ from design.catalogue.products import Bearing
 
 CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
 WINDOW = (0.35, 0.05, 0.08)
+LOWER = "_lower"
 
 
 Frame = Literal["servo", "rot", "laser"]
@@ -41,6 +42,7 @@ class BodySpec:
         make: its solid, rotation frame.
         meets: body that it may touch though the other one moves: the other half of a ring, or what it drives.
         clear: whether beams pass it.
+        from_below: whether it is put in from below, where its product comes twice.
     """
 
     name: str
@@ -50,6 +52,7 @@ class BodySpec:
     make: Callable[[], cq.Solid]
     meets: str = ""
     clear: bool = False
+    from_below: bool = False
 
     @property
     def turns(self) -> bool:
@@ -83,7 +86,7 @@ def _of_belt(stack: BeltStack) -> Iterator[BodySpec]:
     yield _servo(names.SERVO_CASE, "servo", partial(_beside, stack, case))
     yield _servo(names.SERVO_OUTPUT, "servo", partial(_beside, stack, horn))
     yield from _bearing(stack.carrier, stack.tower_top, "_upper")
-    yield from _bearing(stack.carrier, stack.lower_bottom + stack.carrier.width_mm, "_lower")
+    yield from _bearing(stack.carrier, stack.lower_bottom + stack.carrier.width_mm, LOWER)
     yield _ring(names.RING_STATOR, "servo", partial(draw.capsule, stack), meets=names.RING_ROTOR)
     yield _ring(names.RING_ROTOR, "rot", partial(draw.capsule_rotor, stack))
     yield BodySpec(
@@ -107,9 +110,12 @@ def _ring(name: str, frame: Frame, make: Callable[[], cq.Solid], meets: str = ""
 def _bearing(bearing: Bearing, top: float, place: str) -> Iterator[BodySpec]:
     inner, outer = f"{names.BEARING}_inner{place}", f"{names.BEARING}_outer{place}"
     make = partial(draw.bearing_inner, bearing, top)
-    yield BodySpec(name=inner, product=names.BEARING, frame="rot", colour=STEEL, make=make)
+    low = place == LOWER
+    yield BodySpec(name=inner, product=names.BEARING, frame="rot", colour=STEEL, make=make, from_below=low)
     make = partial(draw.bearing_outer, bearing, top)
-    yield BodySpec(name=outer, product=names.BEARING, frame="servo", colour=STEEL, make=make, meets=inner)
+    yield BodySpec(
+        name=outer, product=names.BEARING, frame="servo", colour=STEEL, make=make, meets=inner, from_below=low
+    )
 
 
 def _of_lidar(layout: Layout) -> Iterator[BodySpec]:

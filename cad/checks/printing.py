@@ -18,7 +18,7 @@ from cad.checks.check import Check, at_least, at_most, note, spot, tidy
 from cad.checks.islands import islands_check
 from cad.geometry.holes import Round, rounds_of
 from cad.geometry.mesh import TriMesh
-from cad.geometry.print_pose import PrintPose, print_pose
+from cad.geometry.print_pose import PrintPose
 from design.arrays import Array
 from design.catalogue.products import Printer
 from design.scene import ray_caster
@@ -31,11 +31,13 @@ BESIDE = 2.0  # from a thin spot to a hole that is named with it
 SMALLEST_HOLE = 1.5  # diameter; smaller ones close
 
 
-def printing_checks(printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, TriMesh]) -> list[Check]:
-    """Bed, support, walls and holes of every printed part, as it lies on the bed."""
+def printing_checks(
+    printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, TriMesh], poses: Mapping[str, PrintPose]
+) -> list[Check]:
+    """Bed, support, walls and holes of every printed part, as it lies on the bed in its pose."""
     checks = []
     for name, solid in printed.items():
-        pose = print_pose(meshes[name], printer.bed_mm)
+        pose = poses[name]
         checks.append(_bed(name, pose, printer))
         checks.append(note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg"))
         checks.append(islands_check(name, meshes[name], pose))

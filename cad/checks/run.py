@@ -71,7 +71,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *retention_checks(scanner, assembly),
         *electric_checks(scanner),
         *deflection_checks(scanner, assembly, bodies, meshes),
-        *printing_checks(scanner.printer, printed, meshes),
+        *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *doubts,
     ]
     return checks, shadow

@@ -1,4 +1,4 @@
-"""3MF of one part as it lies on the bed: core specification, millimetres, the same bytes for the same mesh.
+"""3MF of parts as they lie on the bed: core specification, millimetres, the same bytes for the same meshes.
 
 The entries are stored, not deflated, with the zip format's first date: what a compressor makes of them depends on its
 version.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Iterator, Mapping
 from xml.sax.saxutils import escape, quoteattr
 
 from cad.geometry.mesh import TriMesh
@@ -27,28 +28,25 @@ RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def threemf_bytes(mesh: TriMesh, part: str, description: str) -> bytes:
-    """The file of one part; `mesh` is in the frame of the bed, `description` says what it was made from."""
+def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str) -> bytes:
+    """The file of parts that are printed together.
+
+    Args:
+        meshes: by name, in the frame of the bed.
+        title: of the file.
+        description: what it was made from.
+    """
     model = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',
-        f'<metadata name="Title">{escape(part)}</metadata>',
+        f'<metadata name="Title">{escape(title)}</metadata>',
         '<metadata name="Application">scanwright</metadata>',
         f'<metadata name="Description">{escape(description)}</metadata>',
         "<resources>",
-        f'<object id="1" type="model" name={quoteattr(part)}>',
-        "<mesh>",
-        "<vertices>",
-        *(f'<vertex x="{x:.5f}" y="{y:.5f}" z="{z:.5f}"/>' for x, y, z in mesh.vertices.tolist()),
-        "</vertices>",
-        "<triangles>",
-        *(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist()),
-        "</triangles>",
-        "</mesh>",
-        "</object>",
+        *(line for i, (part, mesh) in enumerate(meshes.items(), start=1) for line in _object(i, part, mesh)),
         "</resources>",
         "<build>",
-        '<item objectid="1"/>',
+        *(f'<item objectid="{i}"/>' for i in range(1, len(meshes) + 1)),
         "</build>",
         "</model>",
         "",
@@ -66,3 +64,12 @@ def threemf_bytes(mesh: TriMesh, part: str, description: str) -> bytes:
             entry.external_attr = 0o644 << 16
             package.writestr(entry, text.encode("utf-8"))
     return file.getvalue()
+
+
+def _object(number: int, part: str, mesh: TriMesh) -> Iterator[str]:
+    yield f'<object id="{number}" type="model" name={quoteattr(part)}>'
+    yield from ("<mesh>", "<vertices>")
+    yield from (f'<vertex x="{x:.5f}" y="{y:.5f}" z="{z:.5f}"/>' for x, y, z in mesh.vertices.tolist())
+    yield from ("</vertices>", "<triangles>")
+    yield from (f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
+    yield from ("</triangles>", "</mesh>", "</object>")

@@ -10,12 +10,13 @@ from cad.checks.remarks import without_traps
 from cad.drawings.files import drawing_files
 from cad.files.bom import bom_text, items_of
 from cad.files.glb_scenes import scene_files
-from cad.files.instructions import instructions_text
+from cad.files.manual.instructions import step_files
 from cad.files.part_files import PartsResult, write_files
+from cad.files.plates import plate_files, plates_of
 from cad.files.threemf import threemf_bytes
 from cad.files.wiring import wiring_files
 from cad.findings import PartFinding
-from cad.geometry.mesh import TriMesh, checked_mesh
+from cad.geometry.mesh import checked_mesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.labels.fit_coupon import fit_coupon
 from cad.layout.all_joints import joints_of
@@ -51,41 +52,32 @@ def export_scanner(
     masses = {report.name: report.mass_g for report in made.parts}
     joints = joints_of(assembly.layout)
     progress("drawing the parts")
+    metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
     drawn = begin(drawing_files, scanner, assembly, masses, digest)
     progress("writing print files")
-    files, left_out = _prints(scanner, made.meshes, assembly.metal(), digest)
+    printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
-    coupon = fit_coupon(scanner, assembly.layout.stack)
-    files |= _print_file(scanner, FIT_COUPON, checked_mesh(coupon, FIT_COUPON), digest)
+    coupon = checked_mesh(fit_coupon(scanner, assembly.layout.stack), FIT_COUPON)
+    lying = on_bed(coupon, print_pose(coupon, scanner.printer.bed_mm))
+    files = {
+        f"print/{part}.3mf": threemf_bytes({part: mesh}, part, f"{about}, as it lies on the bed")
+        for part, mesh in (printed | {FIT_COUPON: lying}).items()
+    }
+    plates = plates_of(printed, scanner.printer.bed_mm)
+    files |= plate_files(plates, scanner.printer.bed_mm, about)
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest)
-    progress("writing bom.csv, assembly.md and wiring.svg")
+    progress("writing bom.csv, wiring.svg and assembly.md with its pictures")
     items = items_of(scanner, assembly, joints, masses, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
-    files["assembly.md"] = instructions_text(scanner, assembly, joints, digest).encode("utf-8")
+    files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
     files |= wiring_files(scanner, digest)
     files |= drawn()
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)
-    return Exports(tuple(sorted(files)), tuple(left_out), tuple(findings))
-
-
-def _prints(
-    scanner: Scanner, meshes: dict[str, TriMesh], metal: frozenset[str], digest: str
-) -> tuple[dict[str, bytes], list[LeftOut]]:
-    """`print/<part>.3mf` of every printed part."""
-    files: dict[str, bytes] = {}
-    left_out = []
-    for part, mesh in meshes.items():
-        if part in metal:
-            left_out.append(LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files"))
-            continue
-        files |= _print_file(scanner, part, mesh, digest)
-    return files, left_out
-
-
-def _print_file(scanner: Scanner, part: str, mesh: TriMesh, digest: str) -> dict[str, bytes]:
-    """One part as it lies on the bed."""
-    pose = print_pose(mesh, scanner.printer.bed_mm)
-    about = f"{scanner.angles.task}, config={digest}, {scanner.printer.name}, as it lies on the bed"
-    return {f"print/{part}.3mf": threemf_bytes(on_bed(mesh, pose), part, about)}
+    left_out = tuple(
+        LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files")
+        for part in made.meshes
+        if part in metal
+    )
+    return Exports(tuple(sorted(files)), left_out, tuple(findings))

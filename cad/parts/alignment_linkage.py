@@ -46,6 +46,7 @@ OF_LIDAR = (
 )
 RETRIES = 5
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
+SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 BELT_WORDS = (
     "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
     f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
@@ -62,9 +63,9 @@ def linkage_spec(layout: Layout) -> PartSpec:
         "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way "
         f"only, and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
     )
-    step = Step("Linkage on the shaft", words)
+    step = Step("Linkage on the shaft", words, SEATED)
     if isinstance(stack, BeltStack):
-        step = Step("Linkage on the shaft, and the belt set", BELT_WORDS)
+        step = Step("Linkage on the shaft, and the belt set", BELT_WORDS, SEATED)
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
         turns=True,

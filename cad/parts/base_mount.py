@@ -20,7 +20,7 @@ from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, 
 from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
-from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO_CASE
+from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import passing_hole
 from cad.solids import building
@@ -46,12 +46,15 @@ def mount_spec(layout: Layout) -> PartSpec | None:
         "Servo into the mount",
         f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
         f"Connect the servo's cable now. {screws(DECK)}",
+        check="the case does not rock on its four feet, nor the mount on the deck",
+        brings=(SERVO,),
     )
     if isinstance(layout.stack, BeltStack):
         step = Step(
             "Tower on the mount",
             "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
             f"{screws(BEARING_TOWER)} {screws(DECK)}",
+            check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
         )
     return PartSpec(
         name=BASE_MOUNT,

@@ -35,7 +35,7 @@ from cad.layout.direct.cage import (
 from cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from cad.layout.fits import OnSheet, printed_seat
 from cad.layout.joints import ALL_SCREWS, screws
-from cad.layout.names import BEARING_CAGE, CAGE_BASE, SERVO_CASE
+from cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE
 from cad.parts.part_spec import ON_CASE, PartSpec, Step
 from cad.screws import Trap
 from cad.solids import building
@@ -59,7 +59,7 @@ def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         name=BEARING_CAGE,
         turns=False,
         make=partial(bearing_cage, p),
-        step=Step("Bearing and cage", words),
+        step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
         sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
     )
 
@@ -73,7 +73,11 @@ def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         name=CAGE_BASE,
         turns=False,
         make=partial(cage_base, p),
-        step=Step("Base of the cage on the servo", f"Lower the base over the shaft. {screws(SERVO_CASE)}"),
+        step=Step(
+            "Base of the cage on the servo",
+            f"Lower the base over the shaft. {screws(SERVO_CASE)}",
+            "the shaft turns a whole turn without touching the base",
+        ),
         shaped_by=ON_CASE,
     )
 

@@ -34,7 +34,7 @@ from cad.layout.belt.stack import (
 )
 from cad.layout.belt.tower import DISC_SCREW, UNDER_FOOT_NUT, UNDER_HEAD, BearingTower, disc_azimuths, tower_of
 from cad.layout.fits import OnSheet, printed_seat
-from cad.layout.names import BEARING_TOWER
+from cad.layout.names import BEARING, BEARING_TOWER
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import Trap
 from cad.solids import building
@@ -55,7 +55,9 @@ def tower_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=BEARING_TOWER,
         turns=False,
         make=partial(bearing_tower, p),
-        step=Step("Bearings into the tower", words),
+        step=Step(
+            "Bearings into the tower", words, "both inner rings turn freely, neither bearing stands out", (BEARING,)
+        ),
         sheet=OnSheet((printed_seat(stack.carrier, p.fit),), _nuts_words(p)),
         shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
         shapes={"printer.fit_clearance_mm": "every bore and seat"},

@@ -37,7 +37,9 @@ def holder_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=SLIP_RING_ADAPTER,
         turns=False,
         make=partial(capsule_holder, stack, scanner.printer),
-        step=Step("Capsule on its disc", words),
+        step=Step(
+            "Capsule on its disc", words, "the capsule can be shifted a little by hand, and its rotor turns freely"
+        ),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
     )
 

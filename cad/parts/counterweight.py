@@ -35,7 +35,9 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
         name=COUNTERWEIGHT,
         turns=True,
         make=partial(counterweight, bar),
-        step=Step("Counterweight on the linkage", words),
+        step=Step(
+            "Counterweight on the linkage", words, "no screw stands out above the bar, which lies flat on the ear"
+        ),
         process="sawn",
         material=bar.stock,
         work=f"{len(bar.screws)} threads {SCREW.name}",

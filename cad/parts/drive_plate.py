@@ -16,7 +16,7 @@ from cad.layout.belt.plate import UNDER_HEAD, DrivePlate, plate_of
 from cad.layout.belt.stack import PLATE, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
-from cad.layout.names import DRIVE_PLATE, SERVO_CASE
+from cad.layout.names import DRIVE_PLATE, SERVO, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
 from cad.solids import building
 from design.scanner import Scanner
@@ -41,7 +41,7 @@ def plate_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=DRIVE_PLATE,
         turns=False,
         make=partial(drive_plate, plate_of(scanner, stack)),
-        step=Step("Servo on its plate", words),
+        step=Step("Servo on its plate", words, "the horn still turns freely in the hole of the plate", (SERVO,)),
         sheet=OnSheet(axis=stack.horn_axis),
         shaped_by=OF_SERVO,
         shapes={"belt.teeth": "where the servo stands"},

@@ -48,7 +48,7 @@ def sleeve_spec(layout: Layout) -> PartSpec | None:
         name=JOURNAL_SLEEVE,
         turns=True,
         make=partial(journal_sleeve, layout.linkage, stack),
-        step=Step("Sleeve of the bearing, and the shaft trued", words),
+        step=Step("Sleeve of the bearing, and the shaft trued", words, "the indicator stays within 0.05 mm"),
         process="turned",
         material=TURNED_FROM,
         why_metal=f"{stack.bearing.name} wants a round seat to g6",

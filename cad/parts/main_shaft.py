@@ -34,7 +34,7 @@ def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=MAIN_SHAFT,
         turns=True,
         make=partial(main_shaft, stack),
-        step=Step("Shaft into the tower", words),
+        step=Step("Shaft into the tower", words, "the shaft turns by a light finger and does not tilt"),
         process="turned",
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",

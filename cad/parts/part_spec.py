@@ -37,10 +37,19 @@ TURNED_FROM = "aluminium or steel"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of putting a scanner together: a title, and words with marks of `cad/layout/joints.py` for screws."""
+    """One step of putting a scanner together.
+
+    Attributes:
+        title: of it.
+        words: with marks of `cad/layout/joints.py` for screws.
+        check: what must be so before one goes on.
+        brings: bought products without a step of their own that come with it.
+    """
 
     title: str
     words: str
+    check: str = ""
+    brings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

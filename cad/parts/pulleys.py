@@ -22,7 +22,7 @@ from cad.layout.belt.plate import pulley_foot_radius
 from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
 from cad.layout.fits import OnSheet, no_wider
 from cad.layout.joints import horn_centres, screws
-from cad.layout.names import BEARING_TOWER, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
+from cad.layout.names import BEARING_TOWER, BELT, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
 from cad.parts.part_spec import HORN, PartSpec, Step
 from cad.screws import SCREWS, passing_hole, thread_in_part
 from cad.solids import building
@@ -47,7 +47,7 @@ def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=SHAFT_PULLEY,
         turns=True,
         make=partial(shaft_pulley, stack, scanner.printer),
-        step=Step("Pulley and belt on the shaft", words),
+        step=Step("Pulley and belt on the shaft", words, "the belt lies between both rims", (BELT,)),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
     )
@@ -69,7 +69,7 @@ def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer),
-        step=Step("Drive pulley, and the servo beside the shaft", words),
+        step=Step("Drive pulley, and the servo beside the shaft", words, "the belt runs a turn in its rims"),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),

@@ -34,7 +34,7 @@ def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         name=SHAFT_RING,
         turns=True,
         make=partial(shaft_ring, stack, scanner.printer),
-        step=Step("Ring under the bearings", words),
+        step=Step("Ring under the bearings", words, "pushed and pulled along its axis the shaft does not click"),
     )
 
 

@@ -45,7 +45,9 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         name=SLIP_RING_ADAPTER,
         turns=False,
         make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
-        step=Step("Adapter on the servo", f"{how} {screws(SERVO_CASE)}"),
+        step=Step(
+            "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
+        ),
         shaped_by=(*ON_CASE, *RING),
     )
 

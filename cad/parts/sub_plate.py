@@ -42,7 +42,7 @@ def sub_plate_spec(layout: Layout) -> PartSpec | None:
         name=SUB_PLATE,
         turns=True,
         make=partial(sub_plate, scanner, layout.stack, axis),
-        step=Step("Lidar and sub-plate on the linkage", words),
+        step=Step("Lidar and sub-plate on the linkage", words, "the two plates meet without a gap"),
         angles="laser",
         seat=layout.linkage.seat,
         lifted="lidar",

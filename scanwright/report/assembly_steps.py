@@ -1,20 +1,32 @@
 """The assembly steps as HTML: just the Markdown that `assembly.md` is written in.
 
-Headings, paragraphs, lists with `-`, and in a line `**bold**` and backticks; anything else stays the text it is.
+Headings, paragraphs, lists with `-`, pictures alone in a block, and in a line `**bold**` and backticks; anything else
+stays the text it is.
 """
 
 from __future__ import annotations
 
 import html
 import re
+from collections.abc import Callable
 
 
-def steps_html(text: str) -> str:
-    """HTML of the steps, without the title: the page has one; headings begin at the third level."""
+def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None) -> str:
+    """HTML of the steps, without the title: the page has one; headings begin at the third level.
+
+    Args:
+        text: Markdown.
+        address: of a picture that the text names; None where there is none.
+    """
     blocks = []
     for block in re.split(r"\n\s*\n", text.strip()):
         heading = re.fullmatch(r"(#+) (.*)", block)
-        if heading is None:
+        picture = re.fullmatch(r"!\[(.*)\]\((.*)\)", block)
+        source = None if picture is None else address(picture[2])
+        if picture is not None and source is not None:
+            said = html.escape(picture[1])
+            blocks.append(f'<div class="wide"><img src="{html.escape(source)}" alt="{said}"></div>')
+        elif heading is None:
             lines = block.splitlines()
             listed = all(line.startswith("- ") for line in lines)
             items = "".join(f"<li>{_inline(line[2:])}</li>" for line in lines)

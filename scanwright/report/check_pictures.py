@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from design.arrays import Array
-from design.scene import ray_caster
+from design.scene.parallel_view import Shown, view_of
+from design.scene.ray_caster import build_scene
 from scanwright.report.data_uri import png_uri
 
 SIZE = 200, 150  # pixels, wide and high
@@ -76,8 +76,8 @@ class CheckPictures:
     def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
         self._bodies = bodies
         corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
-        self._origins, self._direction = _rays(corners)
-        self._nearest, self._shade = self._cast(tuple(bodies))
+        self._view = view_of(corners, (SIZE[0] * FINER, SIZE[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
+        self._all = self._shown(tuple(bodies))
         self._drawn: dict[tuple[str, ...], str] = {}
 
     def picture(self, names: tuple[str, ...]) -> str:
@@ -87,36 +87,16 @@ class CheckPictures:
         return self._drawn[names]
 
     def _draw(self, names: tuple[str, ...]) -> str:
-        nearest, shade = self._cast(names)
-        named = np.isfinite(nearest)[:, None]
-        front = named & (nearest <= self._nearest + 1e-6)[:, None]
-        pale = np.where(np.isfinite(self._nearest)[:, None], self._shade[:, None] * OTHER, 255.0)
-        strong = shade[:, None] * NAMED
+        shown = self._shown(names)
+        named = np.isfinite(shown.away_m)[:, None]
+        front = named & (shown.away_m <= self._all.away_m + 1e-6)[:, None]
+        pale = np.where(np.isfinite(self._all.away_m)[:, None], self._all.brightness[:, None] * OTHER, 255.0)
+        strong = shown.brightness[:, None] * NAMED
         colour = np.where(front, strong, np.where(named, THROUGH * strong + (1 - THROUGH) * pale, pale))
         width, height = SIZE
         fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
         return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))
 
-    def _cast(self, names: tuple[str, ...]) -> tuple[Array, NDArray[np.float64]]:
-        """Distance along each ray to the first of some bodies, inf where there is none, and its brightness 0 to 1."""
+    def _shown(self, names: tuple[str, ...]) -> Shown:
         triangles = np.concatenate([self._bodies[name].triangles_m for name in names])
-        hits = ray_caster.cast(
-            ray_caster.build_scene(triangles), self._origins, np.broadcast_to(self._direction, self._origins.shape)
-        )
-        return hits.range_m, 0.35 + 0.65 * np.nan_to_num(np.cos(hits.incidence_rad))
-
-
-def _rays(corners: Array) -> tuple[Array, Array]:
-    """Starts of the rays, row after row from the top left, shape (n, 3), and their direction."""
-    cy, sy, cp, sp = np.cos(YAW_RAD), np.sin(YAW_RAD), np.cos(PITCH_RAD), np.sin(PITCH_RAD)
-    right, up, back = np.array([[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]])
-    seen = corners @ np.array([right, up, back]).T
-    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    half = np.ptp(seen, axis=0) / 2 * MARGIN
-    columns, rows = SIZE[0] * FINER, SIZE[1] * FINER
-    pixel = 2 * max(half[0] / columns, half[1] / rows)
-    x = middle[0] + pixel * (np.arange(columns) - (columns - 1) / 2)
-    y = middle[1] - pixel * (np.arange(rows) - (rows - 1) / 2)
-    across, high = np.meshgrid(x, y)
-    starts = across.reshape(-1, 1) * right + high.reshape(-1, 1) * up + (middle[2] + 2 * half[2] + 0.1) * back
-    return starts, -back
+        return self._view.shown(build_scene(triangles))

@@ -73,7 +73,10 @@ def report_html(folder: Path) -> str:
         "checks": checks,
         "places": {} if checks is None or assembly is None else _places(assembly, checks, bom),
         "bom": bom,
-        "steps": read(folder / "assembly.md", lambda path: steps_html(read_text(path))),
+        "steps": read(
+            folder / "assembly.md",
+            lambda path: steps_html(read_text(path), lambda name: read(folder / name, read_picture)),
+        ),
         "wiring": read(folder / "wiring.svg", read_picture),
         "wiring_words": read(folder / "wiring.md", lambda path: steps_html(read_text(path))),
         "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},

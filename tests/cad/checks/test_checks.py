@@ -120,10 +120,15 @@ def test_a_thin_wall_is_measured_and_a_wedge_is_none():
     assert thin_walls(mesh_of(wedge), 1.2).area_mm2 == 0
 
 
+def printed(printer, part):
+    mesh = mesh_of(part)
+    return printing_checks(printer, {"part": part}, {"part": mesh}, {"part": print_pose(mesh, printer.bed_mm)})
+
+
 def test_the_thinnest_spot_and_the_hole_beside_it_are_told():
     printer = load_catalogue().products["fdm-0.4"]
     drilled = box((0, 0, 0), (40, 30, 20)).cut(upright(5.0, -1, 21, 5.6, 12), upright(2.0, -1, 21, 30, 15)).Solids()[0]
-    (wall,) = [c for c in printing_checks(printer, {"part": drilled}, {"part": mesh_of(drilled)}) if c.kind == "wall"]
+    (wall,) = [c for c in printed(printer, drilled) if c.kind == "wall"]
     thickness, *place = map(
         float, re.search(r"([\d.]+) mm, at \(([-\d.]+), ([-\d.]+), ([-\d.]+)\)", wall.message).groups()
     )
@@ -135,7 +140,7 @@ def test_printing_tells_bed_wall_and_hole():
     printer = load_catalogue().products["fdm-0.4"]
     part = box((0, 0, 0), (260, 30, 20)).cut(upright(0.5, -1, 21, 20, 15)).fuse(box((0, 0, 19), (0.5, 30, 60)))
     part = part.Solids()[0]
-    checks = {c.kind: c for c in printing_checks(printer, {"part": part}, {"part": mesh_of(part)})}
+    checks = {c.kind: c for c in printed(printer, part)}
     assert (checks["bed"].severity, checks["bed"].value) == ("error", 260)
     assert checks["wall"].severity == "error" and checks["wall"].value > 2000
     assert (checks["smallest_hole"].severity, checks["smallest_hole"].value) == ("error", 1.0)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from cad.assembly.make import make_parts
 from cad.files.bom import _wiring, bom_text, items_of
-from cad.files.instructions import instructions_text
+from cad.files.manual.instructions import instructions_text
+from cad.files.manual.scenes import scenes_of
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import LENGTHS, shank_mm
@@ -175,7 +176,7 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert lidar.unit_usd is None and "price unknown" in lidar.note
     assert items[-1].total_usd == scanner.servo.price_usd
     assert bom_text(items).count("\n") == len(items) + 1
-    text = instructions_text(scanner, assembly, joints, "0123456789ab")
+    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
     assert (seat.part, seat.count) == ("sub_plate", 4)
@@ -196,4 +197,6 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]
-    assert "Melt the inserts in" in instructions_text(scanner, assembly, joints, "0123456789ab")
+    assert "Melt the inserts in" in instructions_text(
+        scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab"
+    )

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from cad.assembly.make import make_parts
 from cad.assembly.shadow import shadow_of, triangles_of
-from cad.files.instructions import instructions_text
+from cad.files.manual.instructions import instructions_text
+from cad.files.manual.scenes import scenes_of
 from cad.layout.all_joints import joints_of
 from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
 from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
@@ -111,7 +112,7 @@ def test_screws_from_below_and_a_step_that_says_so(made):
     assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
     bar = assembly.layout.counterweight
     assert bar.ear.high - bar.ear.low + 6 <= joint.length_mm <= bar.ear.high - bar.ear.low + bar.section[1]
-    text = instructions_text(scanner, assembly, joints, "0" * 12)
+    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0" * 12)
     assert text.index("Lidar on its seat") < text.index("Counterweight on the linkage") < text.index("Linkage on the")
 
 

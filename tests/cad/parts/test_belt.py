@@ -17,7 +17,8 @@ from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
 from cad.drawings.write import Words, drawn
 from cad.files.bom import items_of
-from cad.files.instructions import instructions_text
+from cad.files.manual.instructions import instructions_text
+from cad.files.manual.scenes import scenes_of
 from cad.files.urdf import urdf_text
 from cad.geometry.holes import rounds_of
 from cad.geometry.mesh import mesh_of
@@ -329,7 +330,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         ("base_mount", "bearing_tower"): ("M3", 4, "trap"),
         ("base_mount", "deck"): ("M4", 4, "deck"),
     }
-    text = instructions_text(scanner, assembly, joints, "0" * 12)
+    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0" * 12)
     titles = re.findall(r"^## \d+\. (.*)$", text, re.M)
     assert len(titles) == 13 and not [title for title in titles if " to " in title]  # no joint was left over
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)

@@ -10,7 +10,8 @@ from cad import outlines, solids
 from cad.assembly.make import make_parts
 from cad.checks.remarks import without_traps
 from cad.files.bom import items_of
-from cad.files.instructions import instructions_text
+from cad.files.manual.instructions import instructions_text
+from cad.files.manual.scenes import scenes_of
 from cad.geometry.holes import rounds_of
 from cad.labels.fit_coupon import fit_coupon
 from cad.layout.all_joints import joints_of
@@ -77,7 +78,7 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     assert cage.length_mm >= cage.grip_mm + 3.0 + HEIGHT - 0.1  # the leg, the wall, the nut
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 4
-    text = instructions_text(scanner, assembly, joints, "0123456789ab")
+    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their traps" in text
     assert without_traps(PRINTER, joints) == []
     core = thread_in_part(M3, PRINTER, room_for_nut=False)

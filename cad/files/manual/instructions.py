@@ -1,0 +1,154 @@
+"""`assembly.md`: how to put one scanner together, with the screws that its own parts ask for, and a picture a step."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from cad.assembly.assembly import Assembly
+from cad.checks.retention import material_of
+from cad.files.manual.pictures import StepPictures
+from cad.files.manual.scenes import StepScene, scenes_of
+from cad.geometry.mesh import TriMesh
+from cad.layout.joints import CASE_EAR, DECK_MM, Joint
+from cad.layout.names import FIT_COUPON
+from cad.layout.tightening import hold_of
+from design.scanner import Scanner
+
+NUTS = (
+    "Put the nuts into their traps before anything else: those of a plate or an arm from below; those of a boss from "
+    "above into the slots; those of a foot from its corners. Pull each home with a screw. What has no trap is a plain "
+    "thread."
+)
+LOCKED = (
+    "Where a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread, none on plastic, "
+    "which it makes crack. Tighten to the torque that stands behind each screw, and once more after a day, since "
+    "plastic under a head gives way. `checks.json` tells under `retention` and `screw` what each joint holds, and why."
+)
+LOOK = "Look, then wire"
+LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
+THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
+IN_A_LOOP = "Leave the lidar's cables a loose loop for the whole sweep, then join them to USB and power."
+
+
+def instructions_text(
+    scanner: Scanner,
+    assembly: Assembly,
+    scenes: Sequence[StepScene],
+    plates: Sequence[Sequence[str]],
+    config_hash: str,
+) -> str:
+    """The Markdown file.
+
+    Args:
+        scanner: angles and products.
+        assembly: the solids.
+        scenes: the steps, of `scenes.scenes_of`.
+        plates: parts that are printed together, of each `print/plate_<number>`.
+        config_hash: of what shapes the parts.
+    """
+    joints = [joint for scene in scenes for joint, _ in scene.joints]
+    angles = scanner.angles.angles_deg
+    lines = [
+        f"# {scanner.angles.task}: putting it together",
+        "",
+        f"Configuration {config_hash}: {scanner.lidar.name} on {scanner.servo.name}, alpha_rot {angles.alpha_rot:g}, "
+        f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
+        "In the pictures grey stands already and colour comes, made parts orange, bought ones blue; the rotation axis "
+        "stands upright, or the lidar's where it is put in. `exploded.glb` turns under the mouse; `bom.csv` lists what "
+        "you need.",
+        "",
+        f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
+        f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm).",
+        "",
+        *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
+        f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
+        "mm; all others follow from the parts.",
+        "",
+    ]
+    lines += [LOCKED, ""]
+    if any(joint.inserts for joint in joints):
+        lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
+    if any(joint.traps for joint in joints):
+        lines += [NUTS, ""]
+    for number, scene in enumerate(scenes, start=1):
+        lines += [f"## {number}. {scene.step.title}", "", f"![{scene.step.title}]({picture_name(number)})", ""]
+        lines += [_words(assembly, scene), ""]
+        if scene.step.check:
+            lines += [f"Before you go on: {scene.step.check}.", ""]
+    lines += [
+        f"## {len(scenes) + 1}. {LOOK}",
+        "",
+        LAST + (IN_A_LOOP if scanner.slip_ring is None else THROUGH_RING),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:
+    """The lines of one print plate."""
+    name = f"print/plate_{number}"
+    return f"Plate {number}, `{name}.3mf`: {', '.join(parts)}.", "", f"![Plate {number} on the bed]({name}.png)", ""
+
+
+def picture_name(number: int) -> str:
+    """The file of a step's picture, relative to the build folder."""
+    return f"assembly/step_{number:02d}.png"
+
+
+def screws_in_words(assembly: Assembly, joint: Joint) -> str:
+    """One joint as a sentence, with the torque of its screws."""
+    what = f"{joint.count} x {joint.number}"
+    where = {
+        "thread": f"from {joint.part} into {joint.onto}",
+        "trap": f"from {joint.part} onto {joint.count} nuts {joint.screw.name} in {joint.onto}",
+        "nut": f"through {joint.part} into {joint.onto}, with {joint.count} nuts {joint.screw.name}",
+        "deck": f"through the foot into the deck, with {joint.count} nuts {joint.screw.name}",
+        "grub": f"in {joint.part}, against {joint.onto}",
+    }[joint.fixing]
+    held = ", in heat-set inserts" if joint.inserts else ""
+    if joint.traps and joint.fixing == "grub":
+        held = f", through {joint.count} nuts {joint.screw.name} in its bore"
+    return f"{what} {where}{held}, {torque_in_words(assembly, joint)}."
+
+
+def torque_in_words(assembly: Assembly, joint: Joint) -> str:
+    """How tight the screws of a joint are."""
+    hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
+    return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
+
+
+def step_files(
+    scanner: Scanner,
+    assembly: Assembly,
+    meshes: dict[str, TriMesh],
+    joints: Sequence[Joint],
+    plates: Sequence[Sequence[str]],
+    config_hash: str,
+) -> dict[str, bytes]:
+    """`assembly.md` and the picture of each step.
+
+    Args:
+        scanner: angles and products.
+        assembly: the solids.
+        meshes: of the made parts, with their labels.
+        joints: all of them.
+        plates: parts that are printed together.
+        config_hash: of what shapes the parts.
+    """
+    scenes = scenes_of(assembly, joints)
+    pictures = StepPictures(assembly.meshes() | meshes, frozenset(assembly.made))
+    files = {"assembly.md": instructions_text(scanner, assembly, scenes, plates, config_hash).encode("utf-8")}
+    for number, scene in enumerate(scenes, start=1):
+        torques = [torque_in_words(assembly, joint) for joint, _ in scene.joints]
+        files[picture_name(number)] = pictures.picture(scene, torques)
+    return files
+
+
+def _words(assembly: Assembly, scene: StepScene) -> str:
+    """The words of a step with its screws in their places."""
+    text = scene.step.words
+    for joint, mark in scene.joints:
+        said = f"**{screws_in_words(assembly, joint)}**"
+        text = text.replace(mark, f"{said} {mark}", 1) if mark else f"{text} {said}"
+    return " ".join(re.sub(r"\{.*?\}", "", text).split())

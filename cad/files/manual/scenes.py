@@ -1,0 +1,140 @@
+"""What each step of the assembly shows: what is there already, what comes, which way, and by which screws it is held.
+
+A step works on the scanner as far as it stands, or on the bench, where it puts together what later comes as one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.assembly.assembly import Assembly
+from cad.assembly.steps import steps_of
+from cad.layout.balance.counterweight import Counterweight
+from cad.layout.joints import ALL_SCREWS, Joint, screws
+from cad.layout.names import DECK, LIDAR, LIDAR_BODY
+from cad.parts.part_spec import Step
+from design.arrays import Rotation, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class StepScene:
+    """One step.
+
+    Attributes:
+        thing: part or product that it puts in.
+        step: its words.
+        joints: that it closes, each with the mark in its words where it stands, none where the words have no place.
+        there: bodies that stand already, in alphabetical order.
+        comes: bodies that it brings.
+        against: those of them that come the other way.
+        along: unit vector, rotation frame, from which they come.
+        R_rot_picture: the frame that stands upright on the bench: the lidar's own, or the rotation frame.
+    """
+
+    thing: str
+    step: Step
+    joints: tuple[tuple[Joint, str], ...]
+    there: tuple[str, ...]
+    comes: tuple[str, ...]
+    against: tuple[str, ...]
+    along: Vector
+    R_rot_picture: Rotation
+
+
+def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:
+    """All steps in their order; every joint is in one of them, a last one has what no words name."""
+    steps = steps_of(assembly)
+    stands: set[str] = set()
+    benches: list[set[str]] = []
+    scenes = []
+    for (thing, step), own in zip(steps, _closed(steps, joints), strict=True):
+        ready = _bench_of({thing}, benches)
+        comes = {thing, *step.brings} | ready
+        held = {thing_of(body, assembly) for joint, _ in own for body in (joint.part, joint.onto)} - {DECK}
+        beside = held - comes
+        if beside & stands:
+            comes |= _bench_of(beside, benches)
+            beside -= comes
+        alone = bool(own and stands and not beside and not ready)
+        on_bench = alone or bool(beside - stands)
+        there = (beside | _bench_of(beside, benches)) if on_bench else stands
+        scenes.append(_scene(assembly, thing, step, own, there, comes))
+        benches = [bench for bench in benches if not bench & (there | comes)]
+        if on_bench:
+            benches.append(there | comes)
+        else:
+            stands = stands | comes
+    return scenes
+
+
+def _bench_of(things: set[str], benches: Sequence[set[str]]) -> set[str]:
+    """What hangs together with some things that are on the bench."""
+    return {other for bench in benches if bench & things for other in bench}
+
+
+def thing_of(body: str, assembly: Assembly) -> str:
+    """The part, or the bought product that a body is a piece of."""
+    return assembly.bodies[body].product if body in assembly.bodies else body
+
+
+def _closed(steps: Sequence[tuple[str, Step]], joints: Sequence[Joint]) -> list[tuple[tuple[Joint, str], ...]]:
+    """Of each step the joints whose screws its words name, and the marks."""
+    seat = next((joint.part for joint in joints if joint.onto == LIDAR_BODY), "")
+    left = list(joints)
+    closed = []
+    for thing, step in steps:
+        carrier = seat if thing == LIDAR else thing
+        own = []
+        for joint in list(left):
+            marks = [screws(joint.onto, joint.part)]
+            marks += [screws(joint.onto), ALL_SCREWS] if joint.part == carrier else []
+            place = next((mark for mark in marks if mark in step.words), None)
+            if place is not None:
+                own.append((joint, place))
+                left.remove(joint)
+        closed.append(tuple(own))
+    if left:
+        closed[-1] += tuple((joint, "") for joint in left)
+    return closed
+
+
+def _scene(
+    assembly: Assembly,
+    thing: str,
+    step: Step,
+    own: tuple[tuple[Joint, str], ...],
+    there: set[str],
+    comes: set[str],
+) -> StepScene:
+    if not there and comes - {thing}:  # what is brought to the first of all
+        there, comes = {thing}, comes - {thing}
+    along, R = _way(assembly, thing, there, comes)
+    stand, come = (tuple(sorted(_bodies(things, assembly))) for things in (there, comes))
+    against = tuple(name for name in come if name in assembly.bodies and assembly.bodies[name].from_below)
+    return StepScene(thing, step, own, stand, come, against if thing not in comes else (), along, R)
+
+
+def _bodies(things: set[str], assembly: Assembly) -> Iterator[str]:
+    for name in (*assembly.made, *assembly.bought):
+        if thing_of(name, assembly) in things:
+            yield name
+
+
+def _way(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tuple[Vector, Rotation]:
+    """From where it comes: as the exploded view lifts it, from below where all that stands is above it."""
+    lifted = "lidar" if thing == LIDAR else assembly.parts[thing].lifted if thing in assembly.parts else "axis"
+    R = assembly.layout.stack.R()
+    if lifted == "lidar":
+        return R[:, 2], R
+    bar = assembly.layout.counterweight
+    if lifted == "radius" and isinstance(bar, Counterweight):
+        return np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0]), np.eye(3)
+    order = {name: i for i, name in enumerate(assembly.layout.drive.stacked)}
+    below = [order[name] for name in comes if name in order]
+    above = [order[name] for name in there if name in order]
+    up = -1.0 if below and above and max(below) < min(above) else 1.0
+    return np.array([0.0, 0.0, up]), np.eye(3)

@@ -1,0 +1,97 @@
+"""A parallel view of bodies: which way one looks, which pixel shows what, and how bright it is.
+
+Rays are cast like beams. What a body shows is kept apart from what the others do, so that a picture can lay bodies over
+each other by their distances, or show one through another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from design.arrays import Array, Rotation, Vector
+from design.scene.ray_caster import Scene, cast
+
+DARKEST = 0.35  # of a surface that is seen edge on
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What the pixels show of a body, row after row from the top left.
+
+    Attributes:
+        away_m: from the plane of the view, inf where the body is not, shape (n,).
+        brightness: 0 to 1, shape (n,).
+    """
+
+    away_m: Float[ndarray, " n"]
+    brightness: Float[ndarray, " n"]
+
+
+@dataclass(frozen=True, slots=True)
+class ParallelView:
+    """Where one stands.
+
+    Attributes:
+        axes: rows to the right, up, and back to the viewer.
+        low: middle of the lowest pixel at the left, in right and up [m].
+        away_m: of the plane of the view from the origin, along back: nothing is before it.
+        pixel_m: width of a pixel.
+        size: pixels, columns and rows.
+    """
+
+    axes: Rotation
+    low: Float[ndarray, " 2"]
+    away_m: float
+    pixel_m: float
+    size: tuple[int, int]
+
+    def at(self, points_m: Float[ndarray, "*k 3"]) -> Float[ndarray, "*k 2"]:
+        """Columns and rows of points, from the middle of the pixel at the top left, shape (..., 2)."""
+        x, y = np.moveaxis(points_m @ self.axes[:2].T - self.low, -1, 0) / self.pixel_m
+        return np.stack([x, self.size[1] - 1 - y], axis=-1)
+
+    def shown(self, scene: Scene, moved_m: Vector | None = None) -> Shown:
+        """Cast a body, or one that is moved by some way; only the pixels of its box get a ray."""
+        columns, rows = self.size
+        shift = np.zeros(3) if moved_m is None else moved_m
+        seen = self.at(scene.triangles_m.reshape(-1, 3) + shift)
+        low = np.clip(np.floor(seen.min(axis=0)).astype(int), 0, [columns, rows])
+        high = np.clip(np.ceil(seen.max(axis=0)).astype(int) + 1, low, [columns, rows])
+        x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+        right, up, back = self.axes
+        across = self.low[0] + self.pixel_m * x.reshape(-1, 1)
+        high_m = self.low[1] + self.pixel_m * (rows - 1 - y.reshape(-1, 1))
+        starts = across * right + high_m * up + self.away_m * back - shift
+        hits = cast(scene, starts, np.broadcast_to(-back, starts.shape))
+        away, brightness = np.full((rows, columns), np.inf), np.zeros((rows, columns))
+        away[y, x] = hits.range_m.reshape(x.shape)
+        lit = DARKEST + (1 - DARKEST) * np.nan_to_num(np.cos(hits.incidence_rad))
+        brightness[y, x] = lit.reshape(x.shape)
+        return Shown(away.reshape(-1), brightness.reshape(-1))
+
+
+def view_of(
+    corners_m: Array, size: tuple[int, int], yaw_rad: float, pitch_rad: float, margin: float, R: Rotation | None = None
+) -> ParallelView:
+    """The view that shows all of some points.
+
+    Args:
+        corners_m: the points, shape (n, 3).
+        size: pixels, columns and rows.
+        yaw_rad: of the viewer about z, from x.
+        pitch_rad: of the viewer above the horizontal.
+        margin: width of the picture, as a multiple of what it shows.
+        R: the frame in which z is upright, its axes as columns; the points' own by default.
+    """
+    cy, sy, cp, sp = np.cos(yaw_rad), np.sin(yaw_rad), np.cos(pitch_rad), np.sin(pitch_rad)
+    axes = np.array([[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]])
+    axes = axes if R is None else axes @ R.T
+    seen = corners_m @ axes.T
+    middle, half = (seen.min(axis=0) + seen.max(axis=0)) / 2, np.ptp(seen, axis=0) / 2 * margin
+    pixel = float(2 * max(half[:2] / size))
+    low = middle[:2] - pixel * (np.array(size) - 1) / 2
+    return ParallelView(axes, low, float(middle[2] + 2 * half[2] + 0.1), pixel, size)
