@@ -11,9 +11,11 @@ from cad.drawings.sheet import Sheet, Title, sheet_of
 from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.layout.all_joints import joints_of
 from cad.layout.fits import OnSheet
+from cad.parts.part_spec import Process
 from design.catalogue.products import Printer
 from design.scanner import Scanner
 
+MADE: dict[Process, str] = {"printed": "as printed, sanded or reamed to it", "turned": "turned", "sawn": "drilled"}
 AT_M = 10.0  # distance at which a wrong angle is judged
 
 
@@ -53,16 +55,28 @@ def drawing_of(
         ("material", material or f"{scanner.printer.name}, solid"),
         ("mass", f"{mass_g:.1f} g"),
         ("configuration", config_hash),
-        ("general tolerances", "ISO 2768-m" if spec.metal else "ISO 2768-c"),
+        ("general tolerances", "ISO 2768-mK" if spec.metal else "ISO 2768-cL"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, spec.sheet, [] if spec.metal else [_clearances(scanner.printer)])
+    notes = _notes(scanner, part, spec.sheet, MADE[spec.process], _making(spec.process, scanner.printer, part))
     return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
 def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
     """The number of a made part: configuration and place in the assembly."""
     return f"{config_hash}-{list(assembly.made).index(part) + 1}"
+
+
+def _making(process: Process, printer: Printer, part: Part) -> list[str]:
+    """How faces get their sizes, and what the model holds already."""
+    if process != "printed":
+        threads = ", threads countersunk to their diameter" if part.patterns else ""
+        finish = "Ra 3.2, faces with a fit Ra 0.8" if part.fits else "Ra 3.2"
+        return [f"{finish} (ISO 21920-1). Edges broken 0.2 to 0.4 x 45°{threads}."]
+    return [
+        _clearances(printer),
+        "Printed in the pose of its print file. Screw holes drilled to size where they are tight; all else as printed.",
+    ]
 
 
 def _clearances(printer: Printer) -> str:
@@ -73,7 +87,7 @@ def _clearances(printer: Printer) -> str:
     )
 
 
-def _notes(scanner: Scanner, part: Part, said: OnSheet, making: list[str]) -> list[str]:
+def _notes(scanner: Scanner, part: Part, said: OnSheet, how: str, making: list[str]) -> list[str]:
     angles = scanner.angles.angles_deg
     box = part.solid.BoundingBox()
     axis, zero = "rotation axis", "Z 0 is"
@@ -84,7 +98,7 @@ def _notes(scanner: Scanner, part: Part, said: OnSheet, making: list[str]) -> li
         f"{zero} {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
         f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
         *said.notes,
-        *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}." for fit in part.fits),
+        *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}, {how}." for fit in part.fits),
         *making,
     ]
     inclined = [p for p in part.patterns if len(p.holes) >= 3 and abs(p.direction[2]) < 1 - 1e-6]

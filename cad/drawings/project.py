@@ -53,7 +53,7 @@ class Chain:
 Curve = Arc | Chain
 
 
-def project(solid: cq.Solid, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
+def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
     """The lines of a solid in the plane of a view, in a fixed order.
 
     Args:

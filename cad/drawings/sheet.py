@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ezdxf.document import Drawing
+from reportlab.lib.utils import simpleSplit
 
 from cad.drawings.part import Part
-from cad.drawings.pen import GLYPH_WIDTH, Pen, Point, document_at
+from cad.drawings.pen import CAPITAL, GLYPH_WIDTH, Pen, Point, document_at
 from cad.drawings.sizes import draw, sizes_of
 from cad.drawings.views import views_of
 
@@ -18,6 +19,7 @@ A3, A2 = (420.0, 297.0), (594.0, 420.0)
 LEFT, EDGE = 20.0, 10.0  # margins of the frame (ISO 5457)
 STRIP = 46.0  # height of notes and title block
 BLOCK = 180.0  # width of the title block
+NOTE, LINE = 2.2, 4.2  # height of a note, and from one to the next where there is room
 SCALES = ((5.0, A3), (2.0, A3), (1.0, A3), (1.0, A2), (0.5, A3), (0.5, A2), (0.2, A2), (0.1, A2))
 PAD = 8.0  # between views
 
@@ -103,8 +105,11 @@ def _frame(pen: Pen, title: Title, ratio: str, size: Size) -> None:
     """Frame, notes, and the title block: rows of three cells, the last one with scale and symbol of projection."""
     bottom, right, top = EDGE, size[0] - EDGE, size[1] - EDGE
     pen.stroke("FRAME", ((LEFT, bottom), (right, bottom), (right, top), (LEFT, top), (LEFT, bottom)))
-    for i, line in enumerate(title.notes):
-        pen.text((LEFT + 4.0, EDGE + STRIP - 5.0 - 4.2 * i), line, height=2.2)
+    wide = right - BLOCK - LEFT - 12.0
+    lines = [line for note in title.notes for line in simpleSplit(note, "Helvetica", NOTE / CAPITAL, wide)]
+    step = min(LINE, (STRIP - 8.0) / max(1, len(lines) - 1))
+    for i, line in enumerate(lines):
+        pen.text((LEFT + 4.0, EDGE + STRIP - 5.0 - step * i), line, height=NOTE)
     left = right - BLOCK
     rows = -(-(len(title.cells) + 1) // 3)
     height, width = STRIP / rows, BLOCK / 3

@@ -17,6 +17,8 @@ from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
 NEARLY = 0.2  # an extent that differs less from a radius is that radius, notched
 OVER = 3.0  # of a centre line beyond the part
+MARK = 4.0  # length of the thick ends of a cut
+LETTER = 5.0  # room for the letter beside them
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ def sizes_of(view: View, part: Part) -> Sizes:
     measure = Pen(None, 1.0)
     _outline(measure, view)
     sizes = Sizes(measure.box(), {}, {}, [], [], [])
-    if view.kind not in ("iso", "angle"):
+    if view.kind not in ("iso", "angle", "section"):
         _holes(sizes, view, part)
         if view.kind == "front":
             _cylinders(sizes, part)
@@ -63,6 +65,8 @@ def draw(pen: Pen, view: View, sizes: Sizes, part: Part) -> None:
     pen.reached.extend(((left, low), (right, high)))
     if pen.space is not None:
         _outline(pen, view)
+        for line in view.hatching:
+            pen.stroke("DIMENSION", [pen.paper(point) for point in line])
     if view.kind != "iso":
         _centre_lines(pen, view, part, (left, low, right, high))
     for middle, radius in sizes.circles:
@@ -71,8 +75,9 @@ def draw(pen: Pen, view: View, sizes: Sizes, part: Part) -> None:
         centre_mark(pen, pen.paper(middle), radius * pen.scale)
     sign = -1.0 if view.kind == "left" else 1.0  # it looks along the axis that points to the left
     ordinates(pen, sizes.below, low, below=True, sign=sign)
-    ordinates(pen, sizes.beside, left, below=False)
-    callouts_right(pen, sizes.callouts, right)
+    aside = OVER + MARK + LETTER if view.kind == "top" and part.fits else 0.0  # beside the marks of the cut
+    ordinates(pen, sizes.beside, left - aside, below=False)
+    callouts_right(pen, sizes.callouts, right + aside)
     told = [p for p in part.patterns if len(p.holes) >= 3 and shows_angle(view, p)]
     if told and view.kind in ("front", "left", "angle"):
         _angle(pen, view, told[0], part, high + OVER)
@@ -103,8 +108,20 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
                 pen.text((x - 3.0, y + 1.0), "OPTICAL CENTRE", anchor="right")
         pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, top)))
     elif parallel(view.towards, Z):
+        if view.kind == "top" and part.fits:
+            _cut_marks(pen, left - OVER, right + OVER)
         pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, high + OVER)))
         pen.stroke("CENTRE", ((left - OVER, 0.0), (right + OVER, 0.0)))
+
+
+def _cut_marks(pen: Pen, left: float, right: float) -> None:
+    """Where the section is cut: thick ends, arrows along which one looks, and its letter."""
+    for x, out in ((left, -1.0), (right, 1.0)):
+        end = x + out * MARK
+        pen.stroke("FRAME", ((x, 0.0), (end, 0.0)))
+        pen.stroke("DIMENSION", ((end, -2 * MARK), (end, 0.0)))
+        pen.head((end, 0.0), 0.5 * math.pi)
+        pen.text((end + out * 1.5, -2 * MARK), "S", height=3.5, anchor="left" if out > 0 else "right")
 
 
 def _holes(sizes: Sizes, view: View, part: Part) -> None:

@@ -1,7 +1,8 @@
 """Which views a part needs.
 
-Three views along the rotation frame's axes and an isometric; a view onto every pattern of three holes or more that is
-inclined to all of them; and, where no view shows the angle of such a pattern to the axis in true size, one that does.
+Three views along the rotation frame's axes and an isometric; of a part with a fit a section along its axis; a view onto
+every pattern of three holes or more that is inclined to all of them; and, where no view shows the angle of such a
+pattern to the axis in true size, one that does.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_acro
 from cad.drawings.patterns import Pattern, along_pattern, number
 from cad.drawings.pen import Point
 from cad.drawings.project import Curve, project
+from cad.drawings.section import Line, cut_along_axis, hatching
 from design.arrays import Array
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -30,7 +32,8 @@ class View:
         up: unit vector upwards.
         origin: point whose projection is 0 of the ordinates.
         curves: lines of the part, model mm.
-        kind: front and top carry ordinates of planes too, angle and iso none.
+        kind: front and top carry ordinates of planes too, angle, section and iso none.
+        hatching: lines over what is cut.
     """
 
     title: str
@@ -39,6 +42,7 @@ class View:
     origin: Array
     curves: list[Curve]
     kind: str
+    hatching: tuple[Line, ...] = ()
 
     @property
     def towards(self) -> Array:
@@ -71,6 +75,11 @@ def views_of(part: Part) -> list[View]:
     corner = (along - away + Z) / math.sqrt(3)
     right = (along + away) / math.sqrt(2)
     views.append(_view(part, "", right, np.cross(corner, right), base, "iso"))
+    if part.fits:
+        cut = cut_along_axis(part.solid, along, Z)
+        curves = project(cut, along, Z, base, hidden=False)
+        lines = tuple(hatching(cut, along, Z, base))
+        views.append(View("S-S  (along the axis)", along, Z, base, curves, "section", lines))
     letters = iter("ABCDEF")
     for pattern in inclined:
         if not any(parallel(pattern.direction, view.towards) for view in views):

@@ -32,7 +32,7 @@ ON_CASE = (
     "servo.horn_diameter_mm",
     "servo.horn_thickness_mm",
 )
-TURNED_FROM = "aluminium or steel"
+TURNED_FROM = "aluminium EN AW-6082-T6"
 
 
 @dataclass(frozen=True, slots=True)

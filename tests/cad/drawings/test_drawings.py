@@ -19,6 +19,7 @@ from cad.drawings.dimensions import spread
 from cad.drawings.patterns import number, patterns_of
 from cad.drawings.pen import DIAMETER, TURN, Pen, document_at
 from cad.drawings.project import Arc, project
+from cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from cad.drawings.sheet import A2, A3, Sheet
 from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import rounds_of
@@ -230,6 +231,32 @@ def test_a_block_with_a_blind_hole_seen_from_three_sides():
     np.testing.assert_allclose(ends, [(4, 4), (4, 10), (4, 10)], atol=0.01)
     seen, hidden = drawn(solid, X, -Y)  # from below
     assert len(seen) == 4 and len([curve for curve in hidden if isinstance(curve, Arc)]) == 1
+
+
+def test_a_section_is_hatched_where_material_is_cut_and_nowhere_else():
+    tube = upright(20.0, 0, 60).cut(upright(8.0, 10, 70)).Solids()[0]
+    cut = cut_along_axis(tube, X, Z)
+    assert cut.Volume() == pytest.approx(tube.Volume() / 2)
+    assert cut.Center().y > 0  # one looks along +Y: what is before the axis is gone
+    lines = np.array(hatching(cut, X, Z, np.zeros(3)))
+    lengths = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+    area = 40 * 60 - 16 * 50
+    assert (lengths * HATCH_MM).sum() == pytest.approx(area, rel=0.02)
+    across, high = np.abs(lines[..., 0]), lines[..., 1]
+    assert (across <= 20.001).all() and (high >= -0.001).all() and (high <= 60.001).all()
+    middles = lines.mean(axis=1)
+    assert not ((np.abs(middles[:, 0]) < 8) & (middles[:, 1] > 10)).any()  # the bore is empty
+    assert lines.tolist() == np.array(hatching(cut_along_axis(tube, X, Z), X, Z, np.zeros(3))).tolist()
+
+
+def test_what_has_a_fit_has_a_section_its_finish_and_one_material(sheets):
+    for name in ("servo_shaft", "journal_sleeve"):
+        said = sheets[name].said
+        assert any(text.startswith("S-S") for text in said) and said.count("S") == 2
+        assert "ISO 2768-mK" in said and any(text.startswith("Ra 3.2, faces with a fit Ra 0.8") for text in said)
+        assert not any(" or " in text for text in said if text.startswith("aluminium"))
+    assert any("as printed, sanded or reamed" in text for text in sheets["bearing_cage"].said)
+    assert not any(text.startswith("S-S") for text in sheets["base_mount"].said)
 
 
 def test_what_lies_exactly_behind_is_drawn_once():
