@@ -8,6 +8,7 @@ from cad.layout.direct.cage import FOOT_RADIUS, plate_half_x
 from cad.layout.direct.stack import DirectStack
 from cad.layout.names import SLIP_RING_ADAPTER
 from cad.screws import SCREWS, Screw, passing_hole
+from design.catalogue.products import Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 
@@ -35,23 +36,36 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
     servo = scanner.servo
     screw = SCREWS[servo.case_screw]
     hole = passing_hole(screw, scanner.printer)
-    opening = stack.flange_radius + 1.5
-    behind = sorted({y for _, y in servo.case_holes_mm if y < -opening + 2.0 - FOOT_RADIUS}, reverse=True)
-    rows = [sorted(h for h in servo.case_holes_mm if h[1] == y) for y in behind]
-    widest = max((row[-1][0] for row in rows), default=0.0)
-    rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
-    if len(rows) < 2:
+    holes = fork_holes(servo, stack)
+    if not holes:
         raise BuildError(
             f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two "
-            f"pairs of front holes at y < {-opening + 2.0 - FOOT_RADIUS:g}, behind the turning flange"
+            f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
         )
     return SlipRingAdapter(
         stack=stack,
         front=stack.horn + servo.case_max_mm[2],
         ears=stack.horn + servo.case_holes_z_mm,
-        opening=opening,
+        opening=_opening(stack),
         half_x=plate_half_x(servo, screw),
         screw=screw,
         hole=hole,
-        holes=(*rows[0], *rows[-1]),
+        holes=holes,
     )
+
+
+def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:
+    """The nearest and the furthest pair of front holes behind the turning flange; none where there are no two pairs."""
+    behind = sorted({y for _, y in servo.case_holes_mm if y < _behind(stack)}, reverse=True)
+    rows = [sorted(hole for hole in servo.case_holes_mm if hole[1] == y) for y in behind]
+    widest = max((row[-1][0] for row in rows), default=0.0)
+    rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
+    return (*rows[0], *rows[-1]) if len(rows) > 1 else ()
+
+
+def _opening(stack: DirectStack) -> float:
+    return stack.flange_radius + 1.5
+
+
+def _behind(stack: DirectStack) -> float:
+    return 2.0 - FOOT_RADIUS - _opening(stack)

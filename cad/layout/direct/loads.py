@@ -71,21 +71,17 @@ class Supported:
 
 
 def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
-    """The bearing that this scanner needs: the smallest that fits, where the horn is not rated for the rotor.
-
-    Whether one is needed is decided on the heaviest linkage that any angles give, so that a scanner without a bearing
-    is safe. A horn that its maker does not rate is trusted with little. None as well where nothing in the catalogue
-    fits.
-    """
-    if horn_bears(scanner, stack):
-        return None
+    """The smallest bearing that fits around shaft and wires and under the hub; None where the catalogue has none."""
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * WIRE_DEPTH)
     most = 2 * (stack.hub_radius - HUB_STEP)
     return next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
 
 
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
-    """Whether the horn alone bears the heaviest linkage."""
+    """Whether the horn alone bears the heaviest linkage that any angles give: without a bearing a scanner is safe.
+
+    A horn that its maker does not rate is trusted with little.
+    """
     return _is_rated(scanner, heaviest(scanner, stack).moment_nm)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cad.layout.direct.loads import bearing_for
+from cad.layout.direct.adapter import fork_holes
+from cad.layout.direct.loads import bearing_for, horn_bears
 from cad.layout.direct.misalignment import with_waist
 from cad.layout.direct.stack import DirectStack
 from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
@@ -46,12 +47,17 @@ def direct_stack(scanner: Scanner) -> DirectStack:
         bearing=None,
         sub_plate=None,
     )
-    bearing = bearing_for(scanner, alone)
+    bearing = bearing_for(scanner, alone) if _needs_bearing(scanner, alone) else None
     stack = replace(alone, bearing=bearing)
     if covered_screws(scanner.lidar, stack):
         axis = leaning_least(R)
         stack = replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
     return stack if bearing is None else with_waist(scanner, stack)
+
+
+def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:
+    """Where the horn is not rated for the rotor, or where only the base of a bearing's cage finds holes for a ring."""
+    return not horn_bears(scanner, stack) or (scanner.slip_ring is not None and not fork_holes(scanner.servo, stack))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

@@ -297,10 +297,13 @@ def test_a_cage_of_thicker_wall_is_stiffer():
 
 
 @pytest.mark.parametrize("servo", ["XM430-W350", "MX-28"])
-def test_under_a_cage_the_adapter_asks_for_no_holes_of_a_fork(servo):
-    """Their ears leave a fork no two pairs behind the flange; the base of a cage stands on others."""
-    layout = layout_of(scanner_for(0, 55, 30, -50, servo=servo))
+@pytest.mark.parametrize("beta_rot", [55, 0])
+def test_where_a_fork_finds_no_holes_the_base_of_a_cage_does(servo, beta_rot):
+    """Their ears leave a fork no two pairs behind the flange: even an upright axis gets a bearing, and is built."""
+    scanner = scanner_for(0, beta_rot, 30, -50, servo=servo, lidar="UST-10LX")
+    layout = layout_of(scanner)
+    assert layout.stack.bearing is not None
     (adapter,) = [part for part in parts_of(layout) if part.name == "slip_ring_adapter"]
     assert checked_mesh(adapter.make(), adapter.name).is_closed()
     with pytest.raises(BuildError, match=r"slip_ring_adapter: fork: case_holes_mm"):
-        parts_of(layout_of(scanner_for(0, 0, 30, -50, servo=servo)))
+        parts_of(layout_of(replace(scanner, bearings=())))

@@ -53,7 +53,7 @@ def test_what_was_asked_for_stands_in_the_file(command, here):
     ground, ceiling = task.weight
     assert isinstance(ground, GroundRegion) and isinstance(ceiling, CeilingRegion)
     assert (ground.from_m, ground.to_m, ground.height_m, ceiling.ceiling_m) == (0.5, 5, 0.4, 2.5)
-    assert (task.sensor, task.servo, task.slip_ring) == ("UST-10LX", "XM430-W350", "SRC022A-6")
+    assert (task.sensor, task.servo, task.slip_ring) == ("UST-10LX", "XM430-W350", "UH1256-02-0610-06S")
     again = next(line for line in text.splitlines() if line.startswith("# Made by: ")).removeprefix("# Made by: ")
     (here / "FILE.toml").unlink()
     assert command(*shlex.split(again)[1:])[0] == 0
