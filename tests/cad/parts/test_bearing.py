@@ -275,10 +275,10 @@ def test_the_waist_is_as_short_as_a_stalled_servo_allows_and_as_thick_as_the_hor
     bears = scanner.servo.radial_load_n * 0.010 / 2
     thicker = replace(stack, waist_diameter=stack.waist_diameter + 0.1)
     worst = [max(worst_moment_nm(scanner, one, heaviest(scanner, stack)).values()) for one in (stack, thicker)]
-    assert worst[0] <= 0.95 * bears < worst[1]
+    assert worst[0] <= 0.92 * bears < worst[1]
     assert stack.waist_length == length
     in_steel = 0.577 * 900 * np.pi / 16 * (0.76 * stack.waist_diameter) ** 3 / 1000
-    assert stall_nm < 0.95 * in_steel
+    assert stall_nm <= in_steel
     assert (STEEL.waist**4 * STEEL.modulus_pa) == pytest.approx(ALUMINIUM.modulus_pa, rel=0.03)
 
 
