@@ -48,6 +48,8 @@ FILES = {
     *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
     *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
     *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part != "servo_shaft"),
+    *(f"print/plate_1.{kind}" for kind in ("3mf", "png")),
+    *(f"assembly/step_{number:02d}.png" for number in range(1, 7)),
 }
 
 
