@@ -19,6 +19,7 @@ A3, A2 = (420.0, 297.0), (594.0, 420.0)
 LEFT, EDGE = 20.0, 10.0  # margins of the frame (ISO 5457)
 STRIP = 46.0  # height of notes and title block
 BLOCK = 180.0  # width of the title block
+NARROWER = 0.83  # than Helvetica: what a browser without it shows in its stead (DejaVu Sans) is that much wider
 NOTE, LINE = 2.2, 4.2  # height of a note, and from one to the next where there is room
 SCALES = ((5.0, A3), (2.0, A3), (1.0, A3), (1.0, A2), (0.5, A3), (0.5, A2), (0.2, A2), (0.1, A2))
 PAD = 8.0  # between views
@@ -106,7 +107,7 @@ def _frame(pen: Pen, title: Title, ratio: str, size: Size) -> None:
     bottom, right, top = EDGE, size[0] - EDGE, size[1] - EDGE
     pen.stroke("FRAME", ((LEFT, bottom), (right, bottom), (right, top), (LEFT, top), (LEFT, bottom)))
     wide = right - BLOCK - LEFT - 12.0
-    lines = [line for note in title.notes for line in simpleSplit(note, "Helvetica", NOTE / CAPITAL, wide)]
+    lines = [line for note in title.notes for line in simpleSplit(note, "Helvetica", NOTE / CAPITAL, NARROWER * wide)]
     step = min(LINE, (STRIP - 8.0) / max(1, len(lines) - 1))
     for i, line in enumerate(lines):
         pen.text((LEFT + 4.0, EDGE + STRIP - 5.0 - step * i), line, height=NOTE)
