@@ -41,11 +41,11 @@ def nearest_to_ray(
 
 
 class Ruler:
-    """Button, clicks, line and words. `points` gives what is shown."""
+    """Button, clicks, line and words. `points` gives what is shown; `ends` are the one or two that were clicked."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], Sequence[Float32s]]) -> None:
         self._scene, self._points = server.scene, points
-        self._ends: list[Vector] = []
+        self.ends: list[Vector] = []
         self.on = server.gui.add_checkbox("measure", initial_value=False, hint="Click two points of the cloud")
         self.said = ""
         self.on.on_update(lambda _: self._arm())
@@ -55,13 +55,13 @@ class Ruler:
         end = nearest_to_ray(self._points(), np.asarray(origin_m, float), np.asarray(direction, float))
         if end is None:
             return
-        self._ends = [*self._ends, end] if len(self._ends) == 1 else [end]
+        self.ends = [*self.ends, end] if len(self.ends) == 1 else [end]
         self._draw()
 
     def _arm(self) -> None:
         self._scene.remove_click_callback()
         if not self.on.value:
-            self._ends = []
+            self.ends = []
             self._draw()
             return
 
@@ -73,13 +73,13 @@ class Ruler:
         self.said = ""
         for name in ("/ruler/ends", "/ruler/line", "/ruler/length"):
             self._scene.remove_by_name(name)
-        if self._ends:
-            ends = np.array(self._ends, np.float32)
+        if self.ends:
+            ends = np.array(self.ends, np.float32)
             self._scene.add_point_cloud(
                 "/ruler/ends", ends, COLOUR, point_size=0.04, point_shape="circle", precision="float32"
             )
-        if len(self._ends) == 2:
-            first, last = self._ends
+        if len(self.ends) == 2:
+            first, last = self.ends
             self.said = f"{np.linalg.norm(last - first):.3f} m"
             self._scene.add_line_segments(
                 "/ruler/line", ends[None], colors=COLOUR, thickness=3.0, thickness_units="screen"

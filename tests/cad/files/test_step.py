@@ -43,7 +43,10 @@ def test_another_process_writes_the_same_bytes(made, tmp_path):
         len(parts) >= 4 and {"assembly.step", "scanner.urdf", "bom.csv", "assembly.md", "assembly.glb"} <= files.keys()
     )
     metal = {"parts/servo_shaft", "parts/journal_sleeve", "parts/counterweight"}
-    assert len(files) == 5 * len(parts) + len(parts - metal) + 9  # STEP, STL, three drawings; print files
+    manual = {name for name in files if name.startswith(("assembly/step_", "print/plate_"))}
+    assert len(manual) > 5 and {"assembly/step_01.png", "print/plate_1.3mf", "print/plate_1.png"} <= manual
+    # STEP, STL, three drawings; print files
+    assert len(files) == 5 * len(parts) + len(parts - metal) + len(manual) + 9
     assert [name for name, path in files.items() if path.read_bytes() != (made.folder / name).read_bytes()] == []
 
 

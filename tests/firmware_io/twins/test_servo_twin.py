@@ -382,7 +382,7 @@ def test_the_dead_sector_is_marked_and_never_guessed():
         slack = slack_rad(servo, state)
         within = abs(math.remainder(truth, 2 * math.pi))
         if math.isnan(state.position_rad):
-            assert within > dead_rad - 2 * slack
+            assert within > dead_rad - 4 * slack  # two readings and what the twin itself is late
             seen.add("dead")
         else:
             assert within < dead_rad + slack
