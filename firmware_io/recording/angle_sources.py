@@ -1,13 +1,16 @@
-"""Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table."""
+"""Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table.
+
+And what speaks against the unit that it is said to have.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -19,6 +22,9 @@ from design.errors import RecordingError, suggest
 from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.bags import Source, number_at
+from firmware_io.samples import JointLog
+
+AngleUnit = Literal["deg", "rad"]
 
 TF = "tf2_msgs/msg/TFMessage"
 SECONDS, NANOSECONDS = ("time_s", "time", "t"), ("time_ns",)
@@ -26,6 +32,10 @@ ANGLES = ("angle", "angle_deg", "angle_rad", "position", "position_rad")
 ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning about one
 MOST_ANGLE, MOST_NS = 1e9, 2**63 - 1  # years of turns; what an int64 holds
 STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
+WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
+FASTEST_RPM = 120.0
+SWEEP_RAD = 4 * math.pi
+LEAST_RAD = math.radians(7.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +143,46 @@ def read_table(text: str) -> tuple[Times, Floats]:
     if not values:
         raise RecordingError(f"{path}: no line with an angle")
     return np.array(time_ns, np.int64), np.array(values, float)
+
+
+def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
+    """What speaks for the other unit: where angles wrap, how fast the axis would turn, how far; whole numbers.
+
+    Args:
+        time_ns: of the angles.
+        angle: in their unit, as they were told, shape (n,).
+        log: the same, unwrapped.
+        angle_unit: that they are said to have.
+    """
+    yield from _unlikely_motion(time_ns, angle, log, angle_unit)
+    if np.any(angle != np.round(angle)):
+        return
+    if angle_unit == "rad":
+        yield "every angle is a whole number of radians: is the unit deg?"
+    else:
+        yield (
+            "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
+            "to 9 mm per metre of range, the way from command to motion comes on top"
+        )
+
+
+def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
+    step = np.abs(np.diff(angle[np.argsort(time_ns, kind="stable")]))
+    usual = float(np.median(step)) if step.size else 0.0
+    wraps = step[step > max(WRAP * usual, WRAP_LEAST)]
+    other, turn = ("deg", 360.0) if angle_unit == "rad" else ("rad", 2 * math.pi)
+    if wraps.size and abs((float(np.median(wraps)) + usual) / turn - 1) < WRAP_ERROR:
+        yield f"angles jump by {np.median(wraps):.4g}, a whole turn in {other}: is the unit {other}?"
+        return
+    moved_rad, seconds = np.abs(np.diff(log.position_rad)), np.diff(log.time_ns) / 1e9
+    travel_rad, span_rad = float(moved_rad.sum()), float(np.ptp(log.position_rad))
+    fastest_rpm = float(np.median(moved_rad / seconds)) / (2 * math.pi) * 60 if seconds.size else 0.0
+    if angle_unit == "rad" and fastest_rpm > FASTEST_RPM:
+        yield f"the axis turns at {fastest_rpm:.0f} rpm, faster than any servo: is the unit deg?"
+    elif angle_unit == "rad" and span_rad > SWEEP_RAD and travel_rad > 1.5 * span_rad:
+        yield f"the axis goes to and fro over {span_rad / (2 * math.pi):.1f} turns: is the unit deg?"
+    elif angle_unit == "deg" and 0 < span_rad < LEAST_RAD:
+        yield f"the axis moves over {math.degrees(span_rad):.2g} deg only: is the unit rad?"
 
 
 def _nanoseconds(text: str, scale: int) -> int:

@@ -7,7 +7,7 @@ sensor's clock is the host's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from firmware_io.samples import JointLog
 _SAME_CLOCK_NS = (
     1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock
 )
+_LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,3 +108,11 @@ def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
 
 def _overlap(a_ns: Times, b_ns: Times) -> bool:
     return bool(max(a_ns.min(), b_ns.min()) <= min(a_ns.max(), b_ns.max()))
+
+
+def gap_warnings(log: JointLog) -> Iterator[str]:
+    """What a person must know of the times between two angles."""
+    gaps_s = np.diff(log.time_ns) / 1e9
+    if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
+        usual = f"usually {np.median(gaps_s):.3f} s"
+        yield f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across"

@@ -8,6 +8,7 @@ types that come with ROS 2 can be read.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -174,6 +175,17 @@ def laser_scan_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
         hint = f"; did you mean '{scans[0]}'?" if scans else ""
         raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a LaserScan{hint}")
     return value, stamp_ns
+
+
+def scan_fault(laser_scan: Any) -> str:
+    """Why a LaserScan cannot be used, or ""."""
+    if not len(laser_scan.ranges):
+        return "empty_scan"
+    if not (math.isfinite(laser_scan.angle_min) and math.isfinite(laser_scan.angle_increment)):
+        return "scan_without_bearings"
+    if not 0 <= laser_scan.time_increment < 1:
+        return "scan_with_impossible_time_increment"
+    return ""
 
 
 def number_at(body: Any, source: Source, bag: Path) -> tuple[float, int]:

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,25 +20,20 @@ from design.arrays import Floats, Times
 from design.errors import RecordingError
 from firmware_io.recording import ros_messages
 from firmware_io.recording.angle_sources import (
+    AngleUnit,
     FrameSource,
     angles_in,
     is_table,
     parse_frames,
     read_table,
     turned_rad,
+    unit_doubts,
 )
-from firmware_io.recording.bag_clocks import OneClock, Stamps, held_log, one_clock, times, unwrapped_log
-from firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source
+from firmware_io.recording.bag_clocks import OneClock, Stamps, gap_warnings, held_log, one_clock, times, unwrapped_log
+from firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from firmware_io.recording.metadata import held_by, note_in
 from firmware_io.recording.recording import BEAMS_TOPIC, JOINT_TOPIC, SCAN_TOPIC, MessageWriter, RecordingWriter
 from firmware_io.samples import JointLog
-
-AngleUnit = Literal["deg", "rad"]
-_WRAP, _WRAP_LEAST, _WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
-_FASTEST_RPM = 120.0
-_SWEEP_RAD = 4 * math.pi
-_LEAST_RAD = math.radians(7.0)
-_LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +140,8 @@ def import_bag(
         doubled = clock.angle_ns.size - log.time_ns.size
         left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
         warnings = [said for said in (clock.said, survey.angle_said) if said]
-        warnings += [*_unit_warnings(clock.angle_ns, survey.angle, log, angle_unit)]
-        warnings += [*_angle_warnings(survey, angle_unit), *_scan_warnings(survey, clock)]
+        warnings += unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
+        warnings += _scan_warnings(survey, clock)
         if also and clock.said:
             warnings.append(f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times")
         if not in_time.all():
@@ -159,7 +154,7 @@ def import_bag(
                 warnings.append(f"{cut} scans end after the next one begins: their last beams take its angle")
         still = hold or held_by(note_in(opened))
         if not still:
-            warnings += _gap_warnings(log)
+            warnings += gap_warnings(log)
         note = {
             "schema": "scanwright/recording/1",
             "source": bag.name,
@@ -196,7 +191,7 @@ def _survey(
         scan_stamp_ns = 0
         if message.topic == scan_source.topic:
             laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path)
-            fault = _fault(laser_scan)
+            fault = scan_fault(laser_scan)
             if fault:
                 left_out[fault] += 1
             else:
@@ -232,59 +227,9 @@ def _survey(
     )
 
 
-def _fault(laser_scan: Any) -> str:
-    """Why a scan cannot be used, or ""."""
-    if not len(laser_scan.ranges):
-        return "empty_scan"
-    if not (math.isfinite(laser_scan.angle_min) and math.isfinite(laser_scan.angle_increment)):
-        return "scan_without_bearings"
-    if not 0 <= laser_scan.time_increment < 1:
-        return "scan_with_impossible_time_increment"
-    return ""
-
-
 def _endless(laser_scan: Any) -> bool:
     """Whether the longest range is not told: some drivers leave it 0."""
     return not laser_scan.range_max > laser_scan.range_min
-
-
-def _angle_warnings(survey: _Survey, angle_unit: AngleUnit) -> Iterator[str]:
-    if np.any(survey.angle != np.round(survey.angle)):
-        return
-    if angle_unit == "rad":
-        yield "every angle is a whole number of radians: is the unit deg?"
-    else:
-        yield (
-            "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
-            "to 9 mm per metre of range, the way from command to motion comes on top"
-        )
-
-
-def _unit_warnings(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
-    """What speaks for the other unit: where angles wrap, how fast the axis would turn, how far."""
-    step = np.abs(np.diff(angle[np.argsort(time_ns, kind="stable")]))
-    usual = float(np.median(step)) if step.size else 0.0
-    wraps = step[step > max(_WRAP * usual, _WRAP_LEAST)]
-    other, turn = ("deg", 360.0) if angle_unit == "rad" else ("rad", 2 * math.pi)
-    if wraps.size and abs((float(np.median(wraps)) + usual) / turn - 1) < _WRAP_ERROR:
-        yield f"angles jump by {np.median(wraps):.4g}, a whole turn in {other}: is the unit {other}?"
-        return
-    moved_rad, seconds = np.abs(np.diff(log.position_rad)), np.diff(log.time_ns) / 1e9
-    travel_rad, span_rad = float(moved_rad.sum()), float(np.ptp(log.position_rad))
-    fastest_rpm = float(np.median(moved_rad / seconds)) / (2 * math.pi) * 60 if seconds.size else 0.0
-    if angle_unit == "rad" and fastest_rpm > _FASTEST_RPM:
-        yield f"the axis turns at {fastest_rpm:.0f} rpm, faster than any servo: is the unit deg?"
-    elif angle_unit == "rad" and span_rad > _SWEEP_RAD and travel_rad > 1.5 * span_rad:
-        yield f"the axis goes to and fro over {span_rad / (2 * math.pi):.1f} turns: is the unit deg?"
-    elif angle_unit == "deg" and 0 < span_rad < _LEAST_RAD:
-        yield f"the axis moves over {math.degrees(span_rad):.2g} deg only: is the unit rad?"
-
-
-def _gap_warnings(log: JointLog) -> Iterator[str]:
-    gaps_s = np.diff(log.time_ns) / 1e9
-    if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
-        usual = f"usually {np.median(gaps_s):.3f} s"
-        yield f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across"
 
 
 def _scan_warnings(survey: _Survey, clock: OneClock) -> Iterator[str]:
@@ -333,7 +278,7 @@ def _write(
                 beams[stamp_ns] = beams_of_one
         elif message.topic == source.topic:
             laser_scan, stamp_ns = laser_scan_at(message.body, source, bag.path)
-            if not _fault(laser_scan):
+            if not scan_fault(laser_scan):
                 waiting.append((laser_scan, stamp_ns))
         while waiting and (not own or len(waiting) > 1 or waiting[0][1] in beams):
             laser_scan, stamp_ns = waiting.pop(0)

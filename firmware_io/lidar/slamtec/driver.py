@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
@@ -20,6 +20,7 @@ from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.sensor_line import SensorLine, until_back
 from firmware_io.lidar.slamtec import protocol
 from firmware_io.lidar.slamtec.point_count import PointCount
+from firmware_io.lidar.slamtec.series import SERIES
 from firmware_io.lidar.turn import TurnQueue, timed_scan
 
 _ANSWER_S = 0.5
@@ -31,26 +32,6 @@ _PWM = 660  # the SDK's default
 _RPM = 600
 
 Told = TypeVar("Told")
-
-
-@dataclass(frozen=True, slots=True)
-class _Series:
-    """What tells one series from another: the catalogue's name, the line's speed, and what starts the motor."""
-
-    model: str
-    baud: int
-    motor: Literal["dtr", "pwm", "rpm", "scan"]
-
-
-# by the higher half of the model's byte; that of the C1 is one user's word
-_SERIES = {
-    1: _Series("RPLIDAR A1", 115_200, "dtr"),
-    2: _Series("RPLIDAR A2", 256_000, "pwm"),
-    3: _Series("RPLIDAR A3", 256_000, "pwm"),
-    4: _Series("RPLIDAR C1", 460_800, "scan"),
-    6: _Series("RPLIDAR S1", 256_000, "rpm"),
-    7: _Series("RPLIDAR S2", 1_000_000, "rpm"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +172,7 @@ class SlamtecLidar:
 
     def _recognise(self, model: str | None) -> None:
         """Stop what it does, and hear who it is; the line is closed where no one answers."""
-        wanted = [series for series in _SERIES.values() if model in (None, series.model)]
+        wanted = [series for series in SERIES.values() if model in (None, series.model)]
         with self._line.closed_on_error():
             for baud in dict.fromkeys(series.baud for series in wanted):
                 if self._line.serial is not None:
@@ -207,7 +188,7 @@ class SlamtecLidar:
             raise DeviceTimeoutError(f"{self.address}: no RPLIDAR answers; check power, cable and port")
 
     def _accept(self, told: protocol.Info, model: str | None) -> None:
-        found = _SERIES.get(told.model >> 4)
+        found = SERIES.get(told.model >> 4)
         if found is None or model not in (None, found.model):
             other = f"a model {told.model:#04x} of Slamtec's" if found is None else f"a {found.model}"
             raise DeviceError(f"{self._line.name}: this is {other}, not a {model}")
