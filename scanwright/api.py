@@ -125,7 +125,7 @@ def evaluate(
 
 
 def compare(task: TaskLike, *, say: Say = _quiet) -> tuple[Optimum, list[ComparisonRow]]:
-    """Put the optimum of a task beside the usual mounts and ready-made scanners.
+    """Put the optimum of a task beside the usual mounts, the scanner for little money, and ready-made ones.
 
     Raises:
         TaskError: as for `optimise`.

@@ -7,6 +7,10 @@ Rotating candidates have the lidar, the servo and the period of the task, whatev
   an MX-28 that their MAV carries). How far was not found: the twist up to 45 deg that suits the task best is taken;
 - pitch only, as in Malaga (Mandow; Morales 2018): the axis stands upright, only `beta_laser` is free.
 
+Two more scanners stand beside it with all of their own, lidar, servo, motion and the angles that their shipped tasks
+allow: the one of the paper and the one for little money. So a dollar can be weighed: beams per ball on the geometric
+mean, `exp(-J) - 1`, over the price, beside the range and the noise that it buys. Each counts for its own time.
+
 Ready-made scanners are the `multibeam` products of the catalogue, mounted upright with x ahead. Their layers are cones
 about the axis, so their density is zonal as that of a fan whose bearings are the elevations and whose plane holds the
 axis: all that is true of a fan here is true of them. Each is judged twice, for one turn and for the whole turns that
@@ -21,8 +25,7 @@ half of the distance goes into `J_error`. Not modelled: azimuth offsets of the s
 
 from __future__ import annotations
 
-import csv
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,20 +34,20 @@ from numpy import ndarray
 
 from design.angles import STANDARD_DEG
 from design.arrays import Array, Counts, Setting
-from design.catalogue.products import Multibeam, SlipRing
+from design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
 from design.density.ball_count import ball_count
 from design.density.beams import ScanLines
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
 from design.objective.ball_search import SETS
-from design.objective.holes import percent
-from design.objective.problem import NODES, Problem
+from design.objective.named_objectives import beams_per_ball
+from design.objective.problem import NODES, Problem, with_scanner
 from design.objective.score import Score, score, score_on
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.search import search
 from design.sphere.directions import sample_set, spiral
-from design.task.task import AngleRanges, LoadedTask
+from design.task.task import AngleRanges, LoadedTask, load_task
 
 LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations
@@ -52,6 +55,7 @@ SEARCHED = {
     "Bonn, 45 deg": AngleRanges(alpha_rot_deg=180, beta_rot_deg=45, alpha_laser_deg=90, beta_laser_deg=(-90, -45)),
     "pitch only": AngleRanges(alpha_rot_deg=0, beta_rot_deg=0, alpha_laser_deg=0, beta_laser_deg=(-90, 90)),
 }
+SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks: their products, motion and allowed angles
 PHASES = 4  # start phases, and directions, for a scanner that sees part of a turn only: it is no longer zonal
 DIRECTIONS = 10_000
 BLIND_DIRECTIONS = 100_000
@@ -72,6 +76,10 @@ class ComparisonRow:
         gap_deg: widest distance between neighbouring scan lines or layers, across them.
         layers: circles about the axis on which beams run: beams of the 2D lidar, lasers of a multibeam.
         points_per_s: measurements per second; as the maker states it for a multibeam.
+        range_m: farthest, as the maker of the lidar states it; None for a multibeam, whose catalogue has none.
+        range_sigma_mm: noise of one range; None likewise.
+        beams_per_ball: exp(-J) - 1, the geometric mean; None for an objective that is no logarithm.
+        beams_per_ball_per_usd: None as well where a price is not known.
         cost_usd: lidar, servo and slip ring, or the scanner; None where a price is not known.
     """
 
@@ -86,13 +94,17 @@ class ComparisonRow:
     gap_deg: float
     layers: int
     points_per_s: float
+    range_m: float | None
+    range_sigma_mm: float | None
+    beams_per_ball: float | None
+    beams_per_ball_per_usd: float | None
     cost_usd: float | None
 
 
 def compare(
     loaded: LoadedTask, problem: Problem, best: Family, progress: Progress = lambda _: None
 ) -> list[ComparisonRow]:
-    """Rows of the optimum, the alignments known from others, and every multibeam of the catalogue.
+    """Rows of the optimum, the alignments known from others, other scanners, and every multibeam of the catalogue.
 
     Args:
         loaded: the task.
@@ -111,6 +123,13 @@ def compare(
         progress(name)
         family = search(problem, ranges).best[0]
         rows.append(_rotating(name, loaded, problem, family.angles_rad, family.score))
+    for name in SCANNERS:
+        other = load_task(Path(name))
+        if _bought(other) != _bought(loaded):
+            progress(name)
+            on_other = with_scanner(problem, other.lidar, other.task.motion)
+            family = search(on_other, other.task.angles).best[0]
+            rows.append(_rotating(name, other, on_other, family.angles_rad, family.score))
     for product in loaded.products:
         if isinstance(product, Multibeam):
             progress(product.name)
@@ -141,7 +160,9 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRo
         gap_deg=float(np.diff(product.elevations_deg).max()),
         layers=len(product.elevations_deg),
         points_per_s=product.points_per_second,
-        cost_usd=product.price_usd,
+        range_m=None,
+        range_sigma_mm=None,
+        **_value(problem, J, product.price_usd),
     )
 
 
@@ -196,51 +217,9 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     )
 
 
-def table(rows: list[ComparisonRow]) -> list[str]:
-    """Lines of text for a person, the heading first."""
-    width = max(len(row.name) for row in rows)
-    lines = [
-        f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>7}"
-        f" {'of weight':>13} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'USD':>7}"
-    ]
-    for row in rows:
-        cost = "?" if row.cost_usd is None else f"{row.cost_usd:,.0f}"
-        lines.append(
-            f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f} {row.J_error:6.0e}"
-            f" {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13} {row.gap_deg:9.3f} {row.layers:6}"
-            f" {row.points_per_s:9,.0f} {cost:>7}"
-        )
-    return lines
-
-
-def notes(loaded: LoadedTask) -> list[str]:
-    """What the columns mean, and which numbers of the ready-made scanners nobody has verified."""
-    ball = loaded.task.density.ball_radius_deg
-    doubts = [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam) and p.unverified()]
-    return [
-        "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
-        f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
-        "blind: of the sphere outside the masks; of weight: what of the task's weight is blind",
-        "gap: widest between neighbouring scan lines or layers, inside of what is seen",
-        "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
-        "ready-made scanners stand upright; Bonn takes the twist, pitch only the pitch, that suits this task best",
-        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts),
-    ]
-
-
-def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
-    """The rows under the names of their fields; what is not known is empty."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
-
-
 def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score) -> ComparisonRow:
-    ring = loaded.task.slip_ring
-    parts = [loaded.lidar.price_usd, loaded.servo.price_usd]
-    parts += [loaded.products.get(ring, SlipRing).price_usd] if ring else []
-    known = [price for price in parts if price is not None]
+    prices = [product.price_usd for product in _bought(loaded)]
+    known = [price for price in prices if price is not None]
     return ComparisonRow(
         name=name,
         setting="(" + ", ".join(f"{angle:g}" for angle in np.degrees(angles_rad).round(2) + 0.0) + ")",
@@ -253,8 +232,22 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setti
         gap_deg=gaps(problem, angles_rad).line_gap_deg,
         layers=len(problem.bearings_rad),
         points_per_s=loaded.lidar.scan_rate_hz * len(problem.bearings_rad),
-        cost_usd=sum(known) if len(known) == len(parts) else None,
+        range_m=loaded.lidar.range_max_mm / 1000,
+        range_sigma_mm=loaded.lidar.range_sigma_mm,
+        **_value(problem, judged.J, sum(known) if len(known) == len(prices) else None),
     )
+
+
+def _bought(loaded: LoadedTask) -> list[Lidar | Servo | SlipRing]:
+    ring = loaded.task.slip_ring
+    return [loaded.lidar, loaded.servo, *([loaded.products.get(ring, SlipRing)] if ring else [])]
+
+
+def _value(problem: Problem, J: float, cost_usd: float | None) -> dict[str, float | None]:
+    """What a row sees, costs, and sees for a dollar, under the names of its fields."""
+    beams = beams_per_ball(problem.objective, J)
+    each = None if beams is None or cost_usd is None else beams / cost_usd
+    return {"beams_per_ball": beams, "beams_per_ball_per_usd": each, "cost_usd": cost_usd}
 
 
 def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:

@@ -16,7 +16,7 @@ OPTIMUM = {"color": INK}
 
 
 def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
-    """Bars of -J, blind share of the weight, widest gap, and cost, one candidate below the other.
+    """Bars of -J, blind share of the weight, widest gap, cost, and what a dollar sees, one candidate below the other.
 
     Args:
         path: PNG to write.
@@ -29,8 +29,8 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     single = [row for row in rows if row.time_s < longest[row.name]]
     twice = {row.name for row in single}
 
-    figure = Figure(figsize=(11, 1.6 + 0.5 * len(names)), layout="constrained")
-    J, blind, gap, cost = figure.subplots(1, 4, sharey=True, width_ratios=[2.2, 1.2, 1.2, 1.2])
+    figure = Figure(figsize=(13, 1.6 + 0.5 * len(names)), layout="constrained")
+    J, blind, gap, cost, value = figure.subplots(1, 5, sharey=True, width_ratios=[2.2, 1.2, 1.2, 1.2, 1.2])
     for row in whole:
         y = names.index(row.name)
         look = OPTIMUM if row is rows[0] else LONG
@@ -44,6 +44,9 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
         if row.cost_usd is not None:
             cost.barh(y, row.cost_usd / 1000, height=0.6, **look)
         cost.text((row.cost_usd or 0) / 1000, y, _thousands(row.cost_usd), va="center", fontsize=8)
+        if row.beams_per_ball_per_usd is not None:
+            value.barh(y, row.beams_per_ball_per_usd, height=0.6, **look)
+            value.text(row.beams_per_ball_per_usd, y, f" {row.beams_per_ball_per_usd:.2g}", va="center", fontsize=8)
     for row in single:
         place = names.index(row.name) + 0.2
         J.barh(place, -row.J, height=0.38, **SHORT)
@@ -54,7 +57,8 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     blind.set_xlabel("never seen, share of\nthe task's weight [%]")
     gap.set_xlabel("widest gap between\nlines or layers [deg]")
     cost.set_xlabel("lidar, servo, slip ring, or\nscanner [thousand USD]")
-    for axis in (J, blind, gap, cost):
+    value.set_xlabel("beams per ball (geometric\nmean) per dollar")
+    for axis in (J, blind, gap, cost, value):
         axis.spines[["top", "right"]].set_visible(False)
         axis.set_xlim(0, 1.25 * max(1e-6, *(bar.get_width() for bar in axis.patches)))
     figure.suptitle(title, fontsize=11)

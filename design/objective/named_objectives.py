@@ -75,6 +75,11 @@ def log(field: Field) -> Objective:
     return Objective("log", field, (Moment(field, log_density),), _first)
 
 
+def beams_per_ball(objective: Objective, J: float) -> float | None:
+    """`exp(-J) - 1`: beams per ball on the geometric mean of 1 + d; None for an objective that is no logarithm."""
+    return float(np.expm1(-J)) + 0.0 if objective.name == "log" else None
+
+
 def kl(field: Field) -> Objective:
     """Distance to the target distribution [nat], 0 where the density is spread just as the weights are.
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Array, Plane
+from design.catalogue.products import Lidar
 from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
 from design.density.sweep import SweepLines
 from design.errors import TaskError
@@ -95,11 +96,9 @@ def problem_of(loaded: LoadedTask) -> Problem:
     except TaskError as error:
         raise TaskError(f"{loaded.source}: {error}") from error
     motion, lidar = loaded.task.motion, loaded.lidar
-    bearings = lidar.bearings_rad()
-    lines = motion_lines(motion, lidar.scan_rate_hz)
-    return Problem(
-        bearings_rad=bearings,
-        lines=lines,
+    problem = Problem(
+        bearings_rad=lidar.bearings_rad(),
+        lines=motion_lines(motion, lidar.scan_rate_hz),
         sweep=None,
         ball_rad=float(np.radians(density.ball_radius_deg)),
         objective=objective_of(loaded, field),
@@ -107,7 +106,15 @@ def problem_of(loaded: LoadedTask) -> Problem:
         grid_step_deg=step_deg,
         nodes=nodes,
         tolerance=density.tolerance or (np.inf if density.budget_s else 1e-3),
-    ).with_beams(bearings, lines, SweepLines(motion, lidar.scan_rate_hz) if isinstance(motion, Sweep) else None)
+    )
+    return with_scanner(problem, lidar, motion)
+
+
+def with_scanner(problem: Problem, lidar: Lidar, motion: Motion | Shortest) -> Problem:
+    """The same weights and objective, seen by another lidar on another motion."""
+    rate_hz = lidar.scan_rate_hz
+    sweep = SweepLines(motion, rate_hz) if isinstance(motion, Sweep) else None
+    return problem.with_beams(lidar.bearings_rad(), motion_lines(motion, rate_hz), sweep)
 
 
 def motion_lines(motion: Motion | Shortest, scan_rate_hz: float) -> ScanLines:

@@ -120,7 +120,7 @@ def compare(
     ] = Path("out/compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Put the optimum of a task beside the usual mounts and ready-made scanners: table, CSV and picture."""
+    """Put the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
     from scanwright import api
     from scanwright.pipeline.comparison import write_comparison
 

@@ -1,4 +1,4 @@
-"""`out/compare/<task>/`: the optimum of a task beside the usual mounts and ready-made scanners."""
+"""`out/compare/<task>/`: the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.evaluation.comparison import ComparisonRow, compare, notes, table, write_csv
+from design.evaluation.comparison import ComparisonRow, compare
 from design.evaluation.comparison_picture import compare_picture
+from design.evaluation.comparison_table import notes, table, write_csv
 from design.search.optimum import Optimum, find_optimum
 from design.task.task import LoadedTask
 from scanwright.pipeline.folder import report_folder

@@ -18,6 +18,7 @@ from design.arrays import Array
 from design.errors import BuildError, ScanwrightError, TaskError
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
+from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
 from design.scanner import Scanner
@@ -27,7 +28,7 @@ from design.search.shortest_period import shortest_period_s
 from design.search.with_parts import Refused, choose_with_parts
 from design.shadow import Shadow
 from design.task.task import LoadedTask
-from scanwright.study.candidate import density_gain, price_usd, why, with_motion
+from scanwright.study.candidate import density_gain, of_lidar, per_ball, price_usd, why, with_motion
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result
 
@@ -104,6 +105,8 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     values = {
         "J": score.J,
         "density_gain": density_gain(problem, found["standard_J"], score.J),
+        **of_lidar(loaded.lidar),
+        **per_ball(beams_per_ball(problem.objective, score.J), made.values["cost_usd"]),
         "blind_fraction": coverage(seen, setting).blind_fraction,
         "line_gap_deg": gaps(problem, setting).line_gap_deg,
         "period_s": loaded.task.motion.duration_s,

@@ -17,6 +17,7 @@ from design.catalogue.products import Bearing, Belt, Lidar, Servo, SlipRing
 from design.errors import ScanwrightError, TaskError
 from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
+from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import Problem
 from design.search.optimum import Optimum, find_optimum
 from design.task.task import LoadedTask, Task
@@ -75,6 +76,7 @@ def _bounds(optimum: Optimum, standard_J: float) -> dict[str, float | None]:
     return {
         "J": J,
         "density_gain": density_gain(problem, standard_J, J),
+        "beams_per_ball": beams_per_ball(problem.objective, J),
         "blind_fraction": min(coverage(problem, f.angles_rad).blind_fraction for f in families),
         "line_gap_deg": min(gaps(problem, f.angles_rad).line_gap_deg for f in families),
         "period_s": optimum.loaded.task.motion.duration_s,
@@ -87,8 +89,25 @@ def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
     bought: list[Lidar | Servo | SlipRing] = [loaded.lidar, loaded.servo]
     if loaded.task.slip_ring is not None:
         bought.append(loaded.products.get(loaded.task.slip_ring, SlipRing))
-    known = {"mass_g": sum(product.mass_g for product in bought), "cost_usd": price_usd(bought)}
+    price = price_usd(bought)
+    known = {
+        "mass_g": sum(product.mass_g for product in bought),
+        "cost_usd": price,
+        **of_lidar(loaded.lidar),
+        **per_ball(found["bounds"]["beams_per_ball"], price),
+    }
     return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **found["bounds"], **known}.items()}
+
+
+def of_lidar(lidar: Lidar) -> dict[str, float | None]:
+    """Columns that the lidar alone decides."""
+    return {"range_m": lidar.range_max_mm / 1000, "range_sigma_mm": lidar.range_sigma_mm}
+
+
+def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | None]:
+    """Beams per ball, and the same per dollar; None where the objective is no logarithm or a price is not known."""
+    each = None if beams is None or cost_usd is None else beams / cost_usd
+    return {"beams_per_ball": beams, "beams_per_ball_per_usd": each}
 
 
 def density_gain(problem: Problem, standard_J: float, J: float) -> float | None:

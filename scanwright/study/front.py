@@ -26,6 +26,10 @@ COLUMNS = {
     for column in (
         Column("J", "low", "the objective of the task, with what the parts hide"),
         Column("density_gain", "high", "times the beams per ball of the better standard alignment (objective log)"),
+        Column("beams_per_ball", "high", "exp(-J) - 1, the geometric mean (objective log)"),
+        Column("beams_per_ball_per_usd", "high", "the same over cost_usd: what a dollar sees"),
+        Column("range_m", "high", "farthest that the lidar measures, as its maker states it"),
+        Column("range_sigma_mm", "low", "noise of one range, one standard deviation"),
         Column("blind_fraction", "low", "of the unmasked sphere, with what turns in front of the laser"),
         Column("line_gap_deg", "low", "widest between neighbouring scan lines"),
         Column("period_s", "low", "time of one full scan"),

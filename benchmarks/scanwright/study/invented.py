@@ -40,7 +40,8 @@ def invented_search(loaded: LoadedTask) -> Result:
     """A search that costs nothing; its bound comes from the record."""
     period_s = loaded.task.motion.duration_s
     motion = loaded.task.motion.model_dump(mode="json")
-    bounds = {"J": -math.log(period_s) - _dice(loaded, 0), "period_s": period_s}
+    J = -math.log(period_s) - _dice(loaded, 0)
+    bounds = {"J": J, "beams_per_ball": math.expm1(-J), "period_s": period_s}
     return {"status": "found", "motion": motion, "standard_J": 0.0, "families": [], "bounds": bounds}
 
 

@@ -12,6 +12,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Multibeam
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import ball_search, count_at
+from design.density.sweep import SweepLines
 from design.errors import BuildError
 from design.evaluation import comparison as comparison
 from design.evaluation.comparison import (
@@ -21,13 +22,12 @@ from design.evaluation.comparison import (
     multibeam_scan,
     ready_made,
     sampled,
-    table,
-    write_csv,
 )
 from design.evaluation.comparison_picture import compare_picture
+from design.evaluation.comparison_table import table, write_csv
 from design.frames import R_rot_laser, R_world_rot
 from design.objective.ball_search import SETS
-from design.objective.named_objectives import log_density
+from design.objective.named_objectives import homogeneity, log_density
 from design.objective.problem import problem_of
 from design.objective.score import score
 from design.search.search import search
@@ -183,6 +183,35 @@ def test_a_price_that_nobody_knows_is_a_question_mark(rows):
     lines = table(rows)
     assert len({len(line) for line in lines}) == 1, "columns stand below each other"
     assert [line.split()[-1] for line, row in zip(lines[1:], rows, strict=True) if row.cost_usd is None] == ["?", "?"]
+
+
+def test_the_cheap_scanner_stands_beside_with_what_a_dollar_sees(ceiling, rows):
+    """Its own products, motion and angles, judged for this task: J by ball search over its own beams."""
+    _, problem, _ = ceiling
+    row = next(row for row in rows if row.name == "low_cost")
+    assert not [row for row in rows if row.name == "ground_ahead"], "the task has the products of that one"
+    cheap = load_task(Path("low_cost"))
+    assert row.time_s == cheap.task.motion.duration_s
+    assert row.cost_usd == cheap.lidar.price_usd + cheap.servo.price_usd
+    assert (row.range_m, row.range_sigma_mm) == (25, 10)
+    assert row.beams_per_ball == pytest.approx(np.exp(-row.J) - 1)
+    assert row.beams_per_ball_per_usd == pytest.approx(row.beams_per_ball / row.cost_usd)
+    fan = beam_directions_rot(cheap.lidar.bearings_rad(), 0.0, np.radians(50.0))
+    lines = SweepLines(cheap.task.motion, cheap.lidar.scan_rate_hz)
+    J = []
+    for k in range(SETS):
+        joint_rad = lines.angles_rad((k + 0.5) / SETS)  # the start phases of the mean
+        seen = np.concatenate([fan @ R_world_rot(0, 0, angle).T for angle in joint_rad])
+        samples = sample_set(problem.field, problem.grid_step_deg, 10_000, k)
+        counts = ball_search(seen, samples.directions, problem.ball_rad)
+        J.append(log_density(counts) @ samples.weights / samples.weights.sum())
+    assert abs(np.mean(J) - row.J) <= row.J_error + 4 * np.std(J, ddof=1) / SETS**0.5
+
+
+def test_another_objective_has_no_beams_per_dollar(ceiling):
+    _, problem, _ = ceiling
+    row = ready_made(problem.with_objective(homogeneity(problem.field)), multibeam("VLP-16"), 1)
+    assert (row.beams_per_ball, row.beams_per_ball_per_usd) == (None, None)
 
 
 def test_the_picture_names_every_candidate(rows, tmp_path):

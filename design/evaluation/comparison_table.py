@@ -1,0 +1,61 @@
+"""A comparison in words and as CSV."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict, fields
+from pathlib import Path
+
+from design.catalogue.products import Multibeam
+from design.evaluation.comparison import SCANNERS, ComparisonRow
+from design.objective.holes import percent
+from design.task.task import LoadedTask
+
+
+def table(rows: list[ComparisonRow]) -> list[str]:
+    """Lines of text for a person, the heading first."""
+    width = max(len(row.name) for row in rows)
+    lines = [
+        f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>7}"
+        f" {'of weight':>13} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'range [m]':>9}"
+        f" {'noise [mm]':>10} {'beams':>7} {'per USD':>8} {'USD':>7}"
+    ]
+    for row in rows:
+        lines.append(
+            f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f} {row.J_error:6.0e}"
+            f" {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13} {row.gap_deg:9.3f} {row.layers:6}"
+            f" {row.points_per_s:9,.0f} {_known(row.range_m, ',g'):>9} {_known(row.range_sigma_mm, 'g'):>10}"
+            f" {_known(row.beams_per_ball, '.4g'):>7} {_known(row.beams_per_ball_per_usd, '.3g'):>8}"
+            f" {_known(row.cost_usd, ',.0f'):>7}"
+        )
+    return lines
+
+
+def notes(loaded: LoadedTask) -> list[str]:
+    """What the columns mean, and which numbers of the ready-made scanners nobody has verified."""
+    ball = loaded.task.density.ball_radius_deg
+    doubts = [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam) and p.unverified()]
+    return [
+        "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
+        f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
+        "blind: of the sphere outside the masks; of weight: what of the task's weight is blind",
+        "gap: widest between neighbouring scan lines or layers, inside of what is seen",
+        "beams: within the ball, exp(-J) - 1, the geometric mean; per USD: over the price; ? for another objective",
+        "range, noise: of the 2D lidar as its maker states them, one standard deviation; ? for ready-made scanners",
+        "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
+        "ready-made scanners stand upright; Bonn takes the twist, pitch only the pitch, that suits this task best",
+        f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
+        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts),
+    ]
+
+
+def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
+    """The rows under the names of their fields; what is not known is empty."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+
+
+def _known(value: float | None, layout: str) -> str:
+    return "?" if value is None else format(value, layout)
