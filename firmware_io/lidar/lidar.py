@@ -68,6 +68,16 @@ class LidarDriver(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
+    def condition(self) -> tuple[str, ...]:
+        """What it tells of its own age and health, in words, one thing each; empty where it tells nothing.
+
+        Asked before `start` only: in some sensors an answer comes among scans.
+
+        Raises:
+            DeviceError: it does not answer, or is gone.
+        """
+        ...
+
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`.
 

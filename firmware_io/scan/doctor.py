@@ -111,6 +111,8 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
         yield DeviceFinding("ok", ", ".join([f"{port}: {lidar.model}", *(f"{k} {v}" for k, v in told.items() if v)]))
         if angles is not None:
             check_model(angles, lidar)
+        for says in lidar.condition():
+            yield DeviceFinding("ok", f"{port}: {says}")
         lidar.start()
         began_ns = lidar.read().arrival_ns
         late_ns: list[int] = []

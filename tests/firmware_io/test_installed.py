@@ -43,6 +43,9 @@ class Acme:
     def __exit__(self, kind, error, trace):
         self.line.leave(self.stop, error)
 
+    def condition(self):
+        return ()
+
     def start(self, *, intensity=False, cluster=1, skip=0):
         pass
 

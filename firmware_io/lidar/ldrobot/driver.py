@@ -149,6 +149,10 @@ class LdrobotLidar:
                 self._take(packet, arrival_ns)
         return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], intensity=self._intensity)
 
+    def condition(self) -> tuple[str, ...]:
+        """Nothing: it only ever sends points."""
+        return ()
+
     def stop(self) -> None:
         """Hand out no more; its laser stays on as long as it has power."""
         self._scanning = False

@@ -133,6 +133,10 @@ class LmsLidar:
                     self._take(told, arrival_ns)
         return self._waiting.popleft()
 
+    def condition(self) -> tuple[str, ...]:
+        """Nothing: a dirty window and faults stand in every telegram."""
+        return ()
+
     def stop(self) -> None:
         """Stop its stream; its laser stays on as long as it has power.
 

@@ -96,6 +96,15 @@ class ScipLidar:
         """Keys and texts of VV (version), PP (parameters) or II (state). While it scans, scans are lost meanwhile."""
         return protocol.information(self._dialogue.ask(command.encode()))
 
+    def condition(self) -> tuple[str, ...]:
+        """What it says of its state, in its own words (STAT of II).
+
+        Raises:
+            DeviceError: it does not answer, or is gone.
+        """
+        said = self.information("II").get("STAT", "")
+        return (f"it says: {said}",) if said else ()
+
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; the laser lights by itself.
 

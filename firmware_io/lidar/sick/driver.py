@@ -19,13 +19,13 @@ from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.sensor_line import until_back
 from firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
+from firmware_io.lidar.sick.scan_setting import set_rate
 from firmware_io.samples import Scan
 
 _SCAN_S = 1.0
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
 _STLMS_READY = 7
-_SET_UP = {1: "its scan frequency", 2: "its resolution", 3: "its scan frequency and resolution", 4: "its scan area"}
 
 
 class SickLidar:
@@ -88,6 +88,16 @@ class SickLidar:
         """Telegrams that were thrown away."""
         return self._bad_scans + self._dialogue.bad
 
+    def condition(self) -> tuple[str, ...]:
+        """Hours that it has run, in tenths, and how often it was switched on, where it counts them.
+
+        Raises:
+            DeviceError: it does not answer, or is gone.
+        """
+        hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
+        told = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
+        return (*told, *([] if starts is None else [f"it was switched on {starts:,} times"]))
+
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`, at the rate and resolution of the catalogue.
 
@@ -105,7 +115,7 @@ class SickLidar:
 
     def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
         self._login()
-        self._set_rate()
+        set_rate(self._dialogue, self._product)
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
         wanted = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
         self._dialogue.ask(wanted.number("u16", skip + 1))
@@ -188,36 +198,17 @@ class SickLidar:
             return ""
         return self._dialogue.checked("SerialNumber", told.text).strip()
 
+    def _counter(self, name: str) -> int | None:
+        """None from a sensor that does not count this, or tells it to others only."""
+        try:
+            told = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
+        except RefusedError:
+            return None
+        return self._dialogue.checked(name, told.number, "u32")
+
     def _login(self) -> None:
         out = self._dialogue.writer("sMN SetAccessMode").number("u8", _CLIENT).number("u32", _PASSWORD)
         self._dialogue.insist(out, 1)
-
-    def _set_rate(self) -> None:
-        """Rate, resolution and field of the catalogue, in a sensor that has a choice."""
-        lidar = self._product
-        step = round(3_600_000 / lidar.steps_per_turn)
-        first = 900_000 + round((lidar.first_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)
-        last = 900_000 + round((lidar.last_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)
-        rate = round(lidar.scan_rate_hz * 100)
-        try:
-            now = self._dialogue.ask(self._dialogue.writer("sRN LMPscancfg"))
-        except RefusedError as refused:
-            if refused.unknown:
-                return
-            raise
-        rate_now, _, step_now = (
-            self._dialogue.checked("LMPscancfg", now.number, kind) for kind in ("u32", "u16", "u32")
-        )
-        if rate_now == rate and abs(step_now - step) <= 1:
-            return
-        out = self._dialogue.writer("sMN mLMPsetscancfg").number("u32", rate).number("u16", 1).number("u32", step)
-        answer = self._dialogue.ask(out.number("i32", first).number("i32", last))
-        code = self._dialogue.checked("mLMPsetscancfg", answer.number, "u8")
-        if code:
-            raise DeviceError(
-                f"{self._name}: {lidar.scan_rate_hz:g} turns/s in steps of {step / 1e4:g} deg: it refuses "
-                f"{_SET_UP.get(code, f'with code {code}')}; is it a {self.model}?"
-            )
 
     def _wait_until_ready(self, patience_s: float) -> None:
         """A sensor that starts its motor, or is busy with somebody else, is asked again and again."""

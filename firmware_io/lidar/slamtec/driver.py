@@ -97,6 +97,10 @@ class SlamtecLidar:
         """Packets that were thrown away."""
         return self._bad_before + self._splitter.bad
 
+    def condition(self) -> tuple[str, ...]:
+        """Nothing: it counts no hours, and a fault of its health is told by `start`."""
+        return ()
+
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Start the motor and scan until `stop`.
 
@@ -207,7 +211,7 @@ class SlamtecLidar:
             point_us = self._configured(protocol.CONF_SAMPLE_US, of_mode, "<I") / 256
             if kind in protocol.SIZES and point_us > 0:
                 return _Mode(number, kind, point_us * 1e3)
-        standard_us, express_us = self._told(protocol.SAMPLE_TIMES, 0x15, _two_numbers)
+        standard_us, express_us = self._told(protocol.SAMPLE_TIMES, 0x15, protocol.sample_times)
         if express_us:
             return _Mode(0, protocol.CAPSULES, express_us * 1e3)
         return _Mode(0, protocol.NODES, max(standard_us, 1) * 1e3)
@@ -274,12 +278,6 @@ class SlamtecLidar:
         with self._line.told_when_gone():
             while time.monotonic() < end_s and self._line.stream.read(_SILENT_S):
                 pass
-
-
-def _two_numbers(data: bytes) -> tuple[int, int]:
-    if len(data) != 4:
-        raise ProtocolError(f"RPLIDAR: {len(data)} bytes of sample times, not 4")
-    return struct.unpack("<HH", data)
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:

@@ -129,6 +129,17 @@ def health(data: bytes) -> tuple[int, int]:
     return data[0], data[1] | data[2] << 8
 
 
+def sample_times(data: bytes) -> tuple[int, int]:
+    """The reply to SAMPLE_TIMES: between two points of a standard and of an express scan [us].
+
+    Raises:
+        ProtocolError: it has not 4 bytes.
+    """
+    if len(data) != 4:
+        raise ProtocolError(f"RPLIDAR: {len(data)} bytes of sample times, not 4")
+    return struct.unpack("<HH", data)
+
+
 def node(data: bytes) -> SlamtecPacket:
     """A node: one point with its own angle.
 

@@ -46,6 +46,8 @@ class SickMachine:
         busy_until_ns: it says so until then.
         silent_until_ns: it says nothing until then.
         dialects: those that it understands; True is CoLa B.
+        run_tenth_h: how long it has run, tenths of an hour.
+        starts: how often it was switched on.
         refusals: codes with which it refuses what it is asked next, one each.
         scanning: what it tells scans; None where nobody asked.
     """
@@ -62,6 +64,8 @@ class SickMachine:
     dialects: tuple[bool, ...] = (True, False)
     refusals: list[int] = field(default_factory=list)
     serial_number: int = 18_030_000
+    run_tenth_h: int = 6641
+    starts: int = 597
     scanning: _Scanning | None = None
     intensity: bool = False
     interval: int = 1
@@ -179,6 +183,10 @@ class SickMachine:
                 return out.text(self.lidar.name).text("V1.00").telegram()
             case b"sRN", "SerialNumber":
                 return out.text(str(self.serial_number)).telegram()
+            case b"sRN", "ODoprh":
+                return out.number("u32", self.run_tenth_h).telegram()
+            case b"sRN", "ODpwrc":
+                return out.number("u32", self.starts).telegram()
             case b"sRN", "SCdevicestate":
                 return out.number("u8", int(self.measuring and now_ns >= self.busy_until_ns)).telegram()
             case b"sRN", "LMPscancfg":

@@ -108,6 +108,17 @@ def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
             until_fine(lidar)
 
 
+@pytest.mark.parametrize("dialects", [(True,), (False,)], ids=["B", "A"])
+def test_it_tells_its_hours_where_it_counts_them(dialects):
+    """The numbers 4F4 and A7 are those of a sensor in the notes of a driver: 126.8 hours, 167 times."""
+    with twin(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, open_sick(sensor.address) as lidar:
+        assert lidar.condition() == ("it has run for 126.8 h", "it was switched on 167 times")
+        sensor.machine.refusals = [3, 1]  # it knows no such variable, or this level may not read it
+        assert lidar.condition() == ()
+        lidar.start()
+        check(lidar.read().scan, "LMS111")
+
+
 def test_an_unplugged_sensor_is_told_and_comes_back():
     with twin() as sensor, open_sick(sensor.address) as lidar:
         lidar.start(intensity=True)

@@ -11,8 +11,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from design.angles import AngleSet
 from firmware_io import device_ports, serial_port
+from firmware_io.scan import doctor
 from firmware_io.servo.families import all_tables
+from firmware_io.twins.scanner import emulated_scanner, room
 from firmware_io.twins.servo.dynamixel_packets import take
 from firmware_io.twins.servo.twin import ServoTwin
 
@@ -225,3 +228,22 @@ def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
         names = settable(table)
         assert "" not in names
         assert {register for register, _ in (*table.neutral, table.fast)} < set(names.values())
+
+
+@pytest.mark.parametrize(
+    ("model", "says"),
+    [
+        ("LMS111", ["it has run for 664.1 h", "it was switched on 597 times"]),
+        ("UTM-30LX", ["it says: Sensor works well."]),
+    ],
+)
+def test_a_lidar_tells_its_age_and_state(model, says, monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "_LOOK_S", 0.3)
+    angles_deg = {"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 0, "beta_laser": 50}
+    angles = AngleSet.model_validate({"task": "t", "angles_deg": angles_deg, "sensor": model, "servo": "MX-64R"})
+    (tmp_path / "angles.json").write_text(angles.to_json())
+    with emulated_scanner(angles, room(None)) as twins:
+        told = [finding.says for finding in doctor.examine(tmp_path, twins.ports.lidar, twins.ports.servo, None)]
+    for line in says:
+        assert f"{twins.ports.lidar}: {line}" in told
+    assert any(re.search(r": \d+\.\d V, \d+ deg C$", line) for line in told), "the servo its voltage and temperature"
