@@ -36,8 +36,8 @@ Say = Callable[[str], None]
 
 
 @contextmanager
-def _server(name: str, port: int, say: Say) -> Iterator[foxglove.Context]:
-    context = foxglove.Context()
+def _server(context: foxglove.Context, name: str, port: int, say: Say) -> Iterator[None]:
+    """Serve the channels of a context, which must be there: who connects while they are made may subscribe to none."""
     try:
         server = foxglove.start_server(
             name=name,
@@ -50,7 +50,7 @@ def _server(name: str, port: int, say: Say) -> Iterator[foxglove.Context]:
         raise DeviceError(f"--port {port}: cannot serve there: {error}") from error
     say(f"open ws://127.0.0.1:{server.port} in Foxglove, or {server.app_url()}")
     try:
-        yield context
+        yield
     finally:
         server.stop()
 
@@ -70,8 +70,9 @@ def view_recording(recording: Path, angles: Path, say: Say, *, port: int = PORT,
         DeviceError: the port is taken.
     """
     open_recording(recording)  # what cannot be read is refused before an address is told
-    with _server(recording.name, port, say) as context:
-        channels = _channels(recording, angles, context)
+    context = foxglove.Context()
+    channels = _channels(recording, angles, context)
+    with _server(context, recording.name, port, say):
         while True:
             _until(lambda: channels.heard)
             time.sleep(_SETTLED_S)
@@ -133,10 +134,10 @@ def _serve(receiving: Connection, folder: Path, port: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
-    with _server(f"scan of {folder.name}", port, lambda line: print(line, flush=True)) as context:
-        channels = FoxgloveChannels(
-            in_use.angles, own_body_beside(in_use.path), urdf, context, wall_minus_ns=wall_minus_ns
-        )
+    context = foxglove.Context()
+    own_body = own_body_beside(in_use.path)
+    channels = FoxgloveChannels(in_use.angles, own_body, urdf, context, wall_minus_ns=wall_minus_ns)
+    with _server(context, f"scan of {folder.name}", port, lambda line: print(line, flush=True)):
         for batch in batches(receiving):
             tell(batch, channels)
         channels.close()
