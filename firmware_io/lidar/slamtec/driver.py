@@ -178,7 +178,8 @@ class SlamtecLidar:
         """Stop what it does, and hear who it is; the line is closed where no one answers."""
         wanted = [series for series in SERIES.values() if model in (None, series.model)]
         with self._line.closed_on_error():
-            for baud in dict.fromkeys(series.baud for series in wanted):
+            bauds = list(dict.fromkeys(series.baud for series in wanted))
+            for baud in bauds if self._line.serial is not None else bauds[:1]:  # a server has set its own line
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
                 for _ in range(_TRIES):

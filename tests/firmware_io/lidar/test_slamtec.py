@@ -1,5 +1,6 @@
 """RPLIDARs: bytes against published ones, the driver against the twin, whatever breaks on the way."""
 
+import socket
 import time
 from contextlib import suppress
 
@@ -218,3 +219,12 @@ def test_a_fault_is_told():
         twin.machine.health = 2
         with pytest.raises(DeviceError, match="it reports fault 0x8002"):
             ours.start()
+
+
+def test_a_server_that_says_nothing_is_not_asked_at_every_speed():
+    """Its line has a speed of its own: `doctor` without a model would wait for each of the series in turn."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        with pytest.raises(DeviceError, match="no RPLIDAR answers"):
+            driver.open_slamtec(f"127.0.0.1:{server.getsockname()[1]}")
+        with server.accept()[0] as heard:
+            assert heard.recv(10_000).count(protocol.request(protocol.STOP)) == 3
