@@ -9,7 +9,7 @@ from typing import Protocol
 from design.errors import DeviceError
 from design.motion import Motion, Spin
 from firmware_io.scan.acquire import acquire
-from firmware_io.scan.live_feed import Watch
+from firmware_io.scan.live_feed import NOBODY, Both, Watch
 from firmware_io.scan.plan import ScanPlan
 
 AGAIN_S = 3.0
@@ -41,15 +41,23 @@ class Steered(Watch, Protocol):
         """Until something else is wanted, at most so long."""
 
 
-def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None]) -> None:
-    """Scan until something else than a device ends it, such as Ctrl-C; the devices are stopped on every way out."""
+def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None], viewer: Watch = NOBODY) -> None:
+    """Scan until something else than a device ends it, such as Ctrl-C; the devices are stopped on every way out.
+
+    Args:
+        plan: endless.
+        steered: is told of the scan, and says what shall happen.
+        say: is told what is going on.
+        viewer: is told of the scan too.
+    """
+    watch = Both(steered, viewer)
     while True:
         if not steered.running:
             steered.wait(_ASKED_S)
             continue
         steered.begin()
         try:
-            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), say, steered)
+            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), say, watch)
         except Interrupted:
             say("stopped, as a parameter asks")
         except DeviceError as error:

@@ -15,6 +15,7 @@ from firmware_io.ros.drive import drive
 from firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
 from firmware_io.ros.replay import replay
 from firmware_io.ros.robot_frames import description
+from firmware_io.scan.live_feed import NOBODY, Watch
 from firmware_io.scan.plan import ScanPlan
 
 Say = Callable[[str], None]
@@ -44,7 +45,9 @@ class Publishing:
             raise RecordingError("--points-in rot: a turn has no place in a frame that turns; say --points-per scan")
 
 
-def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Publishing) -> None:
+def serve_devices(
+    out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Publishing, viewer: Watch = NOBODY
+) -> None:
     """Publish what the devices say until Ctrl-C; they are stopped on every way out.
 
     Args:
@@ -53,6 +56,7 @@ def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, 
         ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
         say: is told what is going on.
         points: how they are published.
+        viewer: is told of the scan too.
 
     Raises:
         TaskError: the folder has no angle set.
@@ -60,7 +64,7 @@ def serve_devices(out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, 
     """
     held = plan.motion.mode == "stop_and_go"
     with running_node(_scanner(out, points, held), ros_args, replayed=False) as node:
-        drive(plan, node, say)
+        drive(plan, node, say, viewer)
 
 
 def serve_recording(

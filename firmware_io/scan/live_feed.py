@@ -64,6 +64,34 @@ class Nobody:
 NOBODY = Nobody()
 
 
+@dataclass(frozen=True, slots=True)
+class Both:
+    """The `Watch` of two; where the first raises, the second is told nothing."""
+
+    first: Watch
+    second: Watch
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """See `Watch`."""
+        self.first.joint(time_ns, position_rad)
+        self.second.joint(time_ns, position_rad)
+
+    def scan(self, scan: Scan) -> None:
+        """See `Watch`."""
+        self.first.scan(scan)
+        self.second.scan(scan)
+
+    def told(self, line: str) -> None:
+        """See `Watch`."""
+        self.first.told(line)
+        self.second.told(line)
+
+    def close(self) -> None:
+        """See `Watch`."""
+        self.first.close()
+        self.second.close()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
     """What came since the last one; `lost` counts the scans that the view left out so far."""

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from contextlib import closing, suppress
+from contextlib import AbstractContextManager, closing, suppress
 from enum import Enum
 from pathlib import Path
 from threading import Event
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from design.errors import DeviceError, require
 from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
 from scanwright.cli.help import Commands
+
+if TYPE_CHECKING:
+    from firmware_io.scan.live_feed import Watch
 
 app = Commands("Devices")
 
@@ -43,6 +46,17 @@ class PointsIn(Enum):
 ServoId = Annotated[
     int | None, typer.Option(min=0, max=252, metavar="ID", help="Number of the servo, where several share its bus.")
 ]
+
+
+def _viewer(out: Path, *, live: bool = False, foxglove: bool) -> AbstractContextManager[Watch]:
+    if foxglove:
+        require("foxglove", "--foxglove needs the Foxglove SDK", "foxglove")
+        from scanwright.live.foxglove_view import foxglove_feed
+
+        return foxglove_feed(out)
+    from scanwright.live.scan_page import live_page
+
+    return live_page(out, wanted=live)
 
 
 @app.command()
@@ -103,14 +117,12 @@ def scan(
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     if live:
         require_pages("scan --live")
-    if foxglove:
-        require("foxglove", "scan --foxglove needs the Foxglove SDK", "foxglove")
     if live and foxglove:
         raise DeviceError("--live and --foxglove: one of them")
+    viewer = _viewer(out, live=live, foxglove=foxglove)
     from firmware_io.scan.acquire import acquire
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
-    from scanwright.live.scan_page import live_page
 
     plan = plan_scan(
         out,
@@ -128,12 +140,6 @@ def scan(
     show(plan.lines())
     if dry_run:
         return
-    if foxglove:
-        from scanwright.live.foxglove_view import foxglove_feed
-
-        viewer = foxglove_feed(out)
-    else:
-        viewer = live_page(out, wanted=live)
     with viewer as watch:
         try:
             with on_duty(), closing(watch):
@@ -174,6 +180,7 @@ def ros2(
     servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
     servo_id: ServoId = None,
     intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
+    foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve the same to Foxglove, without a bridge.")] = False,
 ) -> None:
     """Publish scans, angles, frames and de-skewed points as a node of ROS 2, until Ctrl-C."""
     require(
@@ -182,6 +189,9 @@ def ros2(
         "rclpy",
         "sensor_msgs",
     )
+    if foxglove and recording is not None:
+        raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
+    viewer = _viewer(out, foxglove=foxglove)
     from firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from firmware_io.scan.plan import plan_scan
 
@@ -193,8 +203,8 @@ def ros2(
             return
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
         show(plan.lines())
-        with on_duty():
-            serve_devices(out, plan, given, Progress(), points)
+        with on_duty(), viewer as watch:
+            serve_devices(out, plan, given, Progress(), points, watch)
     except KeyboardInterrupt as stop:
         for line in ("stopped", *notes_of(stop)):
             complain(line)

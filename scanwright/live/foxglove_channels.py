@@ -28,6 +28,7 @@ from firmware_io.ros.robot_frames import fixed_frames
 from firmware_io.samples import JointSample, Scan
 
 _DESCRIBED_NS = 1_000_000_000
+_ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew
 _TYPES = {
     SCAN_TOPIC: ros_messages.LASER_SCAN,
     JOINT_TOPIC: ros_messages.JOINT_STATE,
@@ -76,7 +77,7 @@ class FoxgloveChannels:
 
     def begin(self) -> None:
         """Begin anew: nothing of what came before is assembled with what comes."""
-        self._assembler, self._described_ns = self._place(), -(2**62)
+        self._assembler, self._described_ns, self._joint_ns = self._place(), -(2**62), -(2**62)
 
     @property
     def heard(self) -> bool:
@@ -92,6 +93,10 @@ class FoxgloveChannels:
         self._log(JOINT_TOPIC, ros_messages.encode_joint(at_ns, position_rad), at_ns)
         turned = ("servo", "rot", frames.rigid(frames.Rz(position_rad), np.zeros(3)))
         self._log("/tf", ros_messages.encode_transforms([*self._fixed, turned], at_ns), at_ns)
+        if at_ns - self._joint_ns > _ANEW_NS:
+            self.close()
+            self._assembler = self._place()
+        self._joint_ns = at_ns
         self._push(JointSample(time_ns, position_rad))
 
     def scan(self, scan: Scan) -> None:

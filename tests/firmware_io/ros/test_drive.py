@@ -73,13 +73,26 @@ class Steered:
         self.story.append(f"wait {seconds:g}")
         self.running = True
 
+    def told(self, line):
+        self.story.append(f"told {line}")
+
+
+class Viewer:
+    """A watch that keeps the lines that it is told."""
+
+    def __init__(self):
+        self.lines = []
+
+    def told(self, line):
+        self.lines.append(line)
+
 
 def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch):
-    steered, motions, said = Steered(), [], []
+    steered, viewer, motions, said = Steered(), Viewer(), [], []
     outcomes = iter([DeviceError("the lidar is gone"), driving.Interrupted(), KeyboardInterrupt()])
 
     def acquire(plan, _say, watch):
-        assert watch is steered
+        watch.told(f"{plan.motion.period_s:g} s")
         motions.append(plan.motion.period_s)
         steered.period_s = 4.0
         raise next(outcomes)
@@ -88,10 +101,14 @@ def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch
     names = dict.fromkeys(ScanPlan.__dataclass_fields__)
     plan = ScanPlan(**{**names, "angles": ANGLES, "motion": Spin(period_s=18.0), "turns": 1, "endless": True})
     with pytest.raises(KeyboardInterrupt):
-        driving.drive(plan, steered, said.append)
+        driving.drive(plan, steered, said.append, viewer)
     assert motions == [18.0, 4.0, 4.0]
     again = "the lidar is gone; trying again in 3 s"
-    assert steered.story == ["wait 1", "begin", again, "wait 3", "begin", "begin"]
+    assert steered.story == [
+        *("wait 1", "begin", "told 18 s", again, "wait 3"),
+        *("begin", "told 4 s", "begin", "told 4 s"),
+    ]
+    assert viewer.lines == ["18 s", "4 s", "4 s"]
     assert said == [again, "stopped, as a parameter asks"]
 
 

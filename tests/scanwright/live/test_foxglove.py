@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from dataclasses import replace
 
 import foxglove
 import numpy as np
@@ -145,6 +146,29 @@ def test_a_client_of_the_protocol_reads_the_recording_back(folder):
     assert clouds.keys() == expected.keys()
     for at_ns, points in clouds.items():
         np.testing.assert_allclose(points, expected[at_ns], atol=1e-5)
+
+
+def test_devices_that_began_anew_are_assembled_as_if_nothing_had_been_before(folder, tmp_path):
+    source = open_recording(folder / "r.mcap")
+    scans, log, later_ns = list(source.scans()), source.joint_log, 10_000_000_000
+    first = Batch(log.time_ns, log.position_rad, tuple(scans), (), 0)
+    again = [replace(scan, stamp_ns=scan.stamp_ns + later_ns) for scan in scans]
+    second = Batch(log.time_ns + later_ns, log.position_rad + 2.0, tuple(again), (), 0)
+    context = foxglove.Context()
+    with foxglove.open_mcap(tmp_path / "live.mcap", context=context):
+        channels = FoxgloveChannels(ANGLES, None, None, context)
+        tell(first, channels)
+        tell(second, channels)
+        channels.close()
+        alone = FoxgloveChannels(ANGLES, None, None, context, wall_minus_ns=1)
+        tell(second, alone)
+        alone.close()
+    with (tmp_path / "live.mcap").open("rb") as stream:
+        decoded = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+    clouds = {stamp_of(m): xyz(m.data, m.point_step) for _, channel, _, m in decoded if channel.topic == "/points"}
+    assert len(clouds) == 120
+    for scan in again:
+        np.testing.assert_array_equal(clouds[scan.stamp_ns], clouds[scan.stamp_ns + 1])
 
 
 def test_a_scan_comes_batch_by_batch_on_the_clock_of_the_world(folder, tmp_path):
