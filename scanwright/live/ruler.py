@@ -47,8 +47,12 @@ class Ruler:
         self._scene, self._points = server.scene, points
         self.ends: list[Vector] = []
         self.on = server.gui.add_checkbox("measure", initial_value=False, hint="Click two points of the cloud")
-        self.said = ""
         self.on.on_update(lambda _: self._arm())
+
+    @property
+    def said(self) -> str:
+        """The distance in words; nothing before the second end."""
+        return f"{np.linalg.norm(self.ends[1] - self.ends[0]):.3f} m" if len(self.ends) == 2 else ""
 
     def click(self, origin_m: Vector, direction: Vector) -> None:
         """Take the point that is meant as the next end; a third one begins anew."""
@@ -70,7 +74,6 @@ class Ruler:
             self.click(np.array(event.ray_origin), np.array(event.ray_direction))
 
     def _draw(self) -> None:
-        self.said = ""
         for name in ("/ruler/ends", "/ruler/line", "/ruler/length"):
             self._scene.remove_by_name(name)
         if self.ends:
@@ -80,7 +83,6 @@ class Ruler:
             )
         if len(self.ends) == 2:
             first, last = self.ends
-            self.said = f"{np.linalg.norm(last - first):.3f} m"
             self._scene.add_line_segments(
                 "/ruler/line", ends[None], colors=COLOUR, thickness=3.0, thickness_units="screen"
             )
