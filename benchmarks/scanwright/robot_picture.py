@@ -72,8 +72,10 @@ def robot_bodies(jackal: Path) -> list[tuple[trimesh.Trimesh, tuple[float, float
     return [(body, YELLOW), *((w, DARK) for w in wheels), *((m, GREY) for m in [*mast, *plate])]
 
 
-def scanner_bodies(glb: Path) -> list[tuple[trimesh.Trimesh, tuple[float, float, float]]]:
-    """The bodies of a GLB of a build in the world's frame, with their colours."""
+def scanner_bodies(
+    glb: Path, T_turned: Array | None = None
+) -> list[tuple[trimesh.Trimesh, tuple[float, float, float]]]:
+    """The bodies of a GLB of a build in the world's frame, with their colours; those on the axis moved by a pose."""
     scene = trimesh.load_scene(glb)
     y_up_to_z_up = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
     bodies = []
@@ -82,6 +84,8 @@ def scanner_bodies(glb: Path) -> list[tuple[trimesh.Trimesh, tuple[float, float,
         mesh = scene.geometry[name].copy()
         linear = np.array(mesh.visual.material.baseColorFactor[:3]) / 255
         mesh.apply_transform(y_up_to_z_up @ T)
+        if T_turned is not None and scene.graph.transforms.parents[node] in ("rot", "laser"):
+            mesh.apply_transform(T_turned)
         r, g, b = np.clip(linear ** (1 / 2.2), 0.1, 1)
         bodies.append((trimesh.Trimesh(mesh.vertices, mesh.faces), (float(r), float(g), float(b))))
     return bodies
@@ -125,9 +129,9 @@ def height_colours(height_m: Array) -> Array:
     return matplotlib.colormaps["viridis"](0.22 + 0.78 * np.clip(height_m / 1.1, 0, 1))[:, :3]
 
 
-def fan(canvas: Canvas, angles: AngleSet) -> None:
-    """The beams of one scan, where the lidar stands in the picture, as a translucent sector; and the axis."""
-    T = angles.T_world_rot(0.0)
+def fan(canvas: Canvas, angles: AngleSet, joint_rad: float = 0.0) -> None:
+    """The beams of one scan at an angle of the servo, as a translucent sector where the lidar stands; and the axis."""
+    T = angles.T_world_rot(joint_rad)
     centre = T[:3, 3] + DECK_M
     bearing = np.radians(np.linspace(-135, 135, 91))
     rim = 0.42 * np.stack([np.cos(bearing), np.sin(bearing), 0 * bearing], axis=1)
