@@ -44,13 +44,13 @@ from firmware_io.twins.simulated import simulated_recording
 from scanwright.report.answer import mounting_rad, problem_as_built
 
 MOVIE = Path(__file__).parents[2] / "docs/pictures/from_task_to_cloud.webp"
-SIZE = (720, 405)
+SIZE = (640, 360)
 STILL, FRAME_MS = 14, 80  # frames that the end of a part stands
 ROLLING = np.radians([0.0, -90.0, 0.0, 90.0])
 DIRECTIONS = 60_000
 BALL_EYE, ORIGIN = np.array([3.0, -2.0, -1.0]), np.zeros(3)
 BY_SCAN = ("time_ns", "bearing_rad", "range_m", "intensity")
-TURNED, PARTED, SCANNED = 26, 18, 36  # frames
+TURNED, PARTED, SCANNED = 26, 18, 30  # frames
 
 
 def main() -> None:
@@ -59,7 +59,7 @@ def main() -> None:
     angles = sw.load_angles(build / "angles.json")
     robot = robot_bodies(Path(os.environ["SCANWRIGHT_DATA"]) / "meshes/jackal-base.stl")
     frames = [*found(build, angles), *assembled(build), *scanned(build, angles, robot)]
-    frames[0].save(MOVIE, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, quality=55, method=6)
+    frames[0].save(MOVIE, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, quality=30, method=6)
 
 
 def found(build: Path, angles: AngleSet) -> Iterator[Image.Image]:
