@@ -9,7 +9,7 @@ import struct
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import TypeVar
 
@@ -64,7 +64,7 @@ class SlamtecLidar:
         self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
         self._scanning = self._intensity = False
-        self._skip = 0
+        self._skip, self._warning = 0, ""
         self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
         self._line = SensorLine(address, 2 * max(protocol.SIZES.values()))
         self._recognise(model)
@@ -98,7 +98,7 @@ class SlamtecLidar:
         return self._bad_before + self._splitter.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Nothing: it counts no hours, and a fault of its health is told by `start`."""
+        """Nothing: it counts no hours; of its health, a fault is told by `start` and a warning with every turn."""
         return ()
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
@@ -116,6 +116,7 @@ class SlamtecLidar:
             raise DeviceError(
                 f"{self._line.name}: it reports fault {code:#06x}: take its power away, and give it again"
             )
+        self._warning = f"it reports a warning of its own health, {code:#06x}: it still scans" if status else ""
         self._intensity, self._skip = intensity, skip
         self._mode = self._typical_mode()
         self._turn_motor(on=True)
@@ -145,7 +146,8 @@ class SlamtecLidar:
             heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
             self._take([*self._heard, *heard], arrival_ns)
             self._heard = []
-        return timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
+        timed = timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
+        return replace(timed, warning=self._warning)
 
     def stop(self) -> None:
         """Laser and motor off.

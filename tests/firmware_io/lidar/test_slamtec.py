@@ -214,6 +214,17 @@ def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
             assert ours.read().scan.range_m.size > 400
 
 
+def test_a_warning_of_its_health_is_told_with_the_turns():
+    with SlamtecTwin(lidar("RPLIDAR S1"), sight) as twin, open_lidar(twin.port, "RPLIDAR S1") as ours:
+        twin.machine.health = 1
+        ours.start()
+        assert ours.read().warning == "it reports a warning of its own health, 0x8002: it still scans"
+        ours.stop()
+        twin.machine.health = 0
+        ours.start()
+        assert not ours.read().warning
+
+
 def test_a_fault_is_told():
     with SlamtecTwin(lidar("RPLIDAR S1"), sight) as twin, open_lidar(twin.port, "RPLIDAR S1") as ours:
         twin.machine.health = 2
