@@ -162,6 +162,13 @@ class Browser:
         page.goto(address)
         return page
 
+    def barriers(self, page):
+        """What axe-core finds that keeps somebody out: a line for each rule and element."""
+        from axe_playwright_python.sync_playwright import Axe
+
+        found = Axe().run(page).response["violations"]
+        return [f"{rule['id']}: {node['html'][:160]}" for rule in found for node in rule["nodes"]]
+
     def _said(self, kind, text):
         if kind in ("error", "warning") and not any(words in text for words in NOT_OURS):
             self.complaints.append(text)

@@ -21,8 +21,10 @@ import secrets
 import socket
 from collections import Counter
 from collections.abc import Callable
+from functools import cache
 from html import escape
 from http import HTTPStatus
+from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
@@ -126,11 +128,11 @@ class Gate:
         return checked
 
     def _titled(self, page: bytes) -> bytes:
-        """The page with its own name and icon in place of the library's."""
+        """The page with its own name and icon in place of the library's, and with what mends it for everybody."""
         head, end, rest = page.partition(b"</title>")
         head = re.sub(rb"<title>.*", lambda _: f"<title>{escape(self.title)}".encode(), head, flags=re.DOTALL)
         head = re.sub(rb'href="data:image/svg\+xml,[^"]*"', lambda _: f'href="{ICON}"'.encode(), head)
-        return head + end + rest
+        return head + end + _mending() + rest
 
     def admits(self, data: str | bytes) -> bool:
         """Whether a message is one that the page sends, whole and of the right types."""
@@ -158,6 +160,13 @@ class Gate:
             "X-Content-Type-Options": "nosniff",
             "Cache-Control": "no-store",
         }
+
+
+@cache
+def _mending() -> bytes:
+    """Style and script that are put into the page."""
+    style, script = (files("scanwright.serving").joinpath(f"mended_page.{kind}").read_bytes() for kind in ("css", "js"))
+    return b"<style>" + style + b"</style><script>" + script + b"</script>"
 
 
 def _bound(port: int) -> socket.socket:

@@ -189,6 +189,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
         page = browser.open(gate.address, width=900, height=600)
         assert page.title() == "a page"
         page.get_by_text("20,000 points").wait_for()
+        assert browser.barriers(page) == []
         page.get_by_label("measure").check()
         until(lambda: view.ruler.on.value)
         for number, across in enumerate((350, 550), 1):

@@ -665,6 +665,14 @@ def test_a_phone_needs_no_sideways_scroll(browser, folder):
     assert small == 0
 
 
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nobody_is_kept_out_of_it(browser, folder, size, scheme):
+    page = browser.open((folder / "report.html").as_uri(), *size, color_scheme=scheme)
+    page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
+    assert browser.barriers(page) == []
+
+
 def test_on_paper_nothing_is_folded_and_no_control_is_left(shown):
     shown.evaluate(
         "window.onbeforeprint = () => (window.printed = document.querySelectorAll('details:not([open])').length)"

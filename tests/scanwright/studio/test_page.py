@@ -186,6 +186,53 @@ def test_on_a_phone_the_facts_can_be_read(studio, browser):
     harmless(browser)
 
 
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+def test_nobody_is_kept_out_of_any_tab(studio, browser, size):
+    _, gate = studio
+    page = browser.open(gate.address, *size)
+    page.get_by_text("exact").wait_for()
+    for tab in ("Angles", "Paint", "Compare", "View", "Save"):
+        page.get_by_role("tab", name=tab).click()
+        page.get_by_role("tab", name=tab, selected=True).wait_for()
+        assert browser.barriers(page) == []
+    page.get_by_role("tab", name="Angles").click()
+    page.get_by_role("slider", name="beta_rot").wait_for()  # by the name that a screen reader says
+    harmless(browser)
+
+
+def test_every_control_is_reached_and_moved_by_the_keyboard(studio, browser):
+    studio, gate = studio
+    page = browser.open(gate.address, width=1000, height=700)
+    page.get_by_text("exact").wait_for()
+    page.get_by_role("tab", name="Angles").focus()
+    name = "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent"
+    reached = []
+    while len(reached) < 20 and "Keep this setting" not in reached:
+        page.keyboard.press("Tab")
+        reached.append(page.evaluate(name))
+    angles = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    assert all(reached.count(angle) == 2 for angle in angles)  # slider and number
+    assert "Optimise" in reached
+    slider = page.get_by_role("slider", name="beta_laser")
+    before = float(slider.get_attribute("aria-valuenow"))
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    until(lambda: studio.controls.angles[3].value != before)
+    harmless(browser)
+
+
+def test_on_a_phone_the_panel_is_a_sheet_that_fingers_can_use(studio, browser):
+    _, gate = studio
+    page = browser.open(gate.address, width=390, height=844, has_touch=True)
+    page.get_by_text("exact").wait_for()
+    sheet = page.locator(".sw-sheet").bounding_box()
+    assert sheet["x"] == 0 and sheet["width"] == 390 and sheet["y"] > 0.4 * 844
+    for control in page.locator(".sw-sheet").get_by_role("button").or_(page.get_by_role("tab")).all():
+        if control.is_visible():
+            assert control.bounding_box()["height"] >= 44
+    harmless(browser)
+
+
 def test_the_page_cannot_be_had_without_its_token(studio, browser):
     _, gate = studio
     page = browser.open(gate.address.split("?")[0], width=400, height=300)
