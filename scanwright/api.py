@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from firmware_io.assembly.assemble import AssembleSummary
     from firmware_io.calibration.calibrate import Calibration
     from firmware_io.lidar.lidar import LidarDriver
+    from firmware_io.mapping.map_files import MapSummary
     from firmware_io.recording.arrays import RecordingArrays
     from firmware_io.recording.importer import ImportSummary
     from firmware_io.recording.recording import Recording
@@ -561,6 +562,47 @@ def register(
     scanner = None if angles is None else _angles(angles)
     paths = [Path(cloud) for cloud in clouds]
     return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, say)
+
+
+def make_map(
+    clouds: Sequence[str | Path],
+    out: str | Path,
+    *,
+    angles: AnglesLike | None = None,
+    poses: str | Path | None = None,
+    resolution_m: float = 0.05,
+    floor_m: float | None = None,
+    from_m: float = 0.1,
+    to_m: float = 1.8,
+    say: Say = _quiet,
+) -> MapSummary:
+    """Turn clouds into an occupancy grid, as ROS's map_server reads it: YAML and PGM.
+
+    A cell is occupied where a point lies in it between two heights above the floor; free where it is not and a
+    beam passed below the lower one; else unknown.
+
+    Args:
+        clouds: of one place, z up, in one frame or with `poses`.
+        out: YAML file to write; the PGM goes beside it.
+        angles: angle set that all clouds were assembled with: its optical centre is where they were seen from. Without
+            it the origins of clouds that have poses are; of others nobody knows it, and they free nothing.
+        poses: TUM file, a line for each cloud, as `register` writes it; the poses in the files if not given.
+        resolution_m: edge of a cell.
+        floor_m: height of the floor in the map; found if not given.
+        from_m: what is lower above the floor is driven over.
+        to_m: what is higher above the floor is driven under.
+        say: is told what is being done.
+
+    Raises:
+        RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map. Nothing is
+            written then.
+    """
+    from firmware_io.mapping.map_files import map_files
+
+    scanner = None if angles is None else _angles(angles)
+    tum = None if poses is None else Path(poses)
+    paths = [Path(cloud) for cloud in clouds]
+    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, say)
 
 
 def read_cloud(path: str | Path) -> Cloud:

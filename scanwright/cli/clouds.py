@@ -1,4 +1,4 @@
-"""Commands about recordings and clouds: import, repair, assemble, calibrate, register, convert."""
+"""Commands about recordings and clouds: import, repair, assemble, calibrate, register, map, convert."""
 
 from __future__ import annotations
 
@@ -213,6 +213,44 @@ def register(
     )
     show(found.lines())
     raise typer.Exit(0 if found.complete else 1)
+
+
+@app.command("map")
+def map_(
+    clouds: Annotated[
+        list[Path], typer.Argument(metavar="CLOUD...", help="Clouds of one place in one frame, or with --poses; z up.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.yaml", help="Map to write; its .pgm goes beside.")],
+    angles: Annotated[
+        Path | None, typer.Option(metavar="angles.json", help="Angle set of the clouds: where they were seen from.")
+    ] = None,
+    poses: Annotated[
+        Path | None, typer.Option(metavar="FILE.tum", help="Where the clouds stand, a line each, as register writes.")
+    ] = None,
+    resolution_m: Annotated[float, typer.Option(metavar="M", help="Edge of a cell.")] = 0.05,
+    floor_m: Annotated[float | None, typer.Option(metavar="Z", help="Height of the floor; found if not given.")] = None,
+    from_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is lower is driven over.")] = 0.1,
+    to_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is higher is driven under.")] = 1.8,
+) -> None:
+    """Turn clouds into an occupancy grid for Nav2: a YAML and a PGM, cells occupied, free or unknown.
+
+    Free is where beams passed close above the floor, so it takes where they came from: name --angles, or --poses.
+    Clouds without are mapped all the same, with nothing free.
+    """
+    from scanwright import api
+
+    summary = api.make_map(
+        clouds,
+        out,
+        angles=angles,
+        poses=poses,
+        resolution_m=resolution_m,
+        floor_m=floor_m,
+        from_m=from_m,
+        to_m=to_m,
+        say=Progress(),
+    )
+    show(summary.lines())
 
 
 @app.command()

@@ -1,0 +1,70 @@
+"""The floor of a levelled cloud: the level that most of what lies lowest has in common."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from numpy import ndarray
+
+from design.errors import RecordingError
+
+_CELL_M = 0.25
+_THICK_M = 0.1  # of the layer that is taken for one level: three sigmas of the noisiest sensor either way, and a carpet
+_LEAST_M2 = 1.0
+_MOST_BELOW = 0.05  # of all points: reflections hang below a floor, a room does not
+_MOST_TILT_RAD = math.radians(1.0)  # a wall of 0.1 m, six metres away
+_GIVE_IT = "name its height: --floor-m"
+
+
+def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> float:
+    """Height of the floor.
+
+    Every square of 0.25 m has its lowest point. The level that most of these share is the floor, if it has an area (a
+    fan that lies level draws lines, no area), and if next to nothing lies below it (of a ceiling the walls do).
+
+    Args:
+        points_m: shape (n, 3), finite, z up.
+        below_m: the floor lies below this height, such as that of the scanner.
+
+    Raises:
+        RecordingError: there is no such level, or it is tilted: the cloud is not levelled.
+    """
+    squares = np.floor(points_m[:, :2] / _CELL_M).astype(np.int64)
+    order = np.lexsort((points_m[:, 2], squares[:, 1], squares[:, 0]))
+    first = np.r_[True, (np.diff(squares[order], axis=0) != 0).any(axis=1)] if order.size else np.zeros(0, bool)
+    lowest = order[first]
+    lowest = lowest[points_m[lowest, 2] < below_m]
+    if not lowest.size:
+        raise RecordingError(f"floor: no point lies below the scanner: {_GIVE_IT}")
+    height_m = np.sort(points_m[lowest, 2])
+    held = np.searchsorted(height_m, height_m + _THICK_M, side="right") - np.arange(height_m.size)
+    low_m = float(height_m[np.argmax(held)])
+    on_level = lowest[np.abs(points_m[lowest, 2] - low_m - _THICK_M / 2) <= _THICK_M / 2]
+    area_m2 = _inner(squares[on_level]) * _CELL_M**2
+    if area_m2 < _LEAST_M2:
+        raise RecordingError(
+            f"floor: what lies lowest shares no level: {area_m2:.2g} m2 at z = {low_m:.2f} m, {_LEAST_M2:g} m2 at "
+            f"least: {_GIVE_IT}"
+        )
+    if (below := float(np.mean(points_m[:, 2] < low_m - _THICK_M))) > _MOST_BELOW:
+        raise RecordingError(
+            f"floor: {below:.0%} of the points lie below the widest level, z = {low_m:.2f} m, which is no floor then: "
+            f"{_GIVE_IT}"
+        )
+    layer = points_m[np.abs(points_m[:, 2] - np.median(points_m[on_level, 2])) <= _THICK_M / 2]
+    middle_m = layer.mean(axis=0)
+    slope, *_ = np.linalg.lstsq((layer - middle_m)[:, :2], layer[:, 2] - middle_m[2], rcond=None)
+    if (tilt_rad := math.atan(math.hypot(*slope))) > _MOST_TILT_RAD:
+        raise RecordingError(
+            f"floor: tilted by {math.degrees(tilt_rad):.1f} deg, at most {math.degrees(_MOST_TILT_RAD):g}: level the "
+            f"cloud, or {_GIVE_IT}"
+        )
+    return float(np.median(layer[:, 2]))
+
+
+def _inner(squares: Int64[ndarray, "n 2"]) -> int:
+    """Squares whose four neighbours are there too; each of them stands once among `squares`, shape (n, 2)."""
+    there = {(int(x), int(y)) for x, y in squares}
+    return sum({(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)} <= there for x, y in there)

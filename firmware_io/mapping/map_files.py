@@ -1,0 +1,154 @@
+"""`scanwright map`: files of clouds become a map to drive by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
+
+from design import frames
+from design.angles import AngleSet
+from design.arrays import Vector
+from design.errors import RecordingError
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.clouds.formats import read_clouds
+from firmware_io.mapping.floor import find_floor
+from firmware_io.mapping.map_server import check_map_place, write_map
+from firmware_io.mapping.occupancy import FREE, OCCUPIED, Heights, OccupancyGrid, check_resolution, occupancy_grid
+from firmware_io.registration.poses import read_poses
+
+_COUNT = "count"  # of points in a voxel, as `merge` of the registration writes it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapSummary:
+    """What became of `map_files`.
+
+    Attributes:
+        grid: the map.
+        heights: between which things are in the way.
+        points: of all clouds.
+        wrote: YAML and image.
+        said: what a person should know, one sentence each.
+    """
+
+    grid: OccupancyGrid
+    heights: Heights
+    points: int
+    wrote: tuple[Path, Path]
+    said: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        grid, heights = self.grid, self.heights
+        rows, columns = grid.cells.shape
+        return [
+            *(f"note: {line}" for line in self.said),
+            f"floor at z = {heights.floor_m:.3f} m, obstacles from {heights.from_m:g} to {heights.to_m:g} m above it",
+            f"{columns} x {rows} cells of {grid.resolution_m:g} m: {grid.area_m2(OCCUPIED):.2f} m2 occupied, "
+            f"{grid.area_m2(FREE):.2f} m2 free",
+            f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}",
+        ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stand:
+    """What one cloud adds to a map, in the frame of the map.
+
+    Attributes:
+        points_m: shape (n, 3), finite.
+        eye_m: where the scanner stood, shape (3,); NaN where nobody knows.
+    """
+
+    points_m: Float64[ndarray, "n 3"]
+    eye_m: Vector
+
+
+def map_files(
+    paths: Sequence[Path],
+    out: Path,
+    scanner: AngleSet | None,
+    poses: Path | None,
+    floor_m: float | None,
+    from_m: float,
+    to_m: float,
+    resolution_m: float,
+    say: Callable[[str], None],
+) -> MapSummary:
+    """Read clouds, find the floor, write the map.
+
+    Args:
+        paths: files of clouds, z up.
+        out: YAML file to write; the image goes beside it.
+        scanner: angle set that all clouds were assembled with: its optical centre is where they were seen from.
+        poses: TUM file, a line for each cloud; without it the poses in the files.
+        floor_m: height of the floor in the map; None to find it.
+        from_m: above the floor; what is lower is driven over.
+        to_m: above the floor; what is higher is driven under.
+        resolution_m: edge of a cell.
+        say: progress.
+
+    Raises:
+        RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map.
+    """
+    check_map_place(out)
+    check_resolution(resolution_m)
+    Heights(0.0 if floor_m is None else floor_m, from_m, to_m)
+    stands, said = _stands(paths, scanner, poses, say)
+    points_m = np.concatenate([stand.points_m for stand in stands])
+    eyes_m = np.repeat([stand.eye_m for stand in stands], [len(stand.points_m) for stand in stands], axis=0)
+    if floor_m is None:
+        floor_m = find_floor(points_m, float(np.nanmin(eyes_m[:, 2], initial=np.inf)))
+    heights = Heights(floor_m, from_m, to_m)
+    say("mapping")
+    grid = occupancy_grid(points_m, eyes_m, heights, resolution_m)
+    said += _about_eyes(stands)
+    return MapSummary(grid, heights, len(points_m), write_map(out, grid), tuple(said))
+
+
+def _stands(
+    paths: Sequence[Path], scanner: AngleSet | None, poses: Path | None, say: Callable[[str], None]
+) -> tuple[list[Stand], list[str]]:
+    """All clouds of all files in the frame of the map, and lines about what was not read."""
+    named: list[tuple[Path, Cloud]] = []
+    said: list[str] = []
+    for path in paths:
+        read, lines = read_clouds(path)
+        said += lines
+        named += [(path, cloud) for cloud in read]
+    given = None if poses is None else read_poses(poses, len(named))
+    stands = []
+    for k, (path, cloud) in enumerate(named):
+        say(f"{path.name}: {len(cloud.points_m):,} points")
+        if not cloud.valid.any():
+            raise RecordingError(f"{path}: none of the {len(cloud.points_m)} rows is a point")
+        T = cloud.T_world_cloud if given is None else given[k]
+        eye_m = _eye(path, cloud, scanner, placed=given is not None or cloud.placed)
+        points_m = cloud.flat().points_m.astype(float)
+        stands.append(Stand(frames.apply(T, points_m), frames.apply(T, eye_m[None])[0]))
+    return stands, said
+
+
+def _eye(path: Path, cloud: Cloud, scanner: AngleSet | None, *, placed: bool) -> Vector:
+    """Where the scanner stood in the frame of its cloud."""
+    if _COUNT in cloud.columns and (scanner is not None or placed):
+        raise RecordingError(
+            f"{path}: its column {_COUNT} says that it is merged of several clouds, which no single place saw: name "
+            "those, with --poses of `scanwright register`"
+        )
+    if scanner is not None:
+        return scanner.T_world_rot(0.0)[:3, 3]
+    return np.zeros(3) if placed else np.full(3, np.nan)
+
+
+def _about_eyes(stands: Sequence[Stand]) -> list[str]:
+    unknown = sum(bool(np.isnan(stand.eye_m[0])) for stand in stands)
+    if not unknown:
+        return []
+    who = "it" if len(stands) == 1 else "them" if unknown == len(stands) else f"{unknown} of them"
+    free = "no cell is free" if unknown == len(stands) else "these free no cell"
+    return [f"nobody knows where the scanner stood that saw {who}, so {free}: name --angles, or --poses"]

@@ -1,0 +1,64 @@
+"""The two files that a ROS map_server reads: YAML beside a PGM."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from design.atomic_file import check_place, whole_file
+from design.errors import RecordingError
+from firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+
+_SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
+# 205 means 0.19608: above the lower threshold it stays unknown. Nav2's own default, 0.25, would make it free.
+_THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
+
+
+def image_beside(path: Path) -> Path:
+    """Where the PGM of a map stands."""
+    return path.with_suffix(".pgm")
+
+
+def check_map_place(path: Path) -> None:
+    """Refuse a map that cannot be written, before the work that it is to hold.
+
+    Raises:
+        RecordingError: its name does not end in .yaml, or no file can be there.
+    """
+    if path.suffix not in (".yaml", ".yml"):
+        raise RecordingError(f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm beside it")
+    for place in (path, image_beside(path)):
+        check_place(place, RecordingError)
+
+
+def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
+    """Write a map, and return its files: YAML and image.
+
+    The first row of the image is the one with the largest y; the origin is the lower left corner of the lower left
+    pixel, its third number the yaw.
+
+    Raises:
+        RecordingError: it cannot be written there.
+    """
+    check_map_place(path)
+    image = image_beside(path)
+    rows, columns = grid.cells.shape
+    shades = np.zeros(256, np.uint8)
+    for value, shade in _SHADES.items():
+        shades[value] = shade  # -1 is the last one
+    with whole_file(image, RecordingError) as part:
+        part.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + shades[grid.cells[::-1]].tobytes())
+    x, y = (round(float(value), 6) for value in grid.origin_m)
+    lines = [
+        f"image: {json.dumps(image.name)}",  # a string of JSON is one of YAML
+        "mode: trinary",
+        f"resolution: {grid.resolution_m!r}",
+        f"origin: [{x!r}, {y!r}, 0.0]",
+        "negate: 0",
+        *(f"{name}: {value}" for name, value in _THRESHOLDS.items()),
+    ]
+    with whole_file(path, RecordingError) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path, image

@@ -1,0 +1,172 @@
+"""Points and the beams that led to them as an occupancy grid: what stands in the way, what is free, what nobody saw."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int8
+from numba import njit
+from numpy import ndarray
+from numpy.typing import NDArray
+
+from design.arrays import Floats
+from design.errors import RecordingError
+
+UNKNOWN, FREE, OCCUPIED = -1, 0, 100
+"""Values of a cell, as nav_msgs/OccupancyGrid has them."""
+_MOST_CELLS = 1 << 26  # 400 x 400 m at 0.05 m
+_FINEST_M, _COARSEST_M = 1e-3, 10.0
+_HIGHEST_M = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Heights:
+    """Which layer of the world is in the way of a robot.
+
+    Attributes:
+        floor_m: height of the floor in the frame of the points.
+        from_m: above the floor; what is lower is driven over.
+        to_m: above the floor; what is higher is driven under.
+
+    Raises:
+        RecordingError: they are not in that order.
+    """
+
+    floor_m: float
+    from_m: float = 0.1
+    to_m: float = 1.8
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.floor_m):
+            raise RecordingError(f"--floor-m = {self.floor_m}: a height in m")
+        if not 0 < self.from_m < self.to_m <= _HIGHEST_M:
+            raise RecordingError(
+                f"--from-m = {self.from_m}, --to-m = {self.to_m}: 0 < the one < the other <= {_HIGHEST_M:g}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """A level world in squares.
+
+    Attributes:
+        cells: `UNKNOWN`, `FREE` or `OCCUPIED`, shape (rows, columns); rows go with y, columns with x.
+        resolution_m: edge of a cell.
+        origin_m: corner of cell (0, 0) where x and y are smallest, shape (2,); whole cells from 0.
+    """
+
+    cells: Int8[ndarray, "rows columns"]
+    resolution_m: float
+    origin_m: Float64[ndarray, " 2"]
+
+    def area_m2(self, value: int) -> float:
+        """Area of all cells of a value."""
+        return int(np.count_nonzero(self.cells == value)) * self.resolution_m**2
+
+
+def check_resolution(resolution_m: float) -> None:
+    """Refuse cells that no map has.
+
+    Raises:
+        RecordingError: so small or so large.
+    """
+    if not _FINEST_M <= resolution_m <= _COARSEST_M:
+        raise RecordingError(f"--resolution-m = {resolution_m}: {_FINEST_M:g} to {_COARSEST_M:g}")
+
+
+def occupancy_grid(
+    points_m: Float64[ndarray, "n 3"],
+    eyes_m: Float64[ndarray, "n 3"],
+    heights: Heights,
+    resolution_m: float = 0.05,
+) -> OccupancyGrid:
+    """What stands between two heights, and where beams passed below them without meeting anything.
+
+    A cell is occupied where a point lies in it between the two heights. It is free where it is not occupied and a beam
+    crossed it below the lower height: one that passes higher says nothing of what stands under it, as a table whose
+    top few beams meet. A beam counts up to a cell before its point, so that its noise frees nothing behind a wall. All
+    other cells are unknown.
+
+    The walk from cell to cell is that of J. Amanatides and A. Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing"
+    (Eurographics 1987).
+
+    Args:
+        points_m: shape (n, 3), finite, z up.
+        eyes_m: where each point was seen from, shape (n, 3); NaN where nobody knows: such a point frees nothing.
+        heights: of what is in the way.
+        resolution_m: edge of a cell.
+
+    Raises:
+        RecordingError: the cells are too small, too large or too many, or no point and no beam is between the heights.
+    """
+    check_resolution(resolution_m)
+    low_m, high_m = heights.floor_m + heights.from_m, heights.floor_m + heights.to_m
+    hits_m = points_m[(points_m[:, 2] >= low_m) & (points_m[:, 2] <= high_m), :2]
+    # half the lower height at most: what looks straight down has its last piece below it left
+    short_m = min(resolution_m, heights.from_m / 2)
+    ways_m = _ways_within(points_m, eyes_m, heights.floor_m - heights.from_m, low_m, short_m)
+    ends_m = np.concatenate([hits_m, ways_m[:, :2], ways_m[:, 2:]])
+    if not ends_m.size:
+        raise RecordingError(
+            f"no point and no beam between {heights.from_m:g} and {heights.to_m:g} m above the floor at "
+            f"z = {heights.floor_m:.2f} m: set --floor-m, --from-m or --to-m"
+        )
+    first = np.floor(ends_m.min(axis=0) / resolution_m) - 1
+    columns, rows = (np.floor(ends_m.max(axis=0) / resolution_m) - first + 2).astype(np.int64)
+    if columns * rows > _MOST_CELLS:
+        raise RecordingError(
+            f"--resolution-m = {resolution_m:g}: {columns:,} x {rows:,} cells, at most {_MOST_CELLS:,} in all: take "
+            "larger ones, or leave strays out (`scanwright assemble --max-range-m`)"
+        )
+    cells = np.full((rows, columns), UNKNOWN, np.int8)
+    _free(cells, ways_m / resolution_m - np.tile(first, 2))
+    column, row = np.floor(hits_m / resolution_m - first).astype(np.int64).T
+    cells[row, column] = OCCUPIED
+    return OccupancyGrid(cells, resolution_m, first * resolution_m)
+
+
+@njit(cache=True)
+def _ways_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, short_m: float) -> Floats:
+    """Of each beam what lies between two heights and ends `short_m` before its point: (m, 4), x y from and x y to."""
+    ways = np.empty((points_m.shape[0], 4))
+    count = 0
+    for i in range(points_m.shape[0]):
+        eye, along = eyes_m[i], points_m[i] - eyes_m[i]
+        length = np.sqrt(np.sum(along**2))
+        if not length > short_m:  # an eye that nobody knows, too
+            continue
+        begin, end = 0.0, 1.0 - short_m / length
+        if along[2] == 0.0:
+            if eye[2] < low_m or eye[2] > high_m:
+                continue
+        else:
+            a, b = (low_m - eye[2]) / along[2], (high_m - eye[2]) / along[2]
+            begin, end = max(begin, min(a, b)), min(end, max(a, b))
+        if begin < end:
+            ways[count, :2] = eye[:2] + begin * along[:2]
+            ways[count, 2:] = eye[:2] + end * along[:2]
+            count += 1
+    return ways[:count]
+
+
+@njit(cache=True)
+def _free(cells: NDArray[np.int8], ways: Floats) -> None:
+    """Free every cell that a way crosses; ways of shape (m, 4) in cells, x y from and x y to."""
+    for i in range(ways.shape[0]):
+        x, y = int(np.floor(ways[i, 0])), int(np.floor(ways[i, 1]))
+        dx, dy = ways[i, 2] - ways[i, 0], ways[i, 3] - ways[i, 1]
+        step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
+        per_x, per_y = (1 / abs(dx) if dx else np.inf), (1 / abs(dy) if dy else np.inf)
+        next_x = (x + (dx > 0) - ways[i, 0]) / dx if dx else np.inf
+        next_y = (y + (dy > 0) - ways[i, 1]) / dy if dy else np.inf
+        cells[y, x] = 0
+        while min(next_x, next_y) < 1.0:
+            if next_x < next_y:
+                x += step_x
+                next_x += per_x
+            else:
+                y += step_y
+                next_y += per_y
+            cells[y, x] = 0

@@ -1,0 +1,113 @@
+"""`scanwright map` from a simulated scanner's cloud to the files of a map, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scanwright as sw
+from design.angles import AngleSet
+from firmware_io.clouds.cloud import Cloud
+from firmware_io.clouds.formats import write_clouds
+
+ANGLES = {
+    "schema": "scanwright/angles/1",
+    "task": "rolling",
+    "task_sha256": None,
+    "source": "design",
+    "angles_deg": dict.fromkeys(["alpha_rot", "gamma_rot", "alpha_laser", "gamma_laser"], 0)
+    | {"beta_rot": 90, "beta_laser": -90},
+    "delta_rotvec_rot_deg": [0, 0],
+    "t_rot_laser_mm": [0, 0, 0],
+    "t_world_rot_mm": [0, 0, 130],
+    "sensor": "URG-04LX",
+    "servo": "AX-12A",
+    "slip_ring": None,
+    "motion": {"mode": "spin", "period_s": 24.0},
+    "J": None,
+    "J_error": None,
+    "covariance": None,
+    "versions": {},
+}
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory):
+    """A rolling scanner's cloud of the furnished room, and its angle set."""
+    folder = tmp_path_factory.mktemp("map")
+    (folder / "angles.json").write_text(json.dumps(ANGLES))
+    angles: AngleSet = sw.load_angles(folder / "angles.json")
+    recorded = sw.simulate(angles, noise_mm=5.0)
+    T = angles.T_world_laser(recorded.joint_rad.ravel())
+    beams = np.stack([np.cos(recorded.bearing_rad), np.sin(recorded.bearing_rad)], axis=-1).reshape(-1, 2)
+    points = recorded.range_m.ravel()[:, None] * np.einsum("nij,nj->ni", T[:, :3, :2], beams) + T[:, :3, 3]
+    write_clouds(folder / "room.ply", [Cloud(points[np.isfinite(points).all(axis=1)])])
+    write_clouds(folder / "merged.npz", [Cloud(points[:9], {"count": np.ones(9, np.uint32)})])
+    write_clouds(folder / "sky.npz", [Cloud(points[np.isfinite(points).all(axis=1) & (points[:, 2] > 0.2)])])
+    (folder / "one.tum").write_text("0 1 2 0 0 0 0 1\n")
+    return folder
+
+
+@pytest.fixture
+def run(command, shop, monkeypatch):
+    monkeypatch.chdir(shop)
+    return lambda *words: command("map", *words)
+
+
+def test_a_cloud_becomes_a_map(run, shop):
+    code, told, complaints = run("room.ply", "--angles", "angles.json", "-o", "room.yaml")
+    assert (code, complaints) == (0, [])
+    lines = told.splitlines()
+    assert lines[0] == "floor at z = -0.900 m, obstacles from 0.1 to 1.8 m above it"
+    assert lines[-1].endswith("points to room.yaml, room.pgm")
+    pixels = np.asarray(Image.open(shop / "room.pgm"))
+    assert set(np.unique(pixels)) == {0, 205, 254}
+    assert 10 < (pixels == 254).sum() * 0.05**2 < 7.2 * 5.6
+    assert "free_thresh: 0.196" in (shop / "room.yaml").read_text()
+
+
+def test_without_a_place_nothing_is_free_and_a_line_says_so(run, shop):
+    code, told, _ = run("room.ply", "-o", "blind.yaml")
+    assert code == 0
+    assert "nobody knows where the scanner stood that saw it, so no cell is free: name --angles, or --poses" in told
+    assert 254 not in np.asarray(Image.open(shop / "blind.pgm"))
+
+
+def origin_m(path):
+    (line,) = (line for line in path.read_text().splitlines() if line.startswith("origin"))
+    return np.array(json.loads(line.partition(": ")[2]))
+
+
+def test_poses_move_the_map(run, shop):
+    for name, words in {"here": (), "there": ("--poses", "one.tum")}.items():
+        code, _, _ = run("room.ply", "--angles", "angles.json", *words, "-o", f"{name}.yaml")
+        assert code == 0
+    np.testing.assert_allclose(origin_m(shop / "there.yaml") - origin_m(shop / "here.yaml"), [1, 2, 0], atol=0.051)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("room.ply", "-o", "room.png"), "room.png: a map_server reads room.yaml, with a .pgm beside it"),
+        (("room.ply", "-o", "no/room.yaml"), "the folder no does not exist"),
+        (("room.ply", "-o", "m.yaml", "--resolution-m", "0"), "--resolution-m = 0.0: 0.001 to 10"),
+        (("room.ply", "-o", "m.yaml", "--resolution-m", "nan"), "--resolution-m = nan"),
+        (("room.ply", "-o", "m.yaml", "--from-m", "2"), "--from-m = 2.0, --to-m = 1.8: 0 < the one < the other"),
+        (("room.ply", "-o", "m.yaml", "--floor-m", "inf"), "--floor-m = inf: a height in m"),
+        (("room.ply", "-o", "m.yaml", "--floor-m", "90"), "no point and no beam between 0.1 and 1.8 m above the floor"),
+        (("sky.npz", "-o", "m.yaml"), "which is no floor then: name its height: --floor-m"),
+        (("sky.npz", "-o", "m.yaml", "--angles", "angles.json"), "no point lies below the scanner"),
+        (("merged.npz", "-o", "m.yaml", "--angles", "angles.json"), "which no single place saw: name those"),
+        (("room.ply", "room.ply", "-o", "m.yaml", "--poses", "one.tum"), "1 poses for 2 clouds"),
+        (("room.ply", "-o", "m.yaml", "--angles", "none.json"), "none.json"),
+        (("none.ply", "-o", "m.yaml"), "none.ply"),
+    ],
+)
+def test_what_makes_no_map_is_one_line_and_no_file(run, shop, words, told):
+    code, _, complaints = run(*words)
+    assert code == 2
+    assert len(complaints) == 1
+    assert told in complaints[0]
+    assert not (shop / "m.yaml").exists()
+    assert not (shop / "m.pgm").exists()
