@@ -69,7 +69,7 @@ class LidarDriver(Protocol):
     ) -> None: ...
 
     def condition(self) -> tuple[str, ...]:
-        """What it tells of its own age and health, in words, one thing each; empty where it tells nothing.
+        """What it tells of its own age and state, in words, one thing each; trouble is a scan's `warning`, or an error.
 
         Asked before `start` only: in some sensors an answer comes among scans.
 

@@ -145,6 +145,7 @@ class LidarMachine:
         motor_error: turns take this part longer than the sensor says.
         stamp_at: which moment of a turn the stamps mean.
         scip_1: it talks SCIP 1.1 until it is told otherwise.
+        state: STAT of II.
         laser: whether it is on.
         scanning: what it scans for; None where nobody asked.
     """
@@ -155,6 +156,7 @@ class LidarMachine:
     motor_error: float = 0.0
     stamp_at: StampAt = "step_0"
     scip_1: bool = False
+    state: str = "Sensor works well."
     laser: bool = False
     scanning: Scanning | None = None
     _adjusting: bool = False
@@ -373,7 +375,7 @@ class LidarMachine:
             ("MESM", self.identity.mode),
             ("SBPS", self.identity.line),
             ("TIME", f"{self.quartz.ms(now_ns):06X}"),
-            ("STAT", "Sensor works well."),
+            ("STAT", self.state),
         ]
 
 

@@ -16,6 +16,7 @@ class VirtualLine:
     """The machine of a twin behind a stream of the drivers' shape, and the clock of both."""
 
     def __init__(self, model, sight):
+        self.model = model
         lidar = load_catalogue().get(model, Lidar)
         self.machine = resolve_name(family_of(model).twin)(lidar, sight, 0).machine
         self.now_ns = time.monotonic_ns()  # at which the machine was made

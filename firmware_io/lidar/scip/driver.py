@@ -23,6 +23,8 @@ from firmware_io.lidar.sensor_line import until_back
 
 _SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
 _EXCHANGES = 60
+# of its captures, and of firmware of the EW and UST; what else a sensor says of its state is trouble
+_WELL = ("sensor works well", "stable 000 no error", "sensor is working normally")
 _WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX answers TM1 with times 23 ms off its stamps
 
 
@@ -58,6 +60,7 @@ class ScipLidar:
         self._bad_scans = 0
         self._counter = StampCounter()
         self._request = b""
+        self._warning = ""
         self._skip = 0
         self._stamp_ms = -1
         self._dialogue = ScipDialogue(address)
@@ -97,13 +100,13 @@ class ScipLidar:
         return protocol.information(self._dialogue.ask(command.encode()))
 
     def condition(self) -> tuple[str, ...]:
-        """What it says of its state, in its own words (STAT of II).
+        """What it says of its state where that is well (STAT of II); trouble comes with its scans.
 
         Raises:
             DeviceError: it does not answer, or is gone.
         """
         said = self.information("II").get("STAT", "")
-        return (f"it says: {said}",) if said else ()
+        return (f"it says: {said}",) if _is_well(said) else ()
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; the laser lights by itself.
@@ -133,7 +136,7 @@ class ScipLidar:
         raw = self.read_raw(timeout_s)
         moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
         scan = to_laser_scan(raw, self.parameters, moment.time_ns)
-        return TimedScan(scan, raw.arrival_ns, moment.uncertainty_ns)
+        return TimedScan(scan, raw.arrival_ns, moment.uncertainty_ns, self._warning)
 
     def read_raw(self, timeout_s: float | None = None) -> RawScan:
         """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
@@ -196,6 +199,8 @@ class ScipLidar:
 
     def _scan_on(self) -> None:
         self._stamp_ms = -1
+        said = self.information("II").get("STAT", "")
+        self._warning = f"it says of itself: {said}: give its power anew" if said and not _is_well(said) else ""
         self._dialogue.insist(self._request, "00")
 
     def _synchronise(self) -> TimeSync | None:
@@ -249,6 +254,10 @@ class ScipLidar:
             intensity=taken.intensity.astype("float32"),
             codes=codes,
         )
+
+
+def _is_well(said: str) -> bool:
+    return said.rstrip(". ").lower() in _WELL
 
 
 def open_scip(address: str, _model: str | None = None, stamp_at: StampAt = "step_0") -> ScipLidar:

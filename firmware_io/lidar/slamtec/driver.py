@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
 from firmware_io.lidar.lidar import StampAt, TimedScan
 from firmware_io.lidar.sensor_line import SensorLine, until_back
 from firmware_io.lidar.slamtec import protocol
@@ -24,7 +24,8 @@ from firmware_io.lidar.slamtec.series import SERIES
 from firmware_io.lidar.turn import TurnQueue, timed_scan
 
 _ANSWER_S = 0.5
-_TURN_S = 3.0  # the motor takes its time to start
+_TURN_S = 1.0  # ten turns
+_START_S = 3.0  # the first turn: the motor takes its time
 _DRAIN_S, _SILENT_S = 0.2, 0.03
 _TRIES = 3
 _PAUSE_NS = 500_000_000
@@ -63,7 +64,7 @@ class SlamtecLidar:
         self._bad_before = 0
         self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
-        self._scanning = self._intensity = False
+        self._scanning = self._turning = self._intensity = False
         self._skip, self._warning = 0, ""
         self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
         self._line = SensorLine(address, 2 * max(protocol.SIZES.values()))
@@ -105,7 +106,8 @@ class SlamtecLidar:
         """Start the motor and scan until `stop`.
 
         Raises:
-            DeviceError: clusters, which it has not; it refuses, reports a fault, or is gone.
+            DeviceFaultError: it reports a fault.
+            DeviceError: clusters, which it has not; it refuses, or is gone.
         """
         if cluster != 1:
             raise DeviceError(
@@ -113,7 +115,7 @@ class SlamtecLidar:
             )
         status, code = self._told(protocol.HEALTH, 6, protocol.health)
         if status == 2:
-            raise DeviceError(
+            raise DeviceFaultError(
                 f"{self._line.name}: it reports fault {code:#06x}: take its power away, and give it again"
             )
         self._warning = f"it reports a warning of its own health, {code:#06x}: it still scans" if status else ""
@@ -126,14 +128,14 @@ class SlamtecLidar:
         told, follows = self._reply(time.monotonic() + _ANSWER_S)
         if not told.stream or told.kind != self._mode.kind:
             raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
-        self._scanning = True
+        self._scanning, self._turning = True, False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
         self._begin_anew()
         self._heard = self._splitter.feed(follows)
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn; it is waited for for three seconds if nothing else is said.
+        """The next turn; it is waited for for a second if nothing else is said, three for the first.
 
         Raises:
             DeviceTimeoutError: none came in time.
@@ -141,11 +143,13 @@ class SlamtecLidar:
         """
         if not self._scanning:
             raise DeviceError(f"{self._line.name}: not started")
-        deadline_s = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
+        patience_s = _TURN_S if self._turning else _START_S
+        deadline_s = time.monotonic() + (patience_s if timeout_s is None else timeout_s)
         while (turn := self._turns.next()) is None:
             heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
             self._take([*self._heard, *heard], arrival_ns)
             self._heard = []
+        self._turning = True
         timed = timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
         return replace(timed, warning=self._warning)
 

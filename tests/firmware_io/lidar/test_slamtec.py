@@ -42,6 +42,7 @@ def patience(monkeypatch):
     """Twins share a computer with the tests: ten times as long; what old firmware leaves unanswered is waited for."""
     monkeypatch.setattr(driver, "_ANSWER_S", 2.0)
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
+    monkeypatch.setattr(driver, "_START_S", 20.0)
 
 
 def lidar(model):
