@@ -22,6 +22,7 @@ class SensorLine:
         address: where it is: a serial port, or HOST:PORT.
         stream: its bytes.
         longest: bytes of what can be whole; so much that comes too late, and is nothing, ends the waiting.
+        heard: bytes that came, whatever they were: none tell that nobody listens at this speed.
     """
 
     def __init__(self, address: str, longest: int) -> None:
@@ -30,7 +31,7 @@ class SensorLine:
         Raises:
             DeviceError: no such port or host, or it is in use.
         """
-        self.address, self.longest = address, longest
+        self.address, self.longest, self.heard = address, longest, 0
         self.stream = open_stream(address)
 
     @property
@@ -69,6 +70,7 @@ class SensorLine:
             with self.told_when_gone():
                 received = self.stream.read(deadline_s - time.monotonic())
             arrival_ns = time.monotonic_ns()
+            self.heard += len(received)
             found = feed(received)
             if found:
                 return found, arrival_ns

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -53,10 +54,12 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
     if twins is not None and lidar is None and servo is None:
         yield DeviceFinding("ok", f"the scanner of {out} is emulated by process {twins.pid}")
         lidars, servos = [twins.lidar], [twins.servo]
-    for port in lidars:
-        yield from _guarded(_examine_lidar(port, angles))
-    for port in servos:
-        yield from _guarded(_examine_servo(port, angles.servo if angles else None, servo_id))
+    model = angles.servo if angles else None
+    examinations = [_guarded(_examine_lidar(port, angles)) for port in lidars]
+    examinations += [_guarded(_examine_servo(port, model, servo_id)) for port in servos]
+    with ThreadPoolExecutor(max(len(examinations), 1)) as side_by_side:  # as a scan asks them
+        for findings in side_by_side.map(list[DeviceFinding], examinations):
+            yield from findings
     if not lidars:
         yield DeviceFinding(
             "wrong",

@@ -176,10 +176,13 @@ class LmsLidar:
                     self._line.serial.baud = baud
                 self._baud = baud
                 for _ in range(_TRIES):
+                    before = self._line.heard
                     try:
                         self._mode(protocol.ON_REQUEST, _ANSWER_S)
                         told = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
                     except DeviceTimeoutError:
+                        if self._line.heard == before and baud != _BAUDS[0]:
+                            break
                         continue
                     self._accept(told.values[:-1].decode("ascii", "replace"), model)
                     self._splitter.bad = 0  # what was on its way when we came is nobody's fault

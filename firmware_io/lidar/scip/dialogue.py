@@ -13,7 +13,7 @@ from firmware_io.lidar.scip import protocol
 from firmware_io.lidar.sensor_line import SensorLine
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
-_TRIES = 3  # a first request may be glued to what a client before us left half said
+_TRIES = 3  # a first request may be glued to what a client before us left half said, which is answered by a refusal
 _BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
 _FASTER_BAUDS = (250_000, 500_000, 750_000)
 
@@ -122,9 +122,12 @@ class ScipDialogue:
             if port is not None and port.baud != baud:
                 port.baud = baud
             for _ in range(_TRIES):
+                before = self.line.heard
                 try:
                     told = self.ask(b"QT", timeout_s=_ANSWER_S / 2)
                 except DeviceTimeoutError:
+                    if self.line.heard == before and baud != _BAUDS[0]:
+                        break
                     continue
                 if told.status == "00":
                     if port is not None and baud != FIRST_BAUD:

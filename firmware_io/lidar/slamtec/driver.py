@@ -185,10 +185,12 @@ class SlamtecLidar:
         wanted = [series for series in SERIES.values() if model in (None, series.model)]
         with self._line.closed_on_error():
             bauds = list(dict.fromkeys(series.baud for series in wanted))
-            for baud in bauds if self._line.serial is not None else bauds[:1]:  # a server has set its own line
+            bauds = bauds if self._line.serial is not None else bauds[:1]  # a server has set its own line
+            for baud in bauds:
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
                 for _ in range(_TRIES):
+                    before = self._line.heard
                     with suppress(DeviceTimeoutError):
                         self._request(protocol.STOP)
                         self._drain()
@@ -196,6 +198,8 @@ class SlamtecLidar:
                         self._accept(told, model)
                         self._baud = baud
                         return
+                    if self._line.heard == before and len(bauds) > 1:
+                        break
             raise DeviceTimeoutError(f"{self.address}: no RPLIDAR answers; check power, cable and port")
 
     def _accept(self, told: protocol.Info, model: str | None) -> None:
@@ -283,8 +287,8 @@ class SlamtecLidar:
         """What it had sent before it stopped."""
         end_s = time.monotonic() + _DRAIN_S
         with self._line.told_when_gone():
-            while time.monotonic() < end_s and self._line.stream.read(_SILENT_S):
-                pass
+            while time.monotonic() < end_s and (drained := self._line.stream.read(_SILENT_S)):
+                self._line.heard += len(drained)
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:
