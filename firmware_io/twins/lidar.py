@@ -7,8 +7,9 @@ import time
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
 from firmware_io.lidar.scip import protocol
+from firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
 from firmware_io.twins.lidar_line import LidarLine, Sight
-from firmware_io.twins.lidar_machine import IDENTITIES, LidarMachine, Look, Quartz
+from firmware_io.twins.lidar_machine import LidarMachine, Look
 
 _HEAD = 32  # bytes of a scan before its ranges: echo, status, stamp
 

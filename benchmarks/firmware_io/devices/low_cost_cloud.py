@@ -13,7 +13,9 @@ import math
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +55,51 @@ def residuals_m(cloud: np.ndarray, angles: AngleSet, scene: Scene) -> tuple[Floa
     return (range_m - hits.range_m)[clear], float(clear.mean())
 
 
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """How far the points of a scan lie from the room.
+
+    Attributes:
+        points: that were taken.
+        share: of the cloud that they are.
+        median_mm: behind the surface, along the beams.
+        spread_mm: robust standard deviation (of the median absolute deviation).
+        beyond: share beyond six times the sensor's noise.
+    """
+
+    points: int
+    share: float
+    median_mm: float
+    spread_mm: float
+    beyond: float
+
+
+def scanned(angles: AngleSet, turns: int, say: Callable[[str], None]) -> Residuals:
+    """Scan the furnished room with the emulated scanner of an angle set, assemble, and compare.
+
+    Raises:
+        ScanwrightError: as `acquire` and `assemble` do.
+    """
+    scene = room(None)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        with emulated_scanner(angles, scene) as twins:
+            acquire(plan_scan(out, turns=turns, lidar=twins.ports.lidar, servo=twins.ports.servo), say)
+        (recording,) = (out / "recordings").glob("*.mcap")
+        api.assemble(recording, out / "angles.json", out / "cloud.ply")
+        error_m, share = residuals_m(read_ply(out / "cloud.ply"), angles, scene)
+    median_m = float(np.median(error_m))
+    sigma_m = load_catalogue().get(angles.sensor, Lidar).range_sigma_mm / 1e3
+    return Residuals(
+        points=error_m.size,
+        share=share,
+        median_mm=1e3 * median_m,
+        spread_mm=1e3 * float(np.median(np.abs(error_m - median_m))) / 0.67449,
+        beyond=float(np.mean(np.abs(error_m) > 6 * sigma_m)),
+    )
+
+
 def main() -> None:
     """Scan, assemble, compare."""
     turns = int(sys.argv[1]) if len(sys.argv) > 1 else 1
@@ -61,21 +108,11 @@ def main() -> None:
         os.nice(-10)  # twins need their time, as hardware does not
     angles = api.optimise(task).angle_set()
     sigma_mm = load_catalogue().get(angles.sensor, Lidar).range_sigma_mm
-    scene = room(None)
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder)
-        (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        with emulated_scanner(angles, scene) as twins:
-            acquire(plan_scan(out, turns=turns, lidar=twins.ports.lidar, servo=twins.ports.servo), print)
-        (recording,) = (out / "recordings").glob("*.mcap")
-        api.assemble(recording, out / "angles.json", out / "cloud.ply")
-        error_m, share = residuals_m(read_ply(out / "cloud.ply"), angles, scene)
-    median_mm = 1e3 * float(np.median(error_m))
-    spread_mm = 1e3 * float(np.median(np.abs(error_m - np.median(error_m)))) / 0.67449
+    found = scanned(angles, turns, print)
     print(
-        f"{task}, {angles.sensor} on {angles.servo}, {turns} full scan(s): {error_m.size:,} points ({share:.0%} away "
-        f"from edges) lie {median_mm:+.2f} mm from the room, spread {spread_mm:.1f} mm; the sensor's noise is "
-        f"{sigma_mm:g} mm; {np.mean(np.abs(error_m) > 6e-3 * sigma_mm):.2%} beyond six times that"
+        f"{task}, {angles.sensor} on {angles.servo}, {turns} full scan(s): {found.points:,} points ({found.share:.0%} "
+        f"away from edges) lie {found.median_mm:+.2f} mm from the room, spread {found.spread_mm:.1f} mm; the sensor's "
+        f"noise is {sigma_mm:g} mm; {found.beyond:.2%} beyond six times that"
     )
 
 

@@ -14,7 +14,7 @@ from firmware_io.lidar import byte_stream, sensor_line
 from firmware_io.lidar.scip import dialogue, protocol
 from firmware_io.lidar.scip.driver import ScipLidar, open_scip
 from firmware_io.lidar.scip.raw_scan import to_laser_scan
-from firmware_io.twins import lidar_machine
+from firmware_io.twins import hokuyo_models, lidar_machine
 from firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
@@ -273,8 +273,8 @@ def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
 
 
 def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypatch):
-    told = replace(lidar_machine.IDENTITIES["UTM-30LX"], firmware="1.16.02(19/Jan./2010)")
-    monkeypatch.setitem(lidar_machine.IDENTITIES, "UTM-30LX", told)
+    told = replace(hokuyo_models.IDENTITIES["UTM-30LX"], firmware="1.16.02(19/Jan./2010)")
+    monkeypatch.setitem(hokuyo_models.IDENTITIES, "UTM-30LX", told)
     asked, answer = [], lidar_machine.LidarMachine.answer
 
     def listening(self, request, now_ns):

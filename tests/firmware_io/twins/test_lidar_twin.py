@@ -14,8 +14,9 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar as Lidar
 from design.errors import DeviceError
 from firmware_io.lidar.scip import protocol
+from firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
 from firmware_io.twins.lidar import LidarTwin
-from firmware_io.twins.lidar_machine import IDENTITIES, LidarMachine, Quartz, clustered
+from firmware_io.twins.lidar_machine import LidarMachine, clustered
 
 MS = 1_000_000
 

@@ -1,0 +1,107 @@
+"""Which Hokuyo a twin is: what it says of itself, and its clock.
+
+Texts and statuses are those of captured sensors, except where an entry says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from firmware_io.lidar.device_clock import STAMP_WRAP_MS
+from firmware_io.lidar.scip.parameters import Parameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """What tells one model from another.
+
+    Attributes:
+        parameters: its PP reply.
+        product: PROD of VV.
+        firmware: FIRM of VV.
+        serial_number: SERI of VV.
+        speed: SCSP of II.
+        mode: MESM of II.
+        line: SBPS of II.
+        speed_request: status of a CR request that changes nothing.
+        no_return: number that stands for a beam that does not come back.
+        too_near: number that stands for something in front of the least range.
+        intensity: whether it measures intensities.
+    """
+
+    parameters: Parameters
+    product: str
+    firmware: str
+    serial_number: str
+    speed: str
+    mode: str = "CLASSIC"
+    line: str = "USB Full Speed"
+    speed_request: str = "04"
+    no_return: int
+    too_near: int
+    intensity: bool = True
+
+
+# Parameters: model, range [mm], steps per turn, first, last and front step, rpm
+IDENTITIES = {
+    known.parameters.model: known
+    for known in (
+        Identity(
+            parameters=Parameters("URG-04LX", 20, 5600, 1024, 44, 725, 384, 600),
+            product="SOKUIKI Sensor URG-04LX",
+            firmware="3.1.04(02/Aug./2007)",
+            serial_number="H0706400",
+            speed="Initial(600[rpm])<-Default setting by user",
+            line="19200[bps]<-Default setting by user",
+            speed_request="03",
+            no_return=0,
+            too_near=6,
+            intensity=False,
+        ),
+        Identity(
+            parameters=Parameters("UTM-30LX", 23, 60000, 1440, 0, 1080, 540, 2400),
+            product="SOKUIKI Sensor TOP-URG UTM-30LX",
+            firmware="P.1.05(17/Apr./2009)",
+            serial_number="00903971",
+            speed="Initial(2400[rpm])<-Default setting by user",
+            no_return=1,
+            too_near=2,
+        ),
+        Identity(
+            parameters=Parameters("UXM-30LX-E", 100, 100000, 1440, 0, 760, 380, 1200),
+            product="SOKUIKI Sensor Tough-URG UXM-30LX-E",
+            firmware="0.3.01(11/Mar./2010)",
+            serial_number="H0909106",
+            speed="Initial(1200[rpm])",
+            mode="STANDARD(max:100000[mm])",
+            no_return=0,
+            too_near=0,
+        ),
+        Identity(  # no capture: product, serial number and mode are made up
+            parameters=Parameters("UST-10LX", 20, 30000, 1440, 0, 1080, 540, 2400),
+            product="SOKUIKI Sensor UST-10LX",
+            firmware="4.0.2-A",
+            serial_number="H1300001",
+            speed="2400",
+            mode="Measuring by Normal Mode",
+            line="Ethernet 100 [Mbps]",
+            no_return=65533,
+            too_near=65533,
+        ),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Quartz:
+    """A sensor's clock: it showed `clock_ms` at `began_ns` and runs `rate_error` fast."""
+
+    began_ns: int
+    clock_ms: int
+    rate_error: float
+
+    def ms(self, time_ns: int) -> int:
+        """What it shows, 24 bit."""
+        shown_ms = self.clock_ms + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e6)
+        return shown_ms % STAMP_WRAP_MS
