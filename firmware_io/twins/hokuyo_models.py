@@ -89,6 +89,38 @@ IDENTITIES = {
             no_return=65533,
             too_near=65533,
         ),
+        Identity(  # parameters as a user listed them (hokuyoaist, issue 1); the rest is the URG-04LX's
+            parameters=Parameters("URG-04LX-UG01", 20, 5600, 1024, 44, 725, 384, 600),
+            product="SOKUIKI Sensor URG-04LX-UG01(Simple-URG)",
+            firmware="3.3.01",
+            serial_number="H1000001",
+            speed="Initial(600[rpm])<-Default setting by user",
+            speed_request="03",
+            no_return=0,
+            too_near=6,
+            intensity=False,
+        ),
+        Identity(  # no capture: parameters as a simulator tells them (urg_sim), the rest is made up
+            parameters=Parameters("UTM-30LX-EW", 23, 60000, 1440, 0, 1080, 540, 2400),
+            product="SOKUIKI Sensor UTM-30LX-EW",
+            firmware="1.1.0",
+            serial_number="H1200001",
+            speed="2400",
+            line="Ethernet 100 [Mbps]",
+            no_return=1,
+            too_near=2,
+        ),
+        Identity(  # no capture: all of it is made up after the UST-10LX
+            parameters=Parameters("UST-20LX", 20, 60000, 1440, 0, 1080, 540, 2400),
+            product="SOKUIKI Sensor UST-20LX",
+            firmware="4.0.2-A",
+            serial_number="H1300002",
+            speed="2400",
+            mode="Measuring by Normal Mode",
+            line="Ethernet 100 [Mbps]",
+            no_return=65533,
+            too_near=65533,
+        ),
     )
 }
 
