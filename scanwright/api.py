@@ -574,6 +574,7 @@ def make_map(
     floor_m: float | None = None,
     from_m: float = 0.1,
     to_m: float = 1.8,
+    seen_through_m: float | None = None,
     say: Say = _quiet,
 ) -> MapSummary:
     """Turn clouds into an occupancy grid, as ROS's map_server reads it: YAML and PGM.
@@ -591,6 +592,8 @@ def make_map(
         floor_m: height of the floor in the map; found if not given.
         from_m: what is lower above the floor is driven over.
         to_m: what is higher above the floor is driven under.
+        seen_through_m: leave out what came or went: points that another cloud was seen through, by more than this; 0.1
+            is usual.
         say: is told what is being done.
 
     Raises:
@@ -602,7 +605,7 @@ def make_map(
     scanner = None if angles is None else _angles(angles)
     tum = None if poses is None else Path(poses)
     paths = [Path(cloud) for cloud in clouds]
-    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, say)
+    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, seen_through_m, say)
 
 
 def read_cloud(path: str | Path) -> Cloud:

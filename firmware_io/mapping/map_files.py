@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float64
-from numpy import ndarray
 
 from design import frames
 from design.angles import AngleSet
@@ -19,6 +17,7 @@ from firmware_io.clouds.formats import read_clouds
 from firmware_io.mapping.floor import find_floor
 from firmware_io.mapping.map_server import check_map_place, write_map
 from firmware_io.mapping.occupancy import FREE, OCCUPIED, Heights, OccupancyGrid, check_resolution, occupancy_grid
+from firmware_io.mapping.seen_through import Stand, seen_through
 from firmware_io.registration.poses import read_poses
 
 _COUNT = "count"  # of points in a voxel, as `merge` of the registration writes it
@@ -31,7 +30,8 @@ class MapSummary:
     Attributes:
         grid: the map.
         heights: between which things are in the way.
-        points: of all clouds.
+        points: of all clouds that are in it.
+        moved: left out, as another cloud was seen through them.
         wrote: YAML and image.
         said: what a person should know, one sentence each.
     """
@@ -39,6 +39,7 @@ class MapSummary:
     grid: OccupancyGrid
     heights: Heights
     points: int
+    moved: int
     wrote: tuple[Path, Path]
     said: tuple[str, ...]
 
@@ -48,24 +49,12 @@ class MapSummary:
         rows, columns = grid.cells.shape
         return [
             *(f"note: {line}" for line in self.said),
+            *([f"left out {self.moved:,} points: another cloud was seen through them"] if self.moved else []),
             f"floor at z = {heights.floor_m:.3f} m, obstacles from {heights.from_m:g} to {heights.to_m:g} m above it",
             f"{columns} x {rows} cells of {grid.resolution_m:g} m: {grid.area_m2(OCCUPIED):.2f} m2 occupied, "
             f"{grid.area_m2(FREE):.2f} m2 free",
             f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}",
         ]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stand:
-    """What one cloud adds to a map, in the frame of the map.
-
-    Attributes:
-        points_m: shape (n, 3), finite.
-        eye_m: where the scanner stood, shape (3,); NaN where nobody knows.
-    """
-
-    points_m: Float64[ndarray, "n 3"]
-    eye_m: Vector
 
 
 def map_files(
@@ -77,6 +66,7 @@ def map_files(
     from_m: float,
     to_m: float,
     resolution_m: float,
+    seen_through_m: float | None,
     say: Callable[[str], None],
 ) -> MapSummary:
     """Read clouds, find the floor, write the map.
@@ -90,6 +80,7 @@ def map_files(
         from_m: above the floor; what is lower is driven over.
         to_m: above the floor; what is higher is driven under.
         resolution_m: edge of a cell.
+        seen_through_m: leave out points that another cloud was seen through, by more than this; None for none.
         say: progress.
 
     Raises:
@@ -99,6 +90,12 @@ def map_files(
     check_resolution(resolution_m)
     Heights(0.0 if floor_m is None else floor_m, from_m, to_m)
     stands, said = _stands(paths, scanner, poses, say)
+    moved = 0
+    if seen_through_m is not None:
+        say("looking for what moved")
+        gone = seen_through(stands, seen_through_m)
+        moved = sum(int(one.sum()) for one in gone)
+        stands = [Stand(stand.points_m[~one], stand.eye_m) for stand, one in zip(stands, gone, strict=True)]
     points_m = np.concatenate([stand.points_m for stand in stands])
     eyes_m = np.repeat([stand.eye_m for stand in stands], [len(stand.points_m) for stand in stands], axis=0)
     if floor_m is None:
@@ -107,7 +104,7 @@ def map_files(
     say("mapping")
     grid = occupancy_grid(points_m, eyes_m, heights, resolution_m)
     said += _about_eyes(stands)
-    return MapSummary(grid, heights, len(points_m), write_map(out, grid), tuple(said))
+    return MapSummary(grid, heights, len(points_m), moved, write_map(out, grid), tuple(said))
 
 
 def _stands(

@@ -231,6 +231,12 @@ def map_(
     floor_m: Annotated[float | None, typer.Option(metavar="Z", help="Height of the floor; found if not given.")] = None,
     from_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is lower is driven over.")] = 0.1,
     to_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is higher is driven under.")] = 1.8,
+    seen_through_m: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="Leave out what moved: other clouds were seen through it, by more than, say, 0.1."
+        ),
+    ] = None,
 ) -> None:
     """Turn clouds into an occupancy grid for Nav2: a YAML and a PGM, cells occupied, free or unknown.
 
@@ -248,6 +254,7 @@ def map_(
         floor_m=floor_m,
         from_m=from_m,
         to_m=to_m,
+        seen_through_m=seen_through_m,
         say=Progress(),
     )
     show(summary.lines())

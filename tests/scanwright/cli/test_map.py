@@ -9,7 +9,7 @@ from PIL import Image
 import scanwright as sw
 from design.angles import AngleSet
 from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import write_clouds
+from firmware_io.clouds.formats import read_clouds, write_clouds
 
 ANGLES = {
     "schema": "scanwright/angles/1",
@@ -74,6 +74,25 @@ def test_without_a_place_nothing_is_free_and_a_line_says_so(run, shop):
     assert 254 not in np.asarray(Image.open(shop / "blind.pgm"))
 
 
+def test_who_stood_there_in_one_cloud_only_is_no_obstacle(run, shop):
+    (cloud,), _ = read_clouds(shop / "room.ply")
+    on_side = np.stack(np.meshgrid(np.arange(-0.2, 0.2, 0.02), np.arange(-0.8, 0.8, 0.02)), axis=2).reshape(-1, 2)
+    somebody = np.insert(on_side, 1, 1.2, axis=1).astype(np.float32)
+    write_clouds(shop / "with.ply", [Cloud(np.vstack([cloud.points_m, somebody]))])
+    words = ("with.ply", "room.ply", "--angles", "angles.json", "-o", "still.yaml")
+    _, told, _ = run(*words)
+    with_him = np.asarray(Image.open(shop / "still.pgm"))
+    code, without, _ = run(*words, "--seen-through-m", "0.1")
+    assert code == 0
+    assert "left out" not in told
+    (line,) = (line for line in without.splitlines() if line.startswith("left out"))
+    count = int(line.split()[2].replace(",", ""))
+    assert line == f"left out {count:,} points: another cloud was seen through them"
+    assert 0.95 * len(somebody) < count < 1.02 * len(somebody)
+    gone = with_him.astype(int) - np.asarray(Image.open(shop / "still.pgm"))
+    assert np.count_nonzero((gone < 0) & (with_him == 0)) >= 8  # his cells, 0.4 m wide
+
+
 def origin_m(path):
     (line,) = (line for line in path.read_text().splitlines() if line.startswith("origin"))
     return np.array(json.loads(line.partition(": ")[2]))
@@ -101,6 +120,8 @@ def test_poses_move_the_map(run, shop):
         (("merged.npz", "-o", "m.yaml", "--angles", "angles.json"), "which no single place saw: name those"),
         (("room.ply", "room.ply", "-o", "m.yaml", "--poses", "one.tum"), "1 poses for 2 clouds"),
         (("room.ply", "-o", "m.yaml", "--angles", "none.json"), "none.json"),
+        (("room.ply", "-o", "m.yaml", "--seen-through-m", "0"), "--seen-through-m = 0.0: a number above 0"),
+        (("room.ply", "room.ply", "-o", "m.yaml", "--seen-through-m", "1"), "0 clouds whose scanner's place is known"),
         (("none.ply", "-o", "m.yaml"), "none.ply"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Maps of places where somebody walks about."""

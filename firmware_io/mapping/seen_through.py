@@ -1,0 +1,121 @@
+"""What moved: points that hang where another stand looked through.
+
+The place of each point is looked up among the directions in which the other stand saw something. Where its nearest
+beams all ended well behind the point, nothing stood there then, and what the point was seen on has come or gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+from numpy import ndarray
+from scipy.spatial import cKDTree
+
+from design.arrays import Vector
+from design.errors import RecordingError
+
+_BEAMS = 10  # fewer lie on one side of a point, or all miss a thin thing: benchmarks/firmware_io/mapping/
+_REACH = 2.0  # times the usual angle to the tenth beam: where they are farther off, nobody looked
+_SAMPLE = 2000
+_NEIGHBOURS = 8
+_NEAR_M = 0.15  # what is farther is of another thing
+_AT_ONCE = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stand:
+    """Points that one place saw, in the frame of the map.
+
+    Attributes:
+        points_m: shape (n, 3), finite.
+        eye_m: where the scanner stood, shape (3,); NaN where nobody knows.
+    """
+
+    points_m: Float64[ndarray, "n 3"]
+    eye_m: Vector
+
+
+def seen_through(stands: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[ndarray, " n"]]:
+    """Points of each stand where another one looked through, shape (n,) each.
+
+    A point is condemned where the ten beams of another stand that pass next to it all ended more than `beyond_m`
+    behind it: so many surround it, so that of the surface that it lies on one ends before it, however flat the surface
+    is seen. Then it goes with the majority of its neighbours within 0.15 m. A beam that came back with nothing tells
+    nothing. What stays within `beyond_m` of what stands still, such as the soles of a foot, stays.
+
+    Args:
+        stands: at least two with a known eye, of one frame; others are left as they are.
+        beyond_m: more than three times the noise, and than what the poses are off by.
+
+    Raises:
+        RecordingError: `beyond_m` is none, or fewer than two stands have an eye.
+    """
+    if not 0 < beyond_m < np.inf:
+        raise RecordingError(f"--seen-through-m = {beyond_m}: a number above 0; 0.1 is usual")
+    known = [k for k, stand in enumerate(stands) if np.isfinite(stand.eye_m).all()]
+    if len(known) < 2:
+        raise RecordingError(
+            f"--seen-through-m: {len(known)} clouds whose scanner's place is known, 2 at least: one tells what another "
+            "looked through (`scanwright assemble --per turn`, and --angles or --poses here)"
+        )
+    gone = [np.zeros(len(stand.points_m), bool) for stand in stands]
+    for k in known:
+        looked = _Looked(stands[k])
+        for other in known:
+            if other != k:
+                left = np.flatnonzero(~gone[other])
+                gone[other][left] = looked.through(stands[other].points_m[left], beyond_m)
+    return [_as_neighbours(stand.points_m, one) for stand, one in zip(stands, gone, strict=True)]
+
+
+class _Looked:
+    """How far one stand saw in each direction."""
+
+    def __init__(self, stand: Stand) -> None:
+        self._eye_m = stand.eye_m
+        along, self._range_m = self._directions(stand.points_m)
+        self._tree = cKDTree(along)
+        sample = along[:: max(1, len(along) // _SAMPLE)]
+        self._reach = _REACH * float(np.median(self._tree.query(sample, _BEAMS + 1)[0][:, -1]))  # inf of a few points
+
+    def through(self, points_m: Float64[ndarray, "n 3"], beyond_m: float) -> Bool[ndarray, " n"]:
+        """Points that it looked through by more than `beyond_m`."""
+        found = np.zeros(len(points_m), bool)
+        if not np.isfinite(self._reach):
+            return found
+        along, range_m = self._directions(points_m)
+        for here, off, beam in _nearest(self._tree, along, _BEAMS, self._reach):
+            there = np.isfinite(off).all(axis=1)
+            ends_m = np.append(self._range_m, -np.inf)[beam].min(axis=1)
+            found[here] = there & (ends_m > range_m[here] + beyond_m)
+        return found
+
+    def _directions(self, points_m: Float64[ndarray, "n 3"]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, " n"]]:
+        """Unit vectors from the eye, and ranges; a point at the eye has no direction, and is near none."""
+        along = points_m - self._eye_m
+        range_m = np.linalg.norm(along, axis=1)
+        return along / np.where(range_m > 0, range_m, 1.0)[:, None], range_m
+
+
+def _as_neighbours(points_m: Float64[ndarray, "n 3"], gone: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
+    """What more than half of the neighbours of each point are, itself among them."""
+    if not gone.any():
+        return gone
+    found = np.zeros_like(gone)
+    padded = np.append(gone, False)
+    for here, off, index in _nearest(cKDTree(points_m), points_m, _NEIGHBOURS + 1, _NEAR_M):
+        found[here] = 2 * padded[index].sum(axis=1) > np.isfinite(off).sum(axis=1)
+    return found
+
+
+def _nearest(
+    tree: cKDTree, points: Float64[ndarray, "n 3"], count: int, reach: float
+) -> Iterator[tuple[slice, Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
+    """Which rows, the distances of their nearest in the tree, and their indices; inf and the tree's size where none."""
+    for begin in range(0, len(points), _AT_ONCE):
+        here = slice(begin, begin + _AT_ONCE)
+        off, index = tree.query(points[here], count, distance_upper_bound=reach, workers=-1)
+        yield here, off, index
