@@ -1,5 +1,7 @@
 """Occupancy grids of simulated rooms whose walls and shadows are known, and the files as a map_server reads them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -110,7 +112,10 @@ def test_points_that_nobody_knows_the_eye_of_free_nothing():
 
 
 def test_a_map_server_reads_the_cells_that_were_meant(tmp_path, with_pillar):
-    yaml, image = write_map(tmp_path / 'a "room".yaml', with_pillar)
+    cells = with_pillar.cells.copy()
+    cells[0, 1] = OCCUPIED  # as above the x axis so below it, else
+    grid = replace(with_pillar, cells=cells)
+    yaml, image = write_map(tmp_path / 'a "room".yaml', grid)
     told = dict(line.split(": ", 1) for line in yaml.read_text().splitlines())
     assert told["image"] == '"a \\"room\\".pgm"'
     pixels = np.asarray(Image.open(image)).astype(float)
@@ -118,7 +123,7 @@ def test_a_map_server_reads_the_cells_that_were_meant(tmp_path, with_pillar):
     read = np.full(pixels.shape, UNKNOWN)
     read[occupied > float(told["occupied_thresh"])] = OCCUPIED
     read[occupied < float(told["free_thresh"])] = FREE
-    np.testing.assert_array_equal(read[::-1], with_pillar.cells)  # the first row of the image is the top
+    np.testing.assert_array_equal(read[::-1], cells)  # the first row of the image is the top
     x, y, yaw = (float(value) for value in told["origin"].strip("[]").split(","))
     np.testing.assert_allclose([x, y, yaw], [*with_pillar.origin_m, 0], atol=1e-6)
     assert (x, float(told["resolution"])) == (pytest.approx(-2.1), 0.05)
