@@ -108,14 +108,14 @@ class AngleSet(Record):
         return json.dumps(self.model_dump(by_alias=True), indent=2) + "\n"
 
 
-def load_angles(path: Path) -> AngleSet:
+def load_angles(path: str | Path) -> AngleSet:
     """Read `angles.json`, as strictly as a task: text and true are no numbers, and the schema is named.
 
     Raises:
         TaskError: the file is missing, is not JSON, or is not an angle set.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise TaskError(f"{path}: cannot read the angle set: {_reason(error)}") from error
     try:

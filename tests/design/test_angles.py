@@ -65,7 +65,7 @@ def test_the_json_text_reads_back_as_the_same_record(angles, delta, lever):
 
 
 def test_every_key_of_the_contract_survives_a_round_trip(tmp_path):
-    one = load_angles(written(tmp_path, full_table()))
+    one = load_angles(str(written(tmp_path, full_table())))
     assert json.loads(one.to_json()) == full_table()
     assert list(json.loads(one.to_json())) == list(full_table())
     assert one.to_json().endswith("}\n")
