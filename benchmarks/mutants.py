@@ -45,7 +45,7 @@ MODULES = {
         "firmware_io/lidar/scip/protocol.py",
         "tests/firmware_io/lidar/test_scip.py tests/firmware_io/lidar/test_lidar.py",
     ),
-    "joints": ("cad/layout/joints.py", "tests/cad/layout/test_joints.py"),
+    "joints": ("cad/layout/joints.py", "tests/cad/layout/test_screw_lengths.py tests/cad/layout/test_joints.py"),
     "calibration": ("firmware_io/calibration/model.py", "tests/firmware_io/calibration"),
 }
 

@@ -54,8 +54,12 @@ class ArrivalLine:
 
     def host_ns(self, sensor_ns: float) -> int:
         """Host time of a sensor time."""
+        return self.arrives_ns(sensor_ns) - self._delay_ns
+
+    def arrives_ns(self, sensor_ns: float) -> int:
+        """When what was whole at a sensor time arrives, if nothing holds it up."""
         since_ns = sensor_ns - self._origin[0]
-        return self._origin[1] + round(since_ns * (1 + self._slope) + self._offset_ns) - self._delay_ns
+        return self._origin[1] + round(since_ns * (1 + self._slope) + self._offset_ns)
 
     @property
     def uncertainty_ns(self) -> int:

@@ -257,6 +257,8 @@ class SlamtecLidar:
         self._last_ns = arrival_ns
         for points in self._count.placed(heard, arrival_ns):
             self._turns.add(points, arrival_ns)
+        if self._count.broken:
+            self._begin_anew()
 
     def _told(self, command: int, kind: int, read: Callable[[bytes], Told], payload: bytes = b"") -> Told:
         """What it answers to a request.
