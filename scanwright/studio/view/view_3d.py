@@ -32,6 +32,7 @@ MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
 WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
 POINT_M = 0.012
+GHOST = 0.25  # opacity of parts that belong to an earlier setting
 
 
 class View3D:
@@ -181,6 +182,11 @@ class View3D:
             )
             for name, body in new.items()
         ]
+
+    def fade_bodies(self, turning: bool) -> None:
+        """One half of the scanner is an earlier setting's: a ghost, until `show_bodies` puts up the new one."""
+        for handle in self._bodies[turning]:
+            handle.opacity = GHOST
 
     def show_scanner(self, visible: bool) -> None:
         """Show or hide it."""

@@ -88,6 +88,7 @@ class Workers:
             scanner = order.scanner()
             if not order.bodies or self._shown.get(turning) == scanner:
                 return
+            self._view.fade_bodies(turning)
             bodies = worker.ask("making the parts ...", make_bodies, scanner, turning)
         except ScanwrightError:
             self._shown.pop(turning, None)

@@ -18,6 +18,7 @@ from design.objective.score import score
 from design.sphere.directions import spiral
 from design.task.task import load_task
 from firmware_io.twins.world import furnished_room
+from scanwright.serving.page_server import guarded_server
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
@@ -36,6 +37,7 @@ from scanwright.studio.view.coloured_sphere import (
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.preview_scan import MOST_RAYS, preview_scan
 from scanwright.studio.view.scanner_bodies import BodyMesh
+from scanwright.studio.view.view_3d import GHOST, View3D
 from scanwright.studio.view.workers import Order, Workers
 
 SETTING = Setting((0.0, -55.0, -80.0, 75.0))
@@ -214,10 +216,13 @@ def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp
     monkeypatch.setenv("SCANWRIGHT_TEST_GO", str(tmp_path / "go"))
     monkeypatch.setattr(workers, "make_bodies", bodies)
     monkeypatch.setattr(workers, "preview_scan", points)
-    shown, said = {}, []
+    shown, said, faded = {}, [], []
     problem = problem_of(loaded)
 
     class View:
+        def fade_bodies(self, turning):
+            faded.append((turning, shown.get(turning)))
+
         def show_bodies(self, _, turning, made):
             self._show(turning, made[0].vertices_m.max() if made else None)
 
@@ -235,15 +240,29 @@ def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp
         assert all_three.settled(60)
         assert shown == {True: 40, False: 40, "points": (80, 3)}
         assert said[-1] == ("", False)
+        assert sorted(faded) == [(False, None), (True, None)]
         all_three.order(Order(loaded, problem, Setting((0, 40, 0, 13)), True, ""))
         assert all_three.settled(60)
         assert said[-1] == ("alignment_linkage: no room", True)
+        assert sorted(faded[2:]) == [(False, 40), (True, 40)]  # while the new ones are made, the old ones are ghosts
         assert shown[True] is shown[False] is None  # and no other setting's parts stay
         all_three.order(Order(loaded, problem, Setting((0, 40, 0, 0)), True, ""))
         assert all_three.settled(60)
         assert (shown[True], said[-1]) == (40, ("", False))
     finally:
         all_three.close()
+
+
+def test_parts_of_an_earlier_setting_are_ghosts_until_the_new_ones_stand():
+    body = (BodyMesh("box", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
+    with guarded_server("a page") as (server, _):
+        view = View3D(server)
+        view.show_bodies(SETTING, True, body)
+        assert [handle.opacity for handle in view._bodies[True]] == [None]
+        view.fade_bodies(True)
+        assert [handle.opacity for handle in view._bodies[True]] == [GHOST]
+        view.show_bodies(SETTING, True, body)
+        assert [handle.opacity for handle in view._bodies[True]] == [None]
 
 
 def test_the_preview_draws_as_many_points_as_a_page_can_and_stands_on_the_walls_of_the_room(loaded, tmp_path):
