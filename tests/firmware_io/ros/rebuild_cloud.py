@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import String
 
 PATIENCE_S = 240.0
+LAST_ANGLE_S = 20.0
 
 
 def rigid(xyz, rpy):
@@ -70,8 +71,10 @@ def main(count, out):
     end_s = time.monotonic() + PATIENCE_S
     while not (urdf and len(scans) >= count and len(points) >= count) and time.monotonic() < end_s:
         rclpy.spin_once(node, timeout_sec=0.1)
-    for _ in range(20):  # the last angles
-        rclpy.spin_once(node, timeout_sec=0.05)
+    last_ns = max(nanoseconds(m.header) + m.time_increment * (len(m.ranges) - 1) * 1e9 for m in scans)
+    end_s = time.monotonic() + LAST_ANGLE_S
+    while not (joints and max(joints)[0] >= last_ns) and time.monotonic() < end_s:
+        rclpy.spin_once(node, timeout_sec=0.05)  # one message at a time: others may wait before the last angle
     robot = ElementTree.fromstring(urdf[0])
     joints.sort()
     chain = fixed(robot, "servo_mount"), fixed(robot, "laser_mount")
