@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import contextmanager
+from types import FrameType
 from typing import ParamSpec, Protocol, TypeVar
 
 from design.errors import BuildError
@@ -76,6 +77,27 @@ def spawn_pool() -> ProcessPoolExecutor:
     """One process that stays, for calls of functions of modules; it is deaf to Ctrl-C, and ends with its owner."""
     # spawned and not forked: a fork of a process with threads may lock up
     return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _attend)
+
+
+@contextmanager
+def ctrl_c_held_back() -> Iterator[None]:
+    """Ctrl-C waits for the end of the block, and what is born in it cannot hear it before it turns a deaf ear.
+
+    Blocked in this thread it would still come by another one, and Python would raise it here: in the middle of what a
+    new process is to be told.
+    """
+    came: list[tuple[int, FrameType | None]] = []
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, lambda *told: came.append(told)) if main else None
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if main:
+            signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        if came and callable(before):
+            before(*came[0])
 
 
 def kill(pool: ProcessPoolExecutor) -> None:

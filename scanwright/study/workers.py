@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import re
-import signal
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -13,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from design.concurrency.second_process import cores, kill, spawn_pool
+from design.concurrency.second_process import cores, ctrl_c_held_back, kill, spawn_pool
 from design.errors import BuildError, TaskError, require
 from scanwright.study.units import Crew
 
@@ -60,15 +59,12 @@ class SingleProcesses(Executor):
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """See `Executor`; waits for a process that has nothing to do. A dead one is replaced."""
         number = self._idle.get()
-        # born with Ctrl-C held back: it may come before the process can turn a deaf ear
-        held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            future = self._pools[number].submit(fn, *args, **kwargs)
-        except BrokenExecutor:
-            self._pools[number] = spawn_pool()
-            future = self._pools[number].submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        with ctrl_c_held_back():
+            try:
+                future = self._pools[number].submit(fn, *args, **kwargs)
+            except BrokenExecutor:
+                self._pools[number] = spawn_pool()
+                future = self._pools[number].submit(fn, *args, **kwargs)
         future.add_done_callback(lambda _: self._idle.put(number))
         return future
 

@@ -2,6 +2,8 @@
 
 import contextlib
 import os
+import signal
+import threading
 import time
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 
 from design.angles import load_angles
 from design.concurrency import second_process as beside
-from design.concurrency.second_process import in_turn, second_process
+from design.concurrency.second_process import ctrl_c_held_back, in_turn, second_process
 from design.errors import BuildError, TaskError
 
 
@@ -46,3 +48,20 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
         os.kill(process, 0)
     with pytest.raises(BuildError, match="was killed"), second_process() as begin:
         begin(os._exit, 1)()
+
+
+def test_ctrl_c_waits_for_the_end_of_the_block_by_whichever_thread_it_comes():
+    go, done = threading.Event(), []
+
+    def press():
+        go.wait()
+        signal.raise_signal(signal.SIGINT)
+
+    other = threading.Thread(target=press)  # it was there before, and nothing is blocked in it
+    other.start()
+    with pytest.raises(KeyboardInterrupt), ctrl_c_held_back():
+        go.set()
+        other.join()
+        done.append("all")
+    assert done == ["all"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
