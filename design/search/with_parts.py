@@ -187,7 +187,7 @@ def equivalents(
     a, b, c, d = angles_deg
     if problem.sweep is not None:
         return [angles_deg]
-    turned = (a + 360.0) % 360.0 - 180.0  # with -b the axis points the other way
+    turned = round((a + 360.0) % 360.0 - 180.0, 9)  # with -b the axis points the other way; no 179.97000000000003
     found: list[tuple[float, float, float, float]] = []
     for beta, alpha in np.diagonal(mirrors_of(problem.bearings_rad), axis1=1, axis2=2).tolist():
         plane = 0.0 + alpha * c, 0.0 + beta * d  # q0 has the sign of beta_laser, q1 that of alpha_laser
