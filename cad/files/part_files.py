@@ -56,6 +56,10 @@ class PartsResult:
     left_out: tuple[LeftOut, ...]
     files: tuple[str, ...]
 
+    def masses_g(self) -> dict[str, float]:
+        """Of the made parts by name."""
+        return {report.name: report.mass_g for report in self.parts}
+
 
 def build_parts(
     scanner: Scanner, folder: Path, progress: Callable[[str], None], make: Callable[[Scanner], Assembly] | None = None

@@ -20,9 +20,15 @@ TIME_STAMP = "2000-01-01T00:00:00"
 # Entities whose list of references the kernel fills in the order of memory addresses.
 UNORDERED = ("MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION",)
 
-_TOKEN = re.compile(r"'(?:[^']|'')*'|#\d+")
+STAND_INS = {"#": "\0", ";": "\1"}  # inside strings; STEP is ASCII without control characters
+
+_STRING = re.compile(r"('(?:[^']|'')*')")
 _COUNTER = re.compile(r"Open CASCADE STEP translator [\d.]+ [\d.]+")
 _OCCURRENCE = re.compile(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\()'\d+',('(?:[^']|'')*')")
+_REFERENCE = re.compile(r"#(\d+)")
+
+Pieces = list[str]
+"""An entity: text and the numbers that it refers to by turns, text first and last."""
 
 
 def step_text(assembly: cq.Assembly, title: str) -> str:
@@ -45,59 +51,65 @@ def canonical_step(text: str) -> str:
     data, tail = rest.split("ENDSEC;", 1)
     head = re.sub(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[^']*'", f"'{TIME_STAMP}'", head)
     head = _COUNTER.sub("Open CASCADE STEP translator", head)
-    bodies = _entities(_COUNTER.sub("Open CASCADE STEP translator", data))
     # the id of an occurrence counts through the process: its name, unique in our assemblies, serves
-    bodies = {key: _OCCURRENCE.sub(r"\1\2,\2", body) for key, body in bodies.items()}
-    references = {key: [int(t[1:]) for t in _TOKEN.findall(body) if t[0] == "#"] for key, body in bodies.items()}
-    digest = _digests(bodies, references)
-    for key, body in bodies.items():
-        if body.startswith(UNORDERED):
-            bodies[key] = _with_sorted_lists(body, digest)
-            references[key] = [int(t[1:]) for t in _TOKEN.findall(bodies[key]) if t[0] == "#"]
+    data = _OCCURRENCE.sub(r"\1\2,\2", _bare(_COUNTER.sub("Open CASCADE STEP translator", data)))
+    bodies = (entity.split("=", 1) for entity in data.split(";")[:-1])
+    entities = {int(name[1:]): _REFERENCE.split(body) for name, body in bodies}
+    references = {key: [int(number) for number in pieces[1::2]] for key, pieces in entities.items()}
+    digest = _digests(entities, references)
+    for key, pieces in entities.items():
+        if pieces[0].startswith(UNORDERED):
+            entities[key] = _with_sorted_lists(pieces, digest)
+            references[key] = [int(number) for number in entities[key][1::2]]
     pointed_at = {target for targets in references.values() for target in targets}
-    roots = sorted((key for key in bodies if key not in pointed_at), key=lambda key: digest[key])
+    roots = sorted((key for key in entities if key not in pointed_at), key=lambda key: digest[key])
     order = _depth_first(roots, references)
-    number = {key: i + 1 for i, key in enumerate(order)}
-
-    def renumber(match: re.Match[str]) -> str:
-        token = match.group()
-        return f"#{number[int(token[1:])]}" if token[0] == "#" else token
-
-    lines = [f"#{number[key]} = {_TOKEN.sub(renumber, bodies[key])};" for key in order]
-    return f"{head}DATA;\n" + "\n".join(lines) + f"\nENDSEC;{tail}"
+    number = {key: f"#{i + 1}" for i, key in enumerate(order)}
+    lines = [f"{number[key]} = {_filled(entities[key], references[key], number)};" for key in order]
+    return f"{head}DATA;\n" + _readable("\n".join(lines)) + f"\nENDSEC;{tail}"
 
 
-def _entities(data: str) -> dict[int, str]:
-    """Entity bodies by number, white space outside strings squeezed; a string may hold a semicolon."""
-    bodies = {}
-    for match in re.finditer(r"#(\d+)\s*=\s*((?:'(?:[^']|'')*'|[^';])*);", data):
-        parts = re.split(r"('(?:[^']|'')*')", match.group(2))
-        bodies[int(match.group(1))] = "".join(p if p.startswith("'") else re.sub(r"\s+", "", p) for p in parts)
-    return bodies
+def _bare(data: str) -> str:
+    """Without the white space outside strings, and without what means something there inside of them."""
+    parts = _STRING.split(data)
+    parts[::2] = ["".join(part.split()) for part in parts[::2]]
+    for sign, stands_in in STAND_INS.items():
+        parts[1::2] = [part.replace(sign, stands_in) for part in parts[1::2]]
+    return "".join(parts)
 
 
-def _digests(bodies: dict[int, str], references: dict[int, list[int]]) -> dict[int, str]:
+def _readable(data: str) -> str:
+    for sign, stands_in in STAND_INS.items():
+        data = data.replace(stands_in, sign)
+    return data
+
+
+def _filled(pieces: Pieces, references: list[int], words: dict[int, str]) -> str:
+    """The text of an entity with a word for each reference."""
+    filled = pieces.copy()
+    filled[1::2] = [words[key] for key in references]
+    return "".join(filled)
+
+
+def _digests(entities: dict[int, Pieces], references: dict[int, list[int]]) -> dict[int, str]:
     """Merkle hash of every entity: independent of how the entities are numbered."""
     digest: dict[int, str] = {}
-    for key in _depth_first(sorted(bodies), references, children_first=True):
-
-        def resolve(match: re.Match[str]) -> str:
-            token = match.group()
-            return digest[int(token[1:])] if token[0] == "#" else token
-
-        body = bodies[key]
-        if body.startswith(UNORDERED):
-            body = _with_sorted_lists(body, digest)
-        digest[key] = hashlib.sha256(_TOKEN.sub(resolve, body).encode("ascii")).hexdigest()
+    for key in _depth_first(sorted(entities), references, children_first=True):
+        pieces, targets = entities[key], references[key]
+        if pieces[0].startswith(UNORDERED):
+            pieces = _with_sorted_lists(pieces, digest)
+            targets = [int(number) for number in pieces[1::2]]
+        digest[key] = hashlib.sha256(_readable(_filled(pieces, targets, digest)).encode("ascii")).hexdigest()
     return digest
 
 
-def _with_sorted_lists(body: str, digest: dict[int, str]) -> str:
+def _with_sorted_lists(pieces: Pieces, digest: dict[int, str]) -> Pieces:
     def in_order(match: re.Match[str]) -> str:
         items = match.group(1).split(",")
         return "(" + ",".join(sorted(items, key=lambda item: digest[int(item[1:])])) + ")"
 
-    return re.sub(r"\((#\d+(?:,#\d+)+)\)", in_order, body)
+    body = _filled(pieces, list(range(len(pieces) // 2)), {i: f"#{number}" for i, number in enumerate(pieces[1::2])})
+    return _REFERENCE.split(re.sub(r"\((#\d+(?:,#\d+)+)\)", in_order, body))
 
 
 def _depth_first(roots: list[int], references: dict[int, list[int]], *, children_first: bool = False) -> list[int]:

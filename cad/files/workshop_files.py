@@ -36,8 +36,17 @@ class Exports:
     findings: tuple[PartFinding, ...]
 
 
+def begin_drawings(scanner: Scanner, made: PartsResult, begin: Begin = in_turn) -> Callable[[], dict[str, bytes]]:
+    """Begin the drawings of all parts: what waits for their files, for `export_scanner`."""
+    return begin(drawing_files, scanner, made.assembly, made.masses_g(), config_hash(scanner))
+
+
 def export_scanner(
-    scanner: Scanner, made: PartsResult, folder: Path, progress: Callable[[str], None], begin: Begin = in_turn
+    scanner: Scanner,
+    made: PartsResult,
+    folder: Path,
+    progress: Callable[[str], None],
+    drawn: Callable[[], dict[str, bytes]] | None = None,
 ) -> Exports:
     """Write all of them into a build folder.
 
@@ -46,14 +55,11 @@ def export_scanner(
         made: its parts, of `part_files.build_parts`.
         folder: the build folder.
         progress: called with a line of text before each step.
-        begin: who draws the parts.
+        drawn: the drawings, where `begin_drawings` has begun them.
     """
-    assembly, digest = made.assembly, config_hash(scanner)
-    masses = {report.name: report.mass_g for report in made.parts}
+    assembly, digest, masses = made.assembly, config_hash(scanner), made.masses_g()
     joints = joints_of(assembly.layout)
-    progress("drawing the parts")
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
-    drawn = begin(drawing_files, scanner, assembly, masses, digest)
     progress("writing print files")
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
@@ -72,7 +78,8 @@ def export_scanner(
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
     files |= wiring_files(scanner, digest)
-    files |= drawn()
+    progress("drawing the parts")
+    files |= (drawn or begin_drawings(scanner, made))()
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)
     left_out = tuple(

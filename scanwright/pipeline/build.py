@@ -18,14 +18,16 @@ from scanwright.pipeline.manifest import first_difference, is_current, listed_fi
 from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
+    from cad.assembly.assembly import Assembly
     from cad.findings import PartFinding
     from design.evaluation.metres import PlaneFigures
+    from design.scanner import Scanner
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen, Workshop
 
 Say = Callable[[str], None]
 
-BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.48, "files": 0.72, "pictures": 0.9, "report": 0.93}
+BEHIND = {"search": 0.0, "shadow": 0.18, "parts": 0.38, "pictures": 0.61, "files": 0.67, "report": 0.9}
 """Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
 
 
@@ -147,6 +149,27 @@ def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
     return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
 
 
+def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Assembly]:
+    """The setting, the scanner with it, and its parts."""
+    from cad.assembly.shadow import PartsWorkshop
+    from cad.layout.layout import mount_offset_mm
+    from design.search.optimum import angle_set
+
+    loaded = optimum.loaded
+    workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
+    chosen = _chosen(optimum, workshop, _at(say, "shadow"))
+    angles = angle_set(loaded, chosen.family).model_copy(update={"task_sha256": task_sha256})
+    offset = mount_offset_mm(loaded.scanner(angles))
+    scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": offset}))
+    return chosen, scanner, workshop.assembly(scanner)
+
+
+def _load_kernel() -> None:
+    """Everything that a second process needs."""
+    for module in ("cad.checks.run", "cad.drawings.files", "design.search.with_parts"):
+        import_module(module)
+
+
 def _at(say: Say, stage: str) -> Say:
     """Progress that tells how much of the whole build is behind it."""
     share = BEHIND[stage]
@@ -156,35 +179,31 @@ def _at(say: Say, stage: str) -> Say:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import build_parts, write_files
-    from cad.layout.layout import mount_offset_mm
     from design.evaluation.density_picture import density_picture
     from design.evaluation.metres import on_planes
-    from design.search.optimum import angle_set, find_optimum
+    from design.search.optimum import find_optimum
     from scanwright.pipeline import records
 
     with fresh_folder(target) as work, second_process() as begin:
-        begin(import_module, "cadquery")  # it loads while the search runs
+        begin(_load_kernel)  # while the search runs
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        from cad.assembly.shadow import PartsWorkshop
-        from cad.checks.run import check_files
-        from cad.files.workshop_files import export_scanner
+        made = begin(_chosen_and_made, optimum, asked.sha256(), say)
+        from cad.checks.run import check_files  # the kernel loads here while the parts are made there
+        from cad.files.workshop_files import begin_drawings, export_scanner
 
-        workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-        chosen = _chosen(optimum, workshop, _at(say, "shadow"))
-        best = chosen.family
-        angles = angle_set(loaded, best).model_copy(update={"task_sha256": asked.sha256()})
-        angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(loaded.scanner(angles))})
-        scanner = loaded.scanner(angles)
-        checked = begin(check_files, scanner, workshop.assembly(scanner), say)
-        parts = build_parts(scanner, work, _at(say, "parts"), workshop.assembly)
-        exported = export_scanner(scanner, parts, work, _at(say, "files"), begin)
+        chosen, scanner, assembly = made()
+        best, angles = chosen.family, scanner.angles
+        checked = begin(check_files, scanner, assembly, say)
+        parts = build_parts(scanner, work, _at(say, "parts"), lambda _: assembly)
+        drawn = begin_drawings(scanner, parts, begin)
         _at(say, "pictures")("drawing density.png")
         standard = standard_settings()
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
         density_picture(work / "density.png", problem, settings, optimum.title)
+        exported = export_scanner(scanner, parts, work, _at(say, "files"), drawn)
         write_files(work, checked())
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         records.write_task(work, asked)
@@ -193,6 +212,6 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         write_package(work)
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
-        records.write_report(work)
+        records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad)
     return Made(optimum, chosen, (*parts.findings, *exported.findings), planes)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from design.concurrency.second_process import Begin, in_turn
 from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import MapRegion, MeshRegion
@@ -54,8 +55,8 @@ def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
     write_json(folder / "left_out.json", {"schema": "scanwright/left_out/1", "left_out": entries})
 
 
-def write_report(folder: Path) -> Path:
-    """`report.html` of a build folder from the files in it, and its digest into the manifest.
+def write_report(folder: Path, begin: Begin = in_turn) -> Path:
+    """`report.html` of a build folder from the files in it, and its digest into the manifest; `begin` as for the page.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
@@ -63,7 +64,7 @@ def write_report(folder: Path) -> Path:
     """
     from scanwright.report.page import REPORT, report_html
 
-    (folder / REPORT).write_text(report_html(folder), encoding="utf-8")
+    (folder / REPORT).write_text(report_html(folder, begin), encoding="utf-8")
     enter(folder, REPORT)
     return folder / REPORT
 

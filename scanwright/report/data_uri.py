@@ -18,5 +18,5 @@ def data_uri(data: bytes, suffix: str = ".png") -> str:
 def png_uri(image: Image.Image) -> str:
     """A picture as the address of a PNG."""
     stream = io.BytesIO()
-    image.save(stream, format="PNG", optimize=True)
+    image.save(stream, format="PNG")
     return data_uri(stream.getvalue())

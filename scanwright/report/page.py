@@ -13,14 +13,15 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from design.angles import AngleSet, load_angles
 from design.arrays import Array
+from design.concurrency.second_process import Begin, in_turn
 from design.errors import BuildError
 from design.evaluation.metres import on_planes
 from design.shadow import load_own_body
-from design.task.task import LoadedTask, load_task
+from design.task.task import load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_table, read_text
-from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
+from scanwright.report.check_pictures import CheckPictures, bodies_named
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.landscapes import AXIS, PLANE, landscape
 from scanwright.report.room_picture import room_picture
@@ -41,20 +42,24 @@ DIRECTIONS = {
 }  # of the world, beside the ball
 
 
-def report_html(folder: Path) -> str:
+def report_html(folder: Path, begin: Begin = in_turn) -> str:
     """The page.
+
+    Args:
+        folder: of the build.
+        begin: who does the share of it that needs the task.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
         BuildError: another file is not as a build writes it.
     """
     angles = load_angles(folder / "angles.json")
-    loaded = read(folder / "task.toml", load_task)
+    on_task = begin(_on_task, folder)
     own_body = read(folder / "own_body.npz", load_own_body)
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
     bom = read(folder / "bom.csv", read_table)
     planes = read(folder / "search.csv", lambda path: read_columns(path, PLANES_CSV))
-    axes = read(folder / "axes.csv", lambda path: read_columns(path, AXES_CSV))
+    axes = read(folder / "axes.csv", _axes)
     checks = read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
     facts = {
         "angles": angles,
@@ -84,7 +89,7 @@ def report_html(folder: Path) -> str:
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
         "manifest": read(folder / "manifest.json", _manifest),
         "task_text": read(folder / "task.toml", read_text),
-        **_on_task(folder, loaded, angles, axes, [] if assembly is None else about_centre(assembly, angles)),
+        **on_task(),
     }
     try:
         return _environment().get_template("page.html.j2").render(facts)
@@ -94,12 +99,14 @@ def report_html(folder: Path) -> str:
         ) from error
 
 
-def _on_task(
-    folder: Path, loaded: LoadedTask | None, angles: AngleSet, axes: Array | None, scanner: list[PlacedBody]
-) -> dict[str, Any]:
+def _on_task(folder: Path) -> dict[str, Any]:
     """What cannot be said without the task."""
+    loaded = read(folder / "task.toml", load_task)
     if loaded is None:
         return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said"))
+    angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
+    assembly = read(folder / "assembly.glb", load_glb)
+    scanner = [] if assembly is None else about_centre(assembly, angles)
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
     found, sphere = answer(problem, angles), density_sphere(problem, angles, axes, task.angles.step_deg)
@@ -111,6 +118,10 @@ def _on_task(
         "room": room_picture(task, folder, problem, setting, sphere, scanner),
         "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting)),
     }
+
+
+def _axes(path: Path) -> Array:
+    return read_columns(path, AXES_CSV)
 
 
 def _environment() -> Environment:
