@@ -39,7 +39,7 @@ def step_text(assembly: cq.Assembly, title: str) -> str:
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.step"
-        assembly.export(str(path), exportType="STEP", write_pcurves=False)
+        assembly.export(str(path), exportType="STEP")
         if not path.exists():
             raise BuildError(f"{assembly.name}: STEP: the CAD kernel wrote no file")
         return canonical_step(path.read_text(encoding="ascii").replace("'Open CASCADE Shape Model'", f"'{title}'", 1))
