@@ -34,7 +34,8 @@ from design.scene.surface import Surface, cell_directions
 from design.search.constraints import Requirements
 from design.search.families import EQUAL, Family
 from design.search.search import search
-from design.task.task import NAMES, AngleRanges, Limits, LoadedTask, Task, load_task, shipped_tasks
+from design.task.angle_ranges import NAMES, AngleRanges
+from design.task.task import Limits, LoadedTask, Task, load_task, shipped_tasks
 
 SMALL_ERROR = 1e-3  # what most scores state at the default
 SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")

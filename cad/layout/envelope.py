@@ -17,6 +17,7 @@ from design.arrays import Array
 from design.catalogue.products import Lidar
 from design.errors import BuildError
 from design.scanner import Scanner
+from design.task.equivalent_settings import BOUNDS, advice
 
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
@@ -61,10 +62,17 @@ def lidar_pose(scanner: Scanner) -> Array:
     if R[2, 2] < -1e-9:
         tilt = math.degrees(math.acos(R[2, 2]))
         raise BuildError(
-            f"{ALIGNMENT_LINKAGE}: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90: "
-            "keep alpha_laser_deg and beta_laser_deg within -90..90, or reverse the axis"
+            f"{ALIGNMENT_LINKAGE}: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90"
+            f"{_instead(scanner)}"
         )
     return R
+
+
+def _instead(scanner: Scanner) -> str:
+    """Words for a setting that sees the same with the lidar upright: an angle of this one is beyond its range."""
+    angles = scanner.angles.angles_deg.model_dump()
+    setting = {name: (angles[name], angles[name]) for name in BOUNDS}
+    return next((said for name in BOUNDS if (said := advice(setting, name))), "")
 
 
 def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:

@@ -47,7 +47,8 @@ from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.search import search
 from design.sphere.directions import sample_set, spiral
-from design.task.task import AngleRanges, LoadedTask, load_task
+from design.task.angle_ranges import AngleRanges
+from design.task.task import LoadedTask, load_task
 
 LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations

@@ -19,7 +19,7 @@ from design.search.coarse import Landscape
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
 from design.search.tolerance import worst_within
-from design.task.task import NAMES, AngleRanges
+from design.task.angle_ranges import NAMES, AngleRanges
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only

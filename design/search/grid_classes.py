@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
 from design.frames import R_world_rot
-from design.task.task import AngleRanges
+from design.task.angle_ranges import AngleRanges
 
 
 @dataclass(frozen=True, slots=True)

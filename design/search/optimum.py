@@ -21,7 +21,8 @@ from design.search.families import Family
 from design.search.search import SearchResult, search
 from design.search.shortest_period import fastest
 from design.sphere.directions import spiral
-from design.task.task import NAMES, LoadedTask
+from design.task.angle_ranges import NAMES
+from design.task.task import LoadedTask
 
 SQUARE_DEGREES = 41_253  # on the whole sphere
 

@@ -21,7 +21,8 @@ from design.search.families import Family, best_leader, find_leaders, refine_lea
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.limits import allowed_planes
 from design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
-from design.task.task import NAMES, AngleRanges, Limits
+from design.task.angle_ranges import NAMES, AngleRanges
+from design.task.task import Limits
 
 LEADERS_STEP_DEG = 5.0
 NONE = Limits()

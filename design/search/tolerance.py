@@ -7,7 +7,7 @@ import numpy as np
 from design.arrays import Setting
 from design.objective.problem import NODES, Problem
 from design.objective.score import quick_J
-from design.task.task import NAMES
+from design.task.angle_ranges import NAMES
 
 
 def sensitivity(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int = NODES) -> dict[str, float]:

@@ -27,7 +27,8 @@ from design.search.families import Family
 from design.search.grid_classes import mirrors_of
 from design.shadow import AXIS_STEPS, Shadow
 from design.sphere.directions import sample_set
-from design.task.task import NAMES, AngleRanges, Limits
+from design.task.angle_ranges import NAMES, AngleRanges
+from design.task.task import Limits
 
 SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
 MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told

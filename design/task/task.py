@@ -27,6 +27,7 @@ from design.motion import Motion, Shortest, Sweep
 from design.record import Fault, Record, faults_of, tell
 from design.scanner import Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
+from design.task.angle_ranges import NAMES, AngleRanges
 from design.task.map_file import read_map
 from design.task.named_products import NAMED, motion_faults
 from design.task.named_record import named_table, names_in
@@ -40,14 +41,10 @@ from design.task.shapes import (
     Placed,
     Region,
     Required,
-    Span,
     Value,
 )
 
 SHIPPED = Path(__file__).parent / "shipped"
-
-Angle = Number | Span
-"""One value fixes the angle; two are the range to search, in degrees."""
 
 T = TypeVar("T")
 
@@ -58,50 +55,6 @@ STAND_INS: dict[str, Any] = {
     "motion": {"mode": "sweep", "limits_deg": (-1.0, 1.0), "period_s": 600.0},
 }
 """For keys without a default that are wrong in a file, while the others are looked at: nothing is wrong with these."""
-
-NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
-
-
-class AngleRanges(Record):
-    """Mounting angles to search over, or fixed."""
-
-    alpha_rot_deg: Angle = Field(
-        default=(-180.0, 180.0), description="the servo's axis, at first upright, is tilted about the line ahead"
-    )
-    beta_rot_deg: Angle = Field(
-        default=(-90.0, 90.0), description="... and before that about the line to the left: 90 points it ahead"
-    )
-    alpha_laser_deg: Angle = Field(
-        default=(-90.0, 90.0), description="the lidar, at first lying across the axis, is rolled about its front"
-    )
-    beta_laser_deg: Angle = Field(
-        default=(-90.0, 90.0), description="... and after that pitched: -90 lets its front look along the axis"
-    )
-    step_deg: Number = Field(default=5.0, ge=0.5, le=45, description="of the grid that is searched, refined to 0.01")
-    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
-    holes: Literal["avoid", "allow"] = Field(
-        default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
-    )
-
-    @model_validator(mode="after")
-    def _within_bounds(self) -> AngleRanges:
-        for name, bound in (("alpha_rot", 180), ("beta_rot", 90), ("alpha_laser", 90), ("beta_laser", 90)):
-            lower, upper = self.limits(name)
-            if not -bound <= lower <= upper <= bound:
-                raise ValueError(f"{name}_deg = {[lower, upper]} does not rise within -{bound} .. {bound}")
-        return self
-
-    def limits(self, name: str) -> Span:
-        """Range of one angle in degrees; both ends are equal where it is fixed."""
-        angle: Angle = getattr(self, f"{name}_deg")
-        return angle if isinstance(angle, tuple) else (angle, angle)
-
-    def grid_deg(self, name: str) -> Array:
-        """Settings of one angle that the search visits, both limits included."""
-        lower, upper = self.limits(name)
-        steps = int(np.floor((upper - lower) / self.step_deg + 1e-9))
-        grid = lower + self.step_deg * np.arange(steps + 1)
-        return grid if upper - grid[-1] < 1e-9 else np.append(grid, upper)
 
 
 class DensityRules(Record):

@@ -16,7 +16,8 @@ from design.objective.score import Score, score
 from design.search.optimum import rounded_to_error
 from design.search.tolerance import sensitivity
 from design.shadow import Shadow
-from design.task.task import NAMES, LoadedTask
+from design.task.angle_ranges import NAMES
+from design.task.task import LoadedTask
 
 OFF_DEG = 1.0  # what a printed and screwed mount may be off by
 

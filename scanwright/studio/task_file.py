@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from design.errors import TaskError
 from design.record import explain
-from design.task.task import NAMES, LoadedTask, Task, load_task
+from design.task.angle_ranges import NAMES
+from design.task.task import LoadedTask, Task, load_task
 from scanwright.pipeline.records import rename_files
 from scanwright.studio.state import Setting
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from cad.kernel import require_kernel
 from design.arrays import Array
-from design.task.task import NAMES, LoadedTask
+from design.task.angle_ranges import NAMES
+from design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task
 from scanwright.study.bench import judge_candidate
 from scanwright.study.candidate import addresses, bounds_of, search_candidate, search_record, winner_task

@@ -16,8 +16,9 @@ from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.errors import TaskError, suggest
 from design.motion import LONGEST_S, SHORTEST_S
 from design.record import Record
+from design.task.angle_ranges import AngleRanges
 from design.task.named_record import named_record
-from design.task.task import AngleRanges, Limits, LoadedTask, load_task
+from design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.front import COLUMNS
 
 SHIPPED = Path(__file__).parent / "shipped"

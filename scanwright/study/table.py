@@ -12,7 +12,7 @@ from typing import Any
 
 from design.atomic_file import whole_file
 from design.errors import BuildError
-from design.task.task import NAMES
+from design.task.angle_ranges import NAMES
 from scanwright.study.crossing import AXES
 from scanwright.study.front import COLUMNS, costs
 from scanwright.study.front_picture import front_picture

@@ -15,7 +15,8 @@ from design.search.constraints import Requirements, fan_reach
 from design.search.search import search
 from design.sphere.directions import weighted_samples
 from design.sphere.outline import reach_about
-from design.task.task import NAMES, Limits, LoadedTask, Task
+from design.task.angle_ranges import NAMES
+from design.task.task import Limits, LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [95, 140], "phi_deg": [-50, 50]}
 CONE = {"shape": "cone", "axis": [1, 0.3, -0.4], "half_angle_deg": 12}

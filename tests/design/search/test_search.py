@@ -13,7 +13,8 @@ from design.objective.problem import problem_of
 from design.objective.score import quick_J, score
 from design.search import coarse, families
 from design.search.search import search
-from design.task.task import NAMES, LoadedTask, Task, load_task
+from design.task.angle_ranges import NAMES
+from design.task.task import LoadedTask, Task, load_task
 
 AHEAD = {
     "weight": [{"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}],

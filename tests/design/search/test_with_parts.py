@@ -17,7 +17,8 @@ from design.search.families import Family
 from design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
 from design.shadow import AXIS_STEPS, Shadow
 from design.sphere.directions import weighted_samples
-from design.task.task import AngleRanges, Limits, LoadedTask, Task
+from design.task.angle_ranges import AngleRanges
+from design.task.task import Limits, LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [60, 130], "phi_deg": [-70, 70]}
 

@@ -1,0 +1,64 @@
+"""The mounting angles of a task: what each may be, and the grid that a search lays over that."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from design.arrays import Array
+from design.record import Record
+from design.task.equivalent_settings import BOUNDS, advice
+from design.task.shapes import Number, Span
+
+Angle = Number | Span
+"""One value fixes the angle; two are the range to search, in degrees."""
+
+NAMES = tuple(BOUNDS)
+
+
+class AngleRanges(Record):
+    """Mounting angles to search over, or fixed."""
+
+    alpha_rot_deg: Angle = Field(
+        default=(-180.0, 180.0), description="the servo's axis, at first upright, is tilted about the line ahead"
+    )
+    beta_rot_deg: Angle = Field(
+        default=(-90.0, 90.0), description="... and before that about the line to the left: 90 points it ahead"
+    )
+    alpha_laser_deg: Angle = Field(
+        default=(-90.0, 90.0), description="the lidar, at first lying across the axis, is rolled about its front"
+    )
+    beta_laser_deg: Angle = Field(
+        default=(-90.0, 90.0), description="... and after that pitched: -90 lets its front look along the axis"
+    )
+    step_deg: Number = Field(default=5.0, ge=0.5, le=45, description="of the grid that is searched, refined to 0.01")
+    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
+    holes: Literal["avoid", "allow"] = Field(
+        default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
+    )
+
+    @model_validator(mode="after")
+    def _within_bounds(self) -> AngleRanges:
+        setting = {name: self.limits(name) for name in BOUNDS}
+        for name, (lower, upper) in setting.items():
+            bound = BOUNDS[name]
+            if lower > upper:
+                raise ValueError(f"{name}_deg = {[lower, upper]} does not rise")
+            if not -bound <= lower <= upper <= bound:
+                shown = f"{lower:g}" if lower == upper else [lower, upper]
+                raise ValueError(f"{name}_deg = {shown} is not within -{bound:g} .. {bound:g}{advice(setting, name)}")
+        return self
+
+    def limits(self, name: str) -> Span:
+        """Range of one angle in degrees; both ends are equal where it is fixed."""
+        angle: Angle = getattr(self, f"{name}_deg")
+        return angle if isinstance(angle, tuple) else (angle, angle)
+
+    def grid_deg(self, name: str) -> Array:
+        """Settings of one angle that the search visits, both limits included."""
+        lower, upper = self.limits(name)
+        steps = int(np.floor((upper - lower) / self.step_deg + 1e-9))
+        grid = lower + self.step_deg * np.arange(steps + 1)
+        return grid if upper - grid[-1] < 1e-9 else np.append(grid, upper)
