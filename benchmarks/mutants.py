@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 _MOST_S = 600.0
 
 MODULES = {
-    "density": ("design/density/spin.py", "tests/design/density"),
+    "density": ("design/density/phase_walk.py", "tests/design/density"),
     "frames": ("design/frames.py", "tests/design/test_frames.py tests/design/test_angles.py"),
     "beams": ("design/density/beams.py", "tests/design/density/test_beams.py tests/design/objective/test_holes.py"),
     "score": ("design/objective/score.py", "tests/design/objective"),

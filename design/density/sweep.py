@@ -18,7 +18,8 @@ from numpy import ndarray
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
-from design.density.spin import TIE, Zones, half_width, sort_by_buckets
+from design.density.phase_walk import TIE, half_width, sort_by_buckets
+from design.density.spin import Zones
 from design.motion import Sweep
 
 
@@ -142,11 +143,12 @@ def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> 
 def _mean(t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: float) -> Array:
     out = np.zeros(len(t))
     pairs = np.empty((6, 2))
+    sin_b, cos_b = np.sin(t_b / 2), np.cos(t_b / 2)
+    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
     for i in range(len(t)):
-        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), len(t_b)):
-            if t_b[b] > t[i] + ball + 1e-9:
-                break
-            half = half_width(t[i], t_b[b], ball)
+        sin_t, cos_t = np.sin(t[i] / 2), np.cos(t[i] / 2)
+        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), np.searchsorted(t_b, t[i] + ball + 1e-9)):
+            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
             if half < 0.0:
                 continue
             for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
@@ -164,12 +166,13 @@ def _zones(
     at, rise = np.empty(12 * len(t_b)), np.empty(12 * len(t_b), np.int64)
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     pairs = np.empty((6, 2))
+    sin_b, cos_b = np.sin(t_b / 2), np.cos(t_b / 2)
+    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
     for i in range(n):
         level, steps = 0, 0
-        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), len(t_b)):
-            if t_b[b] > t[i] + ball + 1e-9:
-                break
-            half = half_width(t[i], t_b[b], ball)
+        sin_t, cos_t = np.sin(t[i] / 2), np.cos(t[i] / 2)
+        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), np.searchsorted(t_b, t[i] + ball + 1e-9)):
+            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
             if half < 0.0:
                 continue
             for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
@@ -182,7 +185,7 @@ def _zones(
                     at[steps], rise[steps] = 0.0, 0
                 at[steps + 1], rise[steps + 1] = last - np.floor(last), -1
                 steps += 2
-        sort_by_buckets(at, steps, 1.0, order, starts)
+        sort_by_buckets(at, steps, order, starts)
         here, lowest, highest = 0.0, 1 << 62, 0
         for k in order[:steps]:
             if at[k] > here:

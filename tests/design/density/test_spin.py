@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
-from design.density.spin import ball_search, count_at, mean_count, sort_by_buckets, zones
+from design.density.phase_walk import sort_by_buckets
+from design.density.spin import ball_search, count_at, mean_count, zones
 from design.frames import R_world_rot
 from design.objective import ball_search as oracle
 from design.objective.problem import problem_of
@@ -360,12 +361,12 @@ def test_directions_in_rings_about_the_axis_tell_of_the_error_they_share(problem
 
 
 @given(
-    places=st.lists(st.floats(0, 0.3, exclude_max=True), max_size=200),
+    places=st.lists(st.floats(0, 1, exclude_max=True), max_size=200),
     crowded=st.booleans(),
 )
 def test_places_are_sorted_however_they_crowd(places, crowded):
     at = np.array(places) * (1e-4 if crowded else 1.0)
     order, starts = np.empty(len(at) + 3, np.int64), np.empty(len(at) + 4, np.int64)
-    sort_by_buckets(at, len(at), 0.3, order, starts)
+    sort_by_buckets(at, len(at), order, starts)
     assert sorted(order[: len(at)]) == list(range(len(at)))
     assert (np.diff(at[order[: len(at)]]) >= 0).all()

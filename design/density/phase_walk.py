@@ -1,0 +1,235 @@
+"""Compiled: what a ball counts while the start phase of the turn goes by; see `design.density.spin`.
+
+The unit of azimuth is the step between two lines. The count rises where a line enters the window of a beam and falls
+where it leaves; line k does so k steps behind line 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from design.arrays import Array, Ints
+
+TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
+CROWD = 32  # places in one bucket, above which sorting within it would cost more than sorting all
+NO_LEVEL = 1 << 62
+
+
+@njit(cache=True, nogil=True)
+def half_width(sin_t: float, cos_t: float, sin_b: float, cos_b: float, sin_ball: float, cos_ball: float) -> float:
+    """Azimuth half-width of the ball about polar angle t on the circle t_b; pi is all of it, -1 none of it.
+
+    Sines and cosines are those of half the angles: `sin((ball - (t - t_b)) / 2) sin((ball + (t - t_b)) / 2)` keeps
+    full precision where t is close to t_b and where both are close to a pole, and an arcsine is all that each pair of
+    polar angles costs.
+    """
+    apart, along = sin_t * cos_b - cos_t * sin_b, cos_t * cos_b + sin_t * sin_b
+    across = (sin_ball * along - cos_ball * apart) * (sin_ball * along + cos_ball * apart)
+    if across < 0.0:
+        return -1.0
+    around = 4 * sin_t * cos_t * sin_b * cos_b
+    if across >= around:
+        return np.pi
+    return 2.0 * np.arcsin(np.sqrt(across / around))
+
+
+@njit(cache=True, nogil=True)
+def mean_counts(polar: Array, beam_polar: Array, ball: float) -> Array:
+    """Mean share of a turn in which each beam is within the ball, summed over the beams, (polar angles,)."""
+    out = np.zeros(len(polar))
+    sin_b, cos_b = np.sin(beam_polar / 2), np.cos(beam_polar / 2)
+    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
+    for i in range(len(polar)):
+        sin_t, cos_t = np.sin(polar[i] / 2), np.cos(polar[i] / 2)
+        for b in range(
+            np.searchsorted(beam_polar, polar[i] - ball - 1e-9), np.searchsorted(beam_polar, polar[i] + ball + 1e-9)
+        ):
+            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
+            if half > 0.0:
+                out[i] += half / np.pi
+    return out
+
+
+@njit(cache=True, nogil=True)
+def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
+    """Indices that sort the first n places, 0 to 1: spread evenly as they are, twice as fast as by comparing."""
+    starts[: n + 1] = 0
+    for k in range(n):
+        starts[min(int(at[k] * n), n - 1) + 1] += 1
+    if starts[: n + 1].max() > CROWD:
+        order[:n] = np.argsort(at[:n])
+        return
+    for b in range(n):
+        starts[b + 1] += starts[b]
+    for k in range(n):
+        b = min(int(at[k] * n), n - 1)
+        order[starts[b]] = k
+        starts[b] += 1
+    for i in range(1, n):
+        k = order[i]
+        j = i - 1
+        while j >= 0 and at[order[j]] > at[k]:
+            order[j + 1] = order[j]
+            j -= 1
+        order[j + 1] = k
+
+
+@njit(cache=True, nogil=True)
+def windows_at(
+    t: float, beam_polar: Array, halves: Array, beam_steps: Array, turn: float, ball: float, edges: Array
+) -> tuple[int, int]:
+    """Where line 0 enters the windows of the beams at a polar angle and leaves them, by turns, in `edges` [steps].
+
+    `halves` are sine and cosine of half the polar angles of the beams, `beam_steps` their azimuths. The edges are not
+    brought back to one turn. Returned: their number, and how many beams see all lines, for which there are none.
+    """
+    sin_t, cos_t, sin_ball, cos_ball = np.sin(t / 2), np.cos(t / 2), np.sin(ball / 2), np.cos(ball / 2)
+    n, whole = 0, 0
+    for b in range(np.searchsorted(beam_polar, t - ball - 1e-9), np.searchsorted(beam_polar, t + ball + 1e-9)):
+        half = half_width(sin_t, cos_t, halves[0, b], halves[1, b], sin_ball, cos_ball)
+        if half >= np.pi:
+            whole += 1
+        elif half >= 0.0:
+            half *= turn / (2 * np.pi)
+            edges[n], edges[n + 1] = beam_steps[b] - half, beam_steps[b] + half
+            n += 2
+    return n, whole
+
+
+@njit(cache=True, nogil=True)
+def even_zones(
+    polar: Array, beam_polar: Array, beam_azimuth: Array, count: int, ball: float, g: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Statistics over the start phase where all gaps between lines are alike: one gap stands for all.
+
+    Returned are means of g and of the count, lowest and highest count, (polar angles,) each.
+    """
+    n = len(polar)
+    mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    halves = np.stack((np.sin(beam_polar / 2), np.cos(beam_polar / 2)))
+    beam_steps = beam_azimuth * (count / (2 * np.pi))
+    at = np.empty(2 * len(beam_polar))
+    order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
+    for i in range(n):
+        edges, whole = windows_at(polar[i], beam_polar, halves, beam_steps, count, ball, at)
+        inside, balance = 0.0, 0.0
+        for k in range(0, edges, 2):
+            inside += at[k + 1] - at[k]
+            at[k], at[k + 1] = at[k] - np.floor(at[k]), at[k + 1] - np.floor(at[k + 1])
+            balance += at[k] - at[k + 1]
+        mean[i] = whole * count + inside
+        # what the mean count leaves when all steps are done is open from the start, whatever ties with what
+        level = whole * count + int(np.round(inside + balance))
+        sort_by_buckets(at, edges, order, starts)
+        here, lowest, highest = 0.0, NO_LEVEL, 0
+        for k in order[:edges]:
+            width = at[k] - here
+            mean_g[i] += g[level] * width
+            if width > TIE:
+                lowest, highest = min(lowest, level), max(highest, level)
+            here = at[k]
+            level += 1 - 2 * (k % 2)
+        mean_g[i] += g[level] * (1.0 - here)
+        if 1.0 - here > TIE:
+            lowest, highest = min(lowest, level), max(highest, level)
+        least[i], most[i] = lowest, highest
+    return mean_g, mean, least, most
+
+
+@njit(cache=True, nogil=True)
+def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) -> float:
+    """Change the count on some pieces of a gap; returned is what the sum of g over the gap changes by."""
+    change = 0.0
+    for j in range(first, last):
+        change += width[j] * (g[level[j] + by] - g[level[j]])
+        level[j] += by
+    return change
+
+
+@njit(cache=True, nogil=True)
+def seam_zones(
+    polar: Array, beam_polar: Array, beam_azimuth: Array, turn: float, ball: float, g: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The same where the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
+
+    In each gap an edge makes one step: ahead of it in the turn where the lines come through the seam, behind it later
+    in the gap by what the seam lacks of a whole step. So when the walk passes an edge the count changes on one arc of
+    the gap, which may go on at the start of the next one, and stays what it was on the rest.
+    """
+    n = len(polar)
+    mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    count = int(np.ceil(turn))
+    seam = turn - (count - 1)
+    halves = np.stack((np.sin(beam_polar / 2), np.cos(beam_polar / 2)))
+    beam_steps = beam_azimuth * (turn / (2 * np.pi))
+    size = 4 * len(beam_polar)
+    edge, at, gap, goes_on = np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.bool_)
+    order, rank, starts = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size + 1, np.int64)
+    width, level = np.empty(size + 1), np.empty(size + 1, np.int64)
+    for i in range(n):
+        edges, whole = windows_at(polar[i], beam_polar, halves, beam_steps, turn, ball, edge)
+        pieces = 2 * edges + 1
+        inside, balance = 0.0, 0.0
+        for k in range(edges):
+            sign = 1 - 2 * (k % 2)
+            inside -= sign * edge[k]
+            edge[k] -= turn * np.floor(edge[k] / turn)
+            gap[k] = min(int(edge[k]), count - 1)
+            behind = edge[k] - gap[k]
+            goes_on[k] = behind >= seam
+            ahead = behind - seam if goes_on[k] else behind - seam + 1.0
+            at[k], at[edges + k] = ahead, behind
+            through = gap[k] + goes_on[k]  # lines
+            for lines, first_at in ((through, ahead), (count - through, edge[k])):
+                balance += sign * (lines * (turn - first_at) - lines * (lines - 1) / 2)
+        mean[i] = whole * count + inside * (count / turn)
+        # what the mean count leaves when all steps are done is open from the start, whatever ties with what
+        now = whole * count + int(np.round((inside * count - balance) / turn))
+        sort_by_buckets(at, 2 * edges, order, starts)
+        here, total = 0.0, 0.0
+        for j in range(pieces):
+            end = at[order[j]] if j < 2 * edges else 1.0
+            width[j], level[j] = end - here, now
+            total += g[now] * (end - here)
+            here = end
+            if j < 2 * edges:
+                rank[order[j]] = j
+                now += 1 - 2 * (order[j] % 2) if order[j] < edges else 0
+        at[:edges] = edge[:edges] / turn
+        sort_by_buckets(at, edges, order, starts)
+        lowest, highest = NO_LEVEL, 0
+        first, last = 0, pieces  # that have changed
+        begun, ended, walked = 0, 0, 0
+        while True:
+            while ended < begun:
+                k = order[ended]
+                if goes_on[k]:
+                    total += _raise(level, width, 0, rank[k] + 1, 1 - 2 * (k % 2), g)
+                    first, last = 0, max(last, rank[k] + 1)
+                ended += 1
+            while begun < edges and gap[order[begun]] <= walked:
+                k = order[begun]
+                start, end_at = rank[edges + k] + 1, pieces if goes_on[k] else rank[k] + 1
+                total += _raise(level, width, start, end_at, 1 - 2 * (k % 2), g)
+                first, last = min(first, start), max(last, end_at)
+                begun += 1
+            if walked == count - 1:
+                break
+            for j in range(first, last):
+                if width[j] > TIE:
+                    lowest, highest = min(lowest, level[j]), max(highest, level[j])
+            after = walked + 1 if ended < begun else (gap[order[begun]] if begun < edges else count - 1)
+            mean_g[i] += total * (after - walked)
+            walked, first, last = after, pieces, 0
+        here = 0.0
+        for j in range(pieces):
+            part = min(here + width[j], seam) - here
+            if part > 0.0:
+                mean_g[i] += g[level[j]] * part
+            if part > TIE:
+                lowest, highest = min(lowest, level[j]), max(highest, level[j])
+            here += width[j]
+        mean_g[i] /= turn
+        least[i], most[i] = lowest, highest
+    return mean_g, mean, least, most
