@@ -1,14 +1,16 @@
-"""Fit coupon: a plate to print first, which tells the clearances of one printer.
+"""Fit coupon: a plate to print first, in half an hour, which tells the clearances of one printer.
 
-Frame: its own, mm, lying on the bed. One row of bores for the shaft's spigot, one of holes for each screw that the
-scanner's catalogue parts take; the number under each hole is its clearance on the diameter, and that of the printer's
-profile is among them; a profile with nut traps gets a row of pockets. The bore that slides without play, and the hole
-that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
+Frame: its own, mm, lying on the bed. A row of bores for the shaft's spigot, one of holes for each screw that the
+scanner's catalogue parts take, one of pockets where the profile traps nuts. The words above a row say what it is for
+and the clearance on the diameter of its first hole, and each hole has a tenth of a millimetre more than the one to its
+left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play, and the hole that the
+screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
@@ -26,13 +28,39 @@ from design.arrays import Array
 from design.scanner import Scanner
 
 NUT = SCREWS["M3"]  # that the parts trap
-THICKNESS = 5.0
+THICKNESS = 1.8  # least: the height that a fit is tried over
+FLOOR = 1.0  # below pockets
 LETTER = 4.5
 STEP = 0.1  # from one clearance to the next
 COLUMNS = 5
-PITCH = 20.0
-MARGIN = 4.0
+WALL = 1.6  # between holes, and around all
 POCKETS = "NUT"  # heading of the row for nuts
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """Holes of one nominal diameter, from left to right by their clearances, below their words."""
+
+    name: str
+    nominal: float
+    fits: list[float]
+
+    @property
+    def words(self) -> str:
+        return f"{self.name} {f'{self.fits[0]:.2f}'.removeprefix('0').removesuffix('0')}+"
+
+    @property
+    def pitch(self) -> float:
+        across = self.nominal + self.fits[-1]
+        return WALL + (across * 2 / math.sqrt(3) if self.name == POCKETS else across)
+
+    @property
+    def width(self) -> float:
+        return 2 * WALL + max(COLUMNS * self.pitch - WALL, text_width(self.words, LETTER))
+
+    @property
+    def height(self) -> float:
+        return self.pitch + LETTER + WALL
 
 
 def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
@@ -43,49 +71,65 @@ def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
     """
     printer, rows = scanner.printer, _rows(scanner, stack)
     groove, trap = groove_of(printer), trap_of(NUT, printer)
-    heading = max(text_width(name, LETTER) for name, _, _ in rows) + 3.0
-    heights = [max(nominal + max(fits), LETTER) + LETTER + 5.0 for _, nominal, fits in rows]
-    width = 2 * MARGIN + heading + PITCH * COLUMNS
-    depth = 2 * MARGIN + sum(heights) + LETTER + 3.0
+    thickness = max(THICKNESS, 0.0 if trap is None else trap.depth + FLOOR)
+    width, depth, places = _laid_out(rows)
     holes: list[cq.Solid] = []
-    y = depth - MARGIN - LETTER
-    words = [(printer.name, MARGIN, y)]
-    for (name, nominal, fits), height in zip(rows, heights, strict=True):
-        y -= height
-        middle = y + LETTER + 2.0 + (height - LETTER - 5.0) / 2 + 1.5
-        words.append((name, MARGIN, middle - LETTER / 2))
-        for i, fit in enumerate(fits):
-            x = MARGIN + heading + PITCH * (i + 0.5)
-            bore = nominal + fit
-            if name == POCKETS and trap is not None:
-                pocket = outlines.polygon(bore / math.sqrt(3), 6) + np.array([x, middle])
-                holes.append(solids.prism(pocket, THICKNESS - trap.depth, THICKNESS + 1.0))
+    for row, (left, low, _) in zip(rows, places, strict=True):
+        for i, fit in enumerate(row.fits):
+            x, y = left + row.pitch * (i + 0.5) - WALL / 2, low + (row.pitch - WALL) / 2
+            bore = row.nominal + fit
+            if row.name == POCKETS and trap is not None:
+                pocket = outlines.polygon(bore / math.sqrt(3), 6) + np.array([x, y])
+                holes.append(solids.prism(pocket, thickness - trap.depth, thickness + 1.0))
                 bore = trap.hole
-            holes.append(solids.upright(bore / 2, -1.0, THICKNESS + 1.0, x, middle))
-            mark = f"{fit:.2f}".rstrip("0").ljust(3, "0")
-            words.append((mark, x - text_width(mark, LETTER) / 2, y))
+            holes.append(solids.upright(bore / 2, -1.0, thickness + 1.0, x, y))
     with building(FIT_COUPON, "plate and holes", "rows", len(rows)) as checked:
-        plate = checked(solids.box((0.0, 0.0, 0.0), (width, depth, THICKNESS)).cut(*holes))
-    with building(FIT_COUPON, "lettering", "title", printer.name) as checked:
-        top = flat_at(plate, np.array([0.5, 0.5, THICKNESS]), np.array([0.0, 0.0, 1.0]))
+        plate = checked(solids.box((0.0, 0.0, 0.0), (width, depth, thickness)).cut(*holes))
+    with building(FIT_COUPON, "lettering", "rows", len(rows)) as checked:
+        top = flat_at(plate, np.array([0.5, 0.5, thickness]), np.array([0.0, 0.0, 1.0]))
         assert top is not None
-        grooves = [outline for word in words for outline in _letters(*word, groove.width, top)]
+        grooves = []
+        for row, (left, _, high) in zip(rows, places, strict=True):
+            grooves += _letters(row.words, np.array([left, high, thickness]), groove.width, top)
         return checked(engrave(plate, [(top, grooves)], groove.depth))
 
 
-def _rows(scanner: Scanner, stack: Hub) -> list[tuple[str, float, list[float]]]:
-    """Heading, nominal diameter and clearances of each; the last one, of pockets, where the profile traps nuts."""
+def _laid_out(rows: list[_Row]) -> tuple[float, float, list[tuple[float, float, float]]]:
+    """Width and depth of the plate; left of each row, low of its holes and of its words.
+
+    Rows stand side by side as far as the widest reaches.
+    """
+    widest = max(row.width for row in rows)
+    lines: list[list[_Row]] = []
+    for row in rows:
+        if lines and sum(other.width for other in [*lines[-1], row]) <= widest:
+            lines[-1].append(row)
+        else:
+            lines.append([row])
+    depth = WALL + sum(max(row.height for row in line) for line in lines)
+    places, top = [], depth - WALL
+    for line in lines:
+        low = top - max(row.height for row in line) + WALL
+        left = WALL
+        for row in line:
+            places.append((left, low, top - LETTER))
+            left += row.width
+        top = low - WALL
+    return widest, depth, places
+
+
+def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
+    """The last one, of pockets, where the profile traps nuts."""
     printer = scanner.printer
     fits, screws = _around(printer.fit_clearance_mm), _around(printer.screw_clearance_mm)
-    rows = [(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
+    rows = [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
     for name in sorted({scanner.lidar.mount_screw, scanner.servo.case_screw}):
-        rows.append((name, SCREWS[name].nominal, screws))
-    return rows if trap_of(NUT, printer) is None else [*rows, (POCKETS, NUT.nut_across, fits)]
+        rows.append(_Row(name, SCREWS[name].nominal, screws))
+    return rows if trap_of(NUT, printer) is None else [*rows, _Row(POCKETS, NUT.nut_across, fits)]
 
 
-def _letters(text: str, x: float, y: float, stroke: float, top: Flat) -> list[shapely.Polygon]:
-    """Outlines of a word whose lower left corner is at (x, y) on the plate, in the axes of its upper face."""
-    corner = np.array([x, y, THICKNESS])
+def _letters(text: str, corner: Array, stroke: float, top: Flat) -> list[shapely.Polygon]:
+    """Outlines of words with their lower left corner on the plate, in the axes of its upper face."""
 
     def put(points: Array) -> Array:
         return top.along(corner + np.column_stack([points, np.zeros(len(points))]))
