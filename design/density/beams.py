@@ -102,7 +102,9 @@ def blind_zones(
     middle of it, as behind a part that turns along, it is several.
     """
     apart = np.diff(bearings_rad)
-    ends = np.flatnonzero(apart > 1.5 * np.median(apart)) + 1 if len(apart) > 1 else np.empty(0, dtype=int)
+    ends = np.empty(0, dtype=int)
+    if len(apart) > 1 and not 0 < apart.max() <= 1.5 * apart.min():  # a median costs more than all else here
+        ends = np.flatnonzero(apart > 1.5 * np.median(apart)) + 1
     fans = np.array([[fan.min() - ball_rad, fan.max() + ball_rad] for fan in np.split(beam_polar_rad, ends)])
     fans = fans[np.argsort(fans[:, 0])]
     starts = np.concatenate([[0.0], np.maximum.accumulate(fans[:, 1])])

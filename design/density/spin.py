@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.spatial import cKDTree
 
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
@@ -84,7 +83,7 @@ def zones(
             return even_zones(polar_rad[chunk], polar_b, azimuth_b, lines.count, ball_rad, g)
         return seam_zones(polar_rad[chunk], polar_b, azimuth_b, turn, ball_rad, g)
 
-    parts = in_chunks(walked, len(polar_rad), smallest=128)
+    parts = in_chunks(walked, len(polar_rad), smallest=512)
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
 
@@ -122,6 +121,8 @@ def ball_search(
     Returns:
         Counts, shape (n,).
     """
+    from scipy.spatial import cKDTree  # its import takes a third of a second, and no search asks for it
+
     chord = 2 * np.sin(ball_rad / 2)
     return cKDTree(beams).query_ball_point(directions, chord, return_length=True, workers=-1)
 

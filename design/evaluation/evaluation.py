@@ -21,7 +21,7 @@ from design.objective.ball_search import BallScore, ball_score
 from design.objective.holes import Hole, holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
-from design.search.tolerance import rise_words, sensitivity
+from design.objective.tolerance import rise_words, sensitivity
 from design.task.task import LoadedTask
 
 

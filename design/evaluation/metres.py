@@ -5,15 +5,15 @@ Every beam of a simulated scan is followed to the plane of a region; what is sai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from scipy.spatial import cKDTree
 
-from design.arrays import Setting, Vector
+from design.arrays import Array, Ints, Setting, Vector
 from design.density.beams import scan_at
 from design.objective.problem import Problem
 from design.sphere.rectangle import edge_normals
@@ -25,6 +25,9 @@ AT_M = 3.0  # from the optical centre, where a gap is told
 RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
 CELLS = 64  # along each side of a region, to begin with
 MOST_CELLS = 200_000
+Nearest = Callable[[Array, list[int]], tuple[Array, Ints]]
+"""Distances from points (n, 3) to those points of a scan that are so many-th nearest, and which they are."""
+
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
 SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and never too narrow
 
@@ -96,14 +99,16 @@ def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem
         return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
     area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
-    tree = cKDTree(ends)  # what lies just beyond an edge ends a gap too
+    from scipy.spatial import cKDTree  # a heavy import that few tasks need
+
+    nearest = cKDTree(ends).query  # what lies just beyond an edge ends a gap too
     return PlaneFigures(
         region.words(),
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),
         at_m,
-        200 * plane.widest(tree, 1, (at_m * (1 - RING), at_m * (1 + RING))),
-        200 * plane.widest(tree, 2, (0.0, np.inf)),
+        200 * plane.widest(nearest, 1, (at_m * (1 - RING), at_m * (1 + RING))),
+        200 * plane.widest(nearest, 2, (0.0, np.inf)),
     )
 
 
@@ -120,7 +125,7 @@ class _Plane:
         """Points of the rectangle [m] at shares of its sides, 0 .. 1."""
         return self.corner + shares[:, :1] * self.along + shares[:, 1:] * self.across
 
-    def widest(self, tree: cKDTree, k: int, away_m: tuple[float, float]) -> float:
+    def widest(self, nearest: Nearest, k: int, away_m: tuple[float, float]) -> float:
         """Radius of the widest disc with fewer than k points inside, its middle so far away, at most `SLACK` too wide.
 
         The distance to the k-th nearest point changes by no more than one goes: cells that can hold no wider disc than
@@ -131,7 +136,7 @@ class _Plane:
         while True:
             middles = self.points(shares)
             reach = half * float(np.linalg.norm(np.abs(self.along) + np.abs(self.across)))
-            found = tree.query(middles, [k])[0][:, 0]
+            found = nearest(middles, [k])[0][:, 0]
             away = np.linalg.norm(middles, axis=1)
             masked = self.hidden(shares)
             there = (away_m[0] <= away) & (away <= away_m[1]) & ~masked

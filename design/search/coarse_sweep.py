@@ -8,7 +8,6 @@ turns to them. As for the spin, g of the mean count comes first and bounds what 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
@@ -118,6 +117,8 @@ def _weights(field: Field, axes: Folded, directions: Array) -> Array:
 
 def _weights_nearby(field: Field, axes: Folded, directions: Array) -> Array:
     """The same of a region that lies between the directions: each of its own is given to the one next to it."""
+    from scipy.spatial import cKDTree  # a heavy import that few tasks need
+
     samples = weighted_samples(field, IN_REGION)
     R = R_world_rot(*np.radians(axes.settings_deg.T))
     tree = cKDTree(directions)

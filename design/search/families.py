@@ -9,15 +9,16 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.optimize import minimize
 
 from design.arrays import Array, Setting
 from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score
+from design.objective.tolerance import worst_within
 from design.search.coarse import Landscape
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
+from design.search.simplex import Enough, lowest_by_simplex
 from design.search.tolerance import worst_within
 from design.task.angle_ranges import NAMES, AngleRanges
 
@@ -31,8 +32,8 @@ PIECE = 128  # planes whose J are made together
 MOST_LOOKS = 80  # for local minima, before the list is left shorter
 MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
 REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
-ROUGH = {"xatol": 0.1, "fatol": 1e-4}  # deg, and J: of all that are not built, as far as their stated errors reach
-FINE = {"xatol": 0.005, "fatol": 1e-7}
+ROUGH = Enough(0.1, 1e-4, 30)  # deg, J, values an angle: of all that are not built, as far as their errors reach
+FINE = Enough(0.005, 1e-7, 30)
 FINEST_DEG = 0.01
 STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
 
@@ -290,20 +291,10 @@ def _refined(
                 return designed
             return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
 
-        start = angles[free]
-        corners = _simplex(J, start, reach * ranges.step_deg, limits[free])
-        found = minimize(
-            J,
-            start,
-            method="Nelder-Mead",
-            bounds=limits[free],
-            options={
-                "initial_simplex": np.vstack([start, corners]),
-                "maxfev": 30 * len(start),
-                **(FINE if len(rounds) > 1 else ROUGH),
-            },
-        )
-        angles[free] = found.x
+        corners, values = _simplex(J, angles[free], reach * ranges.step_deg, limits[free])
+        enough = FINE if len(rounds) > 1 else ROUGH
+        most = replace(enough, values=enough.values * int(free.sum()) - len(values))
+        angles[free] = lowest_by_simplex(J, corners, values, limits[free], most)
     # of the settings around it the nearest: rounding may leave the constraints
     finest = rounds[-1][1]
     below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
@@ -317,11 +308,14 @@ def _refined(
     return leader.angles_deg
 
 
-def _simplex(J: Callable[[Array], float], start: Array, step: float, limits: Array) -> Array:
-    """A setting a step along each angle, (free, free): to the side of the lower J, for one may be refused."""
-    corners = np.tile(start, (len(start), 1))
+def _simplex(J: Callable[[Array], float], start: Array, step: float, limits: Array) -> tuple[Array, Array]:
+    """A setting and one a step along each angle, (free + 1, free): to the side of the lower J, for one may be refused.
+
+    With their J.
+    """
+    corners = [(start, J(start))]
     for i, (low, high) in enumerate(limits):
         sides = [np.where(np.arange(len(start)) == i, start + sign * step, start) for sign in (1, -1)]
         allowed = [side for side in sides if low <= side[i] <= high] or [np.clip(sides[0], *limits.T)]
-        corners[i] = min(allowed, key=J)
-    return corners
+        corners.append(min(((side, J(side)) for side in allowed), key=lambda pair: pair[1]))
+    return np.array([point for point, _ in corners]), np.array([value for _, value in corners])

@@ -129,8 +129,11 @@ def _cells(field: Field, patch: int) -> tuple[Float[ndarray, "n 3"], Float[ndarr
 
 def _breaks(field: Field, axis: Vector) -> Float[ndarray, " n"]:
     """Polar angles at which a circle about `axis` touches an edge or passes a corner; 0 and pi too."""
-    touched = _touched(_breaking(field), axis)
-    points = np.concatenate([touched[_is_edge(field, touched)], edge_corners(field)])
+    planes = _breaking(field)
+    touched = _touched(planes, axis)
+    across = LOOK_RAD * np.concatenate([planes[:, :3], planes[:, :3]])
+    inside, outside = field.weight_at(np.concatenate([touched + across, touched - across])).reshape(2, -1)
+    points = np.concatenate([touched[inside != outside], edge_corners(field)])
     grid = np.linspace(0, np.pi, GRID + 1) if field.edges > MANY_EDGES else np.array([0.0, np.pi])
     return np.concatenate([grid, _polar_about(axis, points)])
 
@@ -174,7 +177,9 @@ def _touched(planes: Float[ndarray, "edges 4"], axis: Vector) -> Float[ndarray, 
     across = axis - normals * (normals @ axis)[:, None]
     length = np.linalg.norm(across, axis=1, keepdims=True)
     tilted = length[:, 0] > 1e-12  # a circle about the axis itself is at one polar angle: any point of it will do
-    side = np.where(tilted[:, None], across / np.maximum(length, 1e-300), frames_about(normals)[:, 0])
+    side = across / np.maximum(length, 1e-300)
+    if not tilted.all():
+        side = np.where(tilted[:, None], side, frames_about(normals)[:, 0])
     radius = np.sqrt(np.maximum(1 - offsets**2, 0))
     return np.concatenate([normals * offsets + side * radius, normals * offsets - side * radius])
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
-from scipy.integrate import cumulative_simpson
 
 from design.arrays import Vector
 
@@ -56,6 +55,8 @@ class SeenRectangle:
             along: shares of the solid angle, 0 .. 1, that lie before each direction along e1.
             across: the same across, along e2.
         """
+        from scipy.integrate import cumulative_simpson  # a heavy import that few tasks need
+
         t = np.linspace(np.arcsinh(self.x[0]), np.arcsinh(self.x[1]), STRIPS + 1)
         low, high = (_h(np.sinh(t), y) for y in self.y)
         sums = cumulative_simpson((high - low) / np.cosh(t), x=t, initial=0.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ class Field:
     @property
     def edges(self) -> int:
         """Number of edge planes: what a circle integral costs."""
-        return len(self.planes) + len(self.map_planes)
+        return sum(len(e.planes) + len(e.map_planes) for e in (self.weight, self.mask))
 
     @property
     def patches(self) -> Float[ndarray, "patches 14"]:
@@ -108,7 +109,7 @@ class Field:
         self, axis: Vector, polar_rad: Float[ndarray, " n"]
     ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
-        numbers = self._numbers()
+        numbers = _numbers(self)
         frame = frames_about(axis[None])
         parts = in_chunks(lambda chunk: circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad), FEW_CIRCLES)
         return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
@@ -117,15 +118,18 @@ class Field:
         self, axes: Float[ndarray, "axes 3"], polar_rad: Float[ndarray, " n"]
     ) -> Float[ndarray, "axes n"]:
         """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
-        numbers = self._numbers()
+        numbers = _numbers(self)
         frames = frames_about(axes)
         parts = in_chunks(lambda chunk: circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
         return np.concatenate(parts)
 
-    def _numbers(self) -> tuple[Array, Array, Array, Array, Array, float]:
-        weight, mask = self.weight, self.mask
-        planes = np.concatenate([self.planes, self.map_planes])
-        return planes, weight.rows, weight.tables, mask.rows, mask.tables, self.background
+
+@lru_cache(maxsize=64)
+def _numbers(field: Field) -> tuple[Array, Array, Array, Array, Array, float]:
+    """What the kernel of circle means takes of a field."""
+    weight, mask = field.weight, field.mask
+    planes = np.concatenate([field.planes, field.map_planes])
+    return planes, weight.rows, weight.tables, mask.rows, mask.tables, field.background
 
 
 def value_of(region: Region | MaskRegion) -> float:

@@ -13,11 +13,11 @@ from design.evaluation.gaps import gaps
 from design.objective.ball_search import start_phases
 from design.objective.problem import problem_of
 from design.objective.score import quick_J
+from design.objective.tolerance import rise_words, sensitivity, worst_within
 from design.search.grid_classes import fold_planes, mirrors_of
 from design.search.limits import allowed_planes
 from design.search.search import search
 from design.search.shortest_period import fastest
-from design.search.tolerance import rise_words, sensitivity, worst_within
 from design.sphere.directions import weighted_samples
 from design.task.task import Limits, LoadedTask, Task, load_task
 
