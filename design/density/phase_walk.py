@@ -7,7 +7,9 @@ where it leaves; line k does so k steps behind line 0.
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float
 from numba import njit
+from numpy import ndarray
 
 from design.arrays import Array, Ints
 
@@ -34,18 +36,31 @@ def half_width(sin_t: float, cos_t: float, sin_b: float, cos_b: float, sin_ball:
     return 2.0 * np.arcsin(np.sqrt(across / around))
 
 
+def meetings(
+    polar_rad: Float[ndarray, " n"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
+) -> tuple[Ints, Array, Array, Array]:
+    """What the kernels take of polar angles about an axis, those of the beams, in order, and the ball.
+
+    Returned are the first beam that may be within the ball and the first one behind, (2, n), and sine and cosine of
+    half the polar angles, (2, n), of half those of the beams, (2, beams), and of half the ball, (2,).
+    """
+    ends = np.searchsorted(beam_polar_rad, np.stack([polar_rad - ball_rad - 1e-9, polar_rad + ball_rad + 1e-9]))
+    return ends, halves(polar_rad), halves(beam_polar_rad), halves(ball_rad)
+
+
+def halves(angle_rad: Array | float) -> Array:
+    """Sine and cosine of half of angles (n,), shape (2, n)."""
+    half = np.asarray(angle_rad) / 2
+    return np.stack([np.sin(half), np.cos(half)])
+
+
 @njit(cache=True, nogil=True)
-def mean_counts(polar: Array, beam_polar: Array, ball: float) -> Array:
+def mean_counts(ends: Ints, polar: Array, beams: Array, ball: Array) -> Array:
     """Mean share of a turn in which each beam is within the ball, summed over the beams, (polar angles,)."""
-    out = np.zeros(len(polar))
-    sin_b, cos_b = np.sin(beam_polar / 2), np.cos(beam_polar / 2)
-    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
-    for i in range(len(polar)):
-        sin_t, cos_t = np.sin(polar[i] / 2), np.cos(polar[i] / 2)
-        for b in range(
-            np.searchsorted(beam_polar, polar[i] - ball - 1e-9), np.searchsorted(beam_polar, polar[i] + ball + 1e-9)
-        ):
-            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
+    out = np.zeros(polar.shape[1])
+    for i in range(len(out)):
+        for b in range(ends[0, i], ends[1, i]):
+            half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
             if half > 0.0:
                 out[i] += half / np.pi
     return out
@@ -54,40 +69,45 @@ def mean_counts(polar: Array, beam_polar: Array, ball: float) -> Array:
 @njit(cache=True, nogil=True)
 def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
     """Indices that sort the first n places, 0 to 1: spread evenly as they are, twice as fast as by comparing."""
-    starts[: n + 1] = 0
+    for b in range(n + 1):
+        starts[b] = 0
+    most = 0
     for k in range(n):
-        starts[min(int(at[k] * n), n - 1) + 1] += 1
-    if starts[: n + 1].max() > CROWD:
-        order[:n] = np.argsort(at[:n])
-        return
+        b = min(int(at[k] * n), n - 1) + 1
+        starts[b] += 1
+        most = max(most, starts[b])
     for b in range(n):
         starts[b + 1] += starts[b]
     for k in range(n):
         b = min(int(at[k] * n), n - 1)
         order[starts[b]] = k
         starts[b] += 1
-    for i in range(1, n):
-        k = order[i]
-        j = i - 1
-        while j >= 0 and at[order[j]] > at[k]:
-            order[j + 1] = order[j]
-            j -= 1
-        order[j + 1] = k
+    gap = 1
+    while most > CROWD and gap < n // 3:  # Shell, Knuth's gaps: np.argsort would take longer to compile than the rest
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, n):
+            k = order[i]
+            j = i - gap
+            while j >= 0 and at[order[j]] > at[k]:
+                order[j + gap] = order[j]
+                j -= gap
+            order[j + gap] = k
+        gap //= 3
 
 
 @njit(cache=True, nogil=True)
 def windows_at(
-    t: float, beam_polar: Array, halves: Array, beam_steps: Array, turn: float, ball: float, edges: Array
+    i: int, ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, edges: Array
 ) -> tuple[int, int]:
     """Where line 0 enters the windows of the beams at a polar angle and leaves them, by turns, in `edges` [steps].
 
-    `halves` are sine and cosine of half the polar angles of the beams, `beam_steps` their azimuths. The edges are not
-    brought back to one turn. Returned: their number, and how many beams see all lines, for which there are none.
+    `beam_steps` are the azimuths of the beams. The edges are not brought back to one turn. Returned: their number, and
+    how many beams see all lines, for which there are none.
     """
-    sin_t, cos_t, sin_ball, cos_ball = np.sin(t / 2), np.cos(t / 2), np.sin(ball / 2), np.cos(ball / 2)
     n, whole = 0, 0
-    for b in range(np.searchsorted(beam_polar, t - ball - 1e-9), np.searchsorted(beam_polar, t + ball + 1e-9)):
-        half = half_width(sin_t, cos_t, halves[0, b], halves[1, b], sin_ball, cos_ball)
+    for b in range(ends[0, i], ends[1, i]):
+        half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
         if half >= np.pi:
             whole += 1
         elif half >= 0.0:
@@ -99,20 +119,18 @@ def windows_at(
 
 @njit(cache=True, nogil=True)
 def even_zones(
-    polar: Array, beam_polar: Array, beam_azimuth: Array, count: int, ball: float, g: Array
+    ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, count: int, g: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Statistics over the start phase where all gaps between lines are alike: one gap stands for all.
 
     Returned are means of g and of the count, lowest and highest count, (polar angles,) each.
     """
-    n = len(polar)
+    n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    halves = np.stack((np.sin(beam_polar / 2), np.cos(beam_polar / 2)))
-    beam_steps = beam_azimuth * (count / (2 * np.pi))
-    at = np.empty(2 * len(beam_polar))
+    at = np.empty(2 * len(beam_steps))
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     for i in range(n):
-        edges, whole = windows_at(polar[i], beam_polar, halves, beam_steps, count, ball, at)
+        edges, whole = windows_at(i, ends, polar, beams, ball, beam_steps, count, at)
         inside, balance = 0.0, 0.0
         for k in range(0, edges, 2):
             inside += at[k + 1] - at[k]
@@ -120,10 +138,11 @@ def even_zones(
             balance += at[k] - at[k + 1]
         mean[i] = whole * count + inside
         # what the mean count leaves when all steps are done is open from the start, whatever ties with what
-        level = whole * count + int(np.round(inside + balance))
+        level = whole * count + int(np.floor(inside + balance + 0.5))
         sort_by_buckets(at, edges, order, starts)
         here, lowest, highest = 0.0, NO_LEVEL, 0
-        for k in order[:edges]:
+        for j in range(edges):
+            k = order[j]
             width = at[k] - here
             mean_g[i] += g[level] * width
             if width > TIE:
@@ -149,7 +168,7 @@ def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) 
 
 @njit(cache=True, nogil=True)
 def seam_zones(
-    polar: Array, beam_polar: Array, beam_azimuth: Array, turn: float, ball: float, g: Array
+    ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, g: Array
 ) -> tuple[Array, Array, Array, Array]:
     """The same where the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
 
@@ -157,18 +176,16 @@ def seam_zones(
     in the gap by what the seam lacks of a whole step. So when the walk passes an edge the count changes on one arc of
     the gap, which may go on at the start of the next one, and stays what it was on the rest.
     """
-    n = len(polar)
+    n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     count = int(np.ceil(turn))
     seam = turn - (count - 1)
-    halves = np.stack((np.sin(beam_polar / 2), np.cos(beam_polar / 2)))
-    beam_steps = beam_azimuth * (turn / (2 * np.pi))
-    size = 4 * len(beam_polar)
+    size = 4 * len(beam_steps)
     edge, at, gap, goes_on = np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.bool_)
     order, rank, starts = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size + 1, np.int64)
     width, level = np.empty(size + 1), np.empty(size + 1, np.int64)
     for i in range(n):
-        edges, whole = windows_at(polar[i], beam_polar, halves, beam_steps, turn, ball, edge)
+        edges, whole = windows_at(i, ends, polar, beams, ball, beam_steps, turn, edge)
         pieces = 2 * edges + 1
         inside, balance = 0.0, 0.0
         for k in range(edges):
@@ -185,7 +202,7 @@ def seam_zones(
                 balance += sign * (lines * (turn - first_at) - lines * (lines - 1) / 2)
         mean[i] = whole * count + inside * (count / turn)
         # what the mean count leaves when all steps are done is open from the start, whatever ties with what
-        now = whole * count + int(np.round((inside * count - balance) / turn))
+        now = whole * count + int(np.floor((inside * count - balance) / turn + 0.5))
         sort_by_buckets(at, 2 * edges, order, starts)
         here, total = 0.0, 0.0
         for j in range(pieces):
@@ -196,7 +213,8 @@ def seam_zones(
             if j < 2 * edges:
                 rank[order[j]] = j
                 now += 1 - 2 * (order[j] % 2) if order[j] < edges else 0
-        at[:edges] = edge[:edges] / turn
+        for k in range(edges):
+            at[k] = edge[k] / turn
         sort_by_buckets(at, edges, order, starts)
         lowest, highest = NO_LEVEL, 0
         first, last = 0, pieces  # that have changed

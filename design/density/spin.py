@@ -21,7 +21,7 @@ from numpy import ndarray
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import ScanLines
-from design.density.phase_walk import even_zones, half_width, mean_counts, seam_zones
+from design.density.phase_walk import even_zones, half_width, halves, mean_counts, meetings, seam_zones
 
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 
@@ -48,7 +48,7 @@ def mean_count(
 ) -> Float[ndarray, " n"]:
     """Mean over the start phase of the beams within a ball at polar angles t, in closed form, shape (len(t),)."""
     beams = np.sort(beam_polar_rad)
-    parts = in_chunks(lambda chunk: mean_counts(polar_rad[chunk], beams, ball_rad), len(polar_rad))
+    parts = in_chunks(lambda chunk: mean_counts(*meetings(polar_rad[chunk], beams, ball_rad)), len(polar_rad))
     return lines.repeats * lines.count * np.concatenate(parts)
 
 
@@ -78,10 +78,13 @@ def zones(
     turn = 2 * np.pi / lines.step_rad
     even = abs(turn - lines.count) < EXACT_TURN
 
+    beam_steps = azimuth_b / lines.step_rad
+
     def walked(chunk: slice) -> tuple[Array, Array, Array, Array]:
+        met = meetings(polar_rad[chunk], polar_b, ball_rad)
         if even:
-            return even_zones(polar_rad[chunk], polar_b, azimuth_b, lines.count, ball_rad, g)
-        return seam_zones(polar_rad[chunk], polar_b, azimuth_b, turn, ball_rad, g)
+            return even_zones(*met, beam_steps, lines.count, g)
+        return seam_zones(*met, beam_steps, turn, g)
 
     parts = in_chunks(walked, len(polar_rad), smallest=512)
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
@@ -129,5 +132,4 @@ def ball_search(
 
 def _half_widths(t: float, beam_polar: Float[ndarray, " beams"], ball_rad: float) -> Float[ndarray, " beams"]:
     """delta_b at polar angle t; -1 where the ball never meets the beam."""
-    halves = [(np.sin(angle / 2), np.cos(angle / 2)) for angle in (t, ball_rad)]
-    return np.array([half_width(*halves[0], np.sin(b / 2), np.cos(b / 2), *halves[1]) for b in beam_polar])
+    return np.array([half_width(*halves(t), *halves(b), *halves(ball_rad)) for b in beam_polar])

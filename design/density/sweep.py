@@ -15,10 +15,10 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array
+from design.arrays import Array, Ints
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
-from design.density.phase_walk import TIE, half_width, sort_by_buckets
+from design.density.phase_walk import TIE, half_width, meetings, sort_by_buckets
 from design.density.spin import Zones
 from design.motion import Sweep
 
@@ -64,7 +64,7 @@ def mean_count_swept(
     """
     t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
     numbers = lines.numbers()
-    parts = in_chunks(lambda chunk: _mean(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad), len(t))
+    parts = in_chunks(lambda chunk: _mean(*meetings(t[chunk], t_b, ball_rad), p[chunk], p_b, numbers), len(t))
     return np.concatenate(parts)
 
 
@@ -81,7 +81,7 @@ def zones_swept(
     """
     t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
     numbers = lines.numbers()
-    parts = in_chunks(lambda chunk: _zones(t[chunk], p[chunk], t_b, p_b, numbers, ball_rad, g), len(t))
+    parts = in_chunks(lambda chunk: _zones(*meetings(t[chunk], t_b, ball_rad), p[chunk], p_b, numbers, g), len(t))
     mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
     return Zones(mean_g, mean, least, most)
 
@@ -140,15 +140,12 @@ def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> 
 
 
 @njit(cache=True, nogil=True)
-def _mean(t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: float) -> Array:
-    out = np.zeros(len(t))
+def _mean(ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Array, numbers: Array) -> Array:
+    out = np.zeros(len(p))
     pairs = np.empty((6, 2))
-    sin_b, cos_b = np.sin(t_b / 2), np.cos(t_b / 2)
-    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
-    for i in range(len(t)):
-        sin_t, cos_t = np.sin(t[i] / 2), np.cos(t[i] / 2)
-        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), np.searchsorted(t_b, t[i] + ball + 1e-9)):
-            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
+    for i in range(len(p)):
+        for b in range(ends[0, i], ends[1, i]):
+            half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
             if half < 0.0:
                 continue
             for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
@@ -158,21 +155,18 @@ def _mean(t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: floa
 
 @njit(cache=True, nogil=True)
 def _zones(
-    t: Array, p: Array, t_b: Array, p_b: Array, numbers: Array, ball: float, g: Array
+    ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Array, numbers: Array, g: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Walk the start phase from 0 to 1 per direction; see `zones_swept`."""
-    n = len(t)
+    n = len(p)
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    at, rise = np.empty(12 * len(t_b)), np.empty(12 * len(t_b), np.int64)
+    at, rise = np.empty(12 * len(p_b)), np.empty(12 * len(p_b), np.int64)
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     pairs = np.empty((6, 2))
-    sin_b, cos_b = np.sin(t_b / 2), np.cos(t_b / 2)
-    sin_ball, cos_ball = np.sin(ball / 2), np.cos(ball / 2)
     for i in range(n):
         level, steps = 0, 0
-        sin_t, cos_t = np.sin(t[i] / 2), np.cos(t[i] / 2)
-        for b in range(np.searchsorted(t_b, t[i] - ball - 1e-9), np.searchsorted(t_b, t[i] + ball + 1e-9)):
-            half = half_width(sin_t, cos_t, sin_b[b], cos_b[b], sin_ball, cos_ball)
+        for b in range(ends[0, i], ends[1, i]):
+            half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
             if half < 0.0:
                 continue
             for k in range(_stretches(p[i] - p_b[b], half, numbers, pairs)):
@@ -187,7 +181,8 @@ def _zones(
                 steps += 2
         sort_by_buckets(at, steps, order, starts)
         here, lowest, highest = 0.0, 1 << 62, 0
-        for k in order[:steps]:
+        for j in range(steps):
+            k = order[j]
             if at[k] > here:
                 mean_g[i] += g[level] * (at[k] - here)
                 if at[k] - here > TIE:

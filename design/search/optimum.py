@@ -156,7 +156,7 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
-    progress("reading the task (the first run compiles the numerics: some 20 s)")
+    progress("reading the task (the first run compiles the numerics: some 5 s)")
     found = loaded
     if isinstance(loaded.task.motion, Shortest):
         found, problem, result = fastest(loaded, progress)

@@ -64,8 +64,7 @@ def lowest(
         has_axis: the same of axes, (2, axes).
         constraints: what settings must keep; where none keeps them J is inf.
     """
-    closed_axis = np.where(has_axis, 0, np.inf).astype(np.float32)
-    closed_plane = np.where(has_plane, 0, np.inf).astype(np.float32)
+    closed_axis, closed_plane = (np.where(has, 0, np.inf).astype(np.float32, "C") for has in (has_axis, has_plane))
     plain, kept = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
     for part in _slices(has_axis.shape[1], PART):
         for piece in _slices(has_plane.shape[1], PIECE):
@@ -81,7 +80,7 @@ def lowest(
 
 
 def _joined(objective: Objective, moments: list[Array]) -> Array:
-    return np.asarray(objective.join(np.stack(moments) if len(moments) > 1 else moments[0][None]))
+    return np.asarray(objective.join(np.stack(moments) if len(moments) > 1 else moments[0][None]), dtype=np.float32)
 
 
 def _slices(count: int, size: int) -> list[slice]:
@@ -108,13 +107,11 @@ class _Running:
 
     def meets(self, straight: Array, turned: Array, piece: slice, part: slice) -> None:
         """Lower it by a tile of J, of a piece of the planes about a part of the axes."""
-        planes = self.closed_plane[:, piece]
-        axes, by_axis = (np.ascontiguousarray(of[:, part]) for of in (self.closed_axis, self.by_axis))  # vectorises
-        of_planes = (self.by_plane[:, piece], self.its_class[:, piece], self.its_flip[:, piece])
         # one thread: handing a tile to others takes as long as looking through it
-        _lower_planes(straight, turned, planes, axes, part.start, *of_planes)
-        _lower_axes(straight, turned, planes, axes, by_axis)
-        self.by_axis[:, part] = by_axis
+        first = (piece.start, part.start)
+        closed = (self.closed_plane, self.closed_axis)
+        _lower_planes(straight, turned, *first, *closed, self.by_plane, self.its_class, self.its_flip)
+        _lower_axes(straight, turned, *first, *closed, self.by_axis)
 
     @property
     def lowest(self) -> Lowest:
@@ -126,47 +123,57 @@ class _Running:
 def _lower_planes(
     straight: Array,
     turned: Array,
+    plane: int,
+    axis: int,
     closed_plane: Array,
     closed_axis: Array,
-    first: int,
     by_plane: Array,
     its_class: Array,
     its_flip: Array,
 ) -> None:
-    """Lowest J of each plane about axes from `first` on, which axis that is and its flip."""
+    """Lowest J of each plane of a tile about its axes, which axis that is and its flip; a tile has its first of both.
+
+    Whole arrays and the first of each side, and no slices of them: one kernel serves every tile.
+    """
+    columns = straight.shape[1]
+    closed = closed_axis[:, axis : axis + columns]
     for c in range(len(straight)):
         lows = np.full(2, np.float32(np.inf))
-        for a in range(straight.shape[1]):
+        for a in range(columns):
             # an axis that is flipped as well comes the same way round
-            J0, J1 = straight[c, a] + closed_axis[0, a], turned[c, a] + closed_axis[1, a]
+            J0, J1 = straight[c, a] + closed[0, a], turned[c, a] + closed[1, a]
             J = J0 if J0 < J1 else J1
             lows[0] = J if lows[0] > J else lows[0]
-            J0, J1 = turned[c, a] + closed_axis[0, a], straight[c, a] + closed_axis[1, a]
+            J0, J1 = turned[c, a] + closed[0, a], straight[c, a] + closed[1, a]
             J = J0 if J0 < J1 else J1
             lows[1] = J if lows[1] > J else lows[1]
         for flip in range(2):
             low = lows[flip]
-            if not low + closed_plane[flip, c] < by_plane[flip, c]:
+            if not low + closed_plane[flip, plane + c] < by_plane[flip, plane + c]:
                 continue
-            by_plane[flip, c] = low + closed_plane[flip, c]
+            by_plane[flip, plane + c] = low + closed_plane[flip, plane + c]
             same, cross = (straight[c], turned[c]) if flip == 0 else (turned[c], straight[c])
-            for a in range(len(same)):
-                unflipped = same[a] + closed_axis[0, a] == low
-                if unflipped or cross[a] + closed_axis[1, a] == low:
-                    its_class[flip, c], its_flip[flip, c] = first + a, 0 if unflipped else 1
+            for a in range(columns):
+                unflipped = same[a] + closed[0, a] == low
+                if unflipped or cross[a] + closed[1, a] == low:
+                    its_class[flip, plane + c], its_flip[flip, plane + c] = axis + a, 0 if unflipped else 1
                     break
 
 
 @njit(cache=True, nogil=True)
-def _lower_axes(straight: Array, turned: Array, closed_plane: Array, closed_axis: Array, by_axis: Array) -> None:
-    """Lowest J about each axis."""
+def _lower_axes(
+    straight: Array, turned: Array, plane: int, axis: int, closed_plane: Array, closed_axis: Array, by_axis: Array
+) -> None:
+    """Lowest J about each axis of a tile."""
+    columns = straight.shape[1]
+    closed, lowest = closed_axis[:, axis : axis + columns], by_axis[:, axis : axis + columns]
     for c in range(len(straight)):
         for flip in range(2):
             same, cross = (straight[c], turned[c]) if flip == 0 else (turned[c], straight[c])
-            for a in range(len(same)):
-                J0, J1 = same[a] + closed_plane[0, c], cross[a] + closed_plane[1, c]
-                J = (J0 if J0 < J1 else J1) + closed_axis[flip, a]
-                by_axis[flip, a] = J if by_axis[flip, a] > J else by_axis[flip, a]
+            for a in range(columns):
+                J0, J1 = same[a] + closed_plane[0, plane + c], cross[a] + closed_plane[1, plane + c]
+                J = (J0 if J0 < J1 else J1) + closed[flip, a]
+                lowest[flip, a] = J if lowest[flip, a] > J else lowest[flip, a]
 
 
 def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:

@@ -57,9 +57,10 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
 @njit(cache=True, nogil=True)
 def first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
     """The first row that holds each direction with a value above 0, (directions,); their number where none does."""
-    out = np.full(directions.shape[0], rows.shape[0])
+    out = np.empty(directions.shape[0], np.int64)
     for i in range(directions.shape[0]):
-        x, y, z = directions[i]
+        out[i] = rows.shape[0]
+        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         for k in range(rows.shape[0]):
             if _holds(x, y, z, rows[k]) and _of_cell(x, y, z, rows[k], tables) > 0.0:
                 out[i] = k
@@ -78,17 +79,22 @@ def values_at(directions: Array, rows: Array, tables: Array, background: float) 
 
 @njit(cache=True, nogil=True)
 def _sort(values: Array, n: int) -> None:
-    """Sort the first n values in place: by insertion while they are few, as on nearly every circle."""
-    if n > 32:
-        values[:n] = np.sort(values[:n])
-        return
-    for i in range(1, n):
-        value = values[i]
-        j = i - 1
-        while j >= 0 and values[j] > value:
-            values[j + 1] = values[j]
-            j -= 1
-        values[j + 1] = value
+    """Sort the first n values in place (Shell, Knuth's gaps): on nearly every circle they are few.
+
+    `np.sort` would take longer to compile than all the rest of this file.
+    """
+    gap = 1
+    while n > 32 and gap < n // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, n):
+            value = values[i]
+            j = i - gap
+            while j >= 0 and values[j] > value:
+                values[j + gap] = values[j]
+                j -= gap
+            values[j + gap] = value
+        gap //= 3
 
 
 @njit(cache=True, nogil=True)
