@@ -20,6 +20,7 @@ class Screw:
     nut_across: float  # across the flats of a hexagon nut, ISO 4032
     nut_height: float  # at most, ISO 4032
     insert: float | None = None  # hole for a heat-set insert: Accu's chart (-0, +0.1), NopSCADlib
+    nut_standard: str = "ISO 4032"
 
     @property
     def head_room(self) -> float:
@@ -38,6 +39,9 @@ SCREWS = {
         Screw("M6", 6.0, 10.0, 6.0, 5.0, 10.0, 5.2),
     )
 }
+TRIPOD_SCREW = Screw("1/4-20 UNC", 6.35, 9.53, 6.35, 5.1, 11.11, 5.74, nut_standard="ASME B18.2.2")
+"""Of tripods (ISO 1222), with the head of a cap screw of its size; core and nut of ASME B1.1 and B18.2.2."""
+
 INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts is deeper
 
 

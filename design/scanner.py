@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pydantic import Field
+
 from design.angles import AngleSet
 from design.catalogue.catalogue import Catalogue
 from design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
 from design.deck_holes import Circle, Rectangle
+from design.record import Record
+
+
+class Modules(Record):
+    """Parts that a scanner works without, and that a task may ask for."""
+
+    tripod_foot: bool = Field(default=False, description="a plate under the mount with a nut 1/4-20 for a tripod")
+
+
+NO_MODULES = Modules()
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +30,7 @@ class Scanner:
         bearings: those that a tilted axis may choose from, smallest bore first.
         belts: those that a capsule ring's scanner may choose from, the narrowest first.
         deck: holes that the base mount is screwed to; None where the mount may choose them.
+        modules: what else was asked for.
     """
 
     angles: AngleSet
@@ -28,9 +41,16 @@ class Scanner:
     bearings: tuple[Bearing, ...]
     belts: tuple[Belt, ...] = ()
     deck: Rectangle | Circle | None = None
+    modules: Modules = NO_MODULES
 
 
-def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue, deck: Rectangle | Circle | None = None) -> Scanner:
+def scanner_of(
+    angles: AngleSet,
+    printer: str,
+    catalogue: Catalogue,
+    deck: Rectangle | Circle | None = None,
+    modules: Modules = NO_MODULES,
+) -> Scanner:
     """Look up the products that an angle set names.
 
     Raises:
@@ -45,4 +65,5 @@ def scanner_of(angles: AngleSet, printer: str, catalogue: Catalogue, deck: Recta
         bearings=catalogue.bearings(),
         belts=catalogue.belts(),
         deck=deck,
+        modules=modules,
     )

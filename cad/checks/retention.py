@@ -3,7 +3,8 @@
 Every joint is taken out in turn: what then has no way to the deck hangs on it. That weighs five times its weight, in
 the direction that is worst for each screw; friction and preload hold nothing. Screws share a force equally and take a
 moment as a group of equal springs does; those that point at the axis from a hub or a boss take no moment, their fit
-does. What gives way under that fails; what has less than twice of it to spare is a warning.
+does; a lone screw keeps a foot from tipping over its edge. What gives way under that fails; what has less than twice of
+it to spare is a warning.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from cad.geometry.inertia import Inertial
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import Joint
 from cad.layout.loads import STANDARD_GRAVITY
-from cad.layout.names import DECK, LIDAR
+from cad.layout.names import DECK, LIDAR, TRIPOD
 from cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
 from design.arrays import Array
 from design.scanner import Scanner
@@ -51,7 +52,7 @@ def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     ways = [(_node(assembly, other.part), _node(assembly, other.onto)) for other in joints_of(layout) if other != joint]
     ways += layout.drive.borne
     everything = {name for way in ways for name in way} | {_node(assembly, joint.part), _node(assembly, joint.onto)}
-    reached, fresh = {DECK}, {DECK}
+    reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}
     while fresh:
         fresh = {b for way in ways for a, b in (way, way[::-1]) if a in fresh} - reached
         reached |= fresh
@@ -128,6 +129,10 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
     start = np.array([axis.start for axis in joint.axes]) / 1000
     along = np.array([axis.along for axis in joint.axes])
     shares = np.broadcast_to(np.eye(3) / joint.count, (joint.count, 3, 3)).copy()
+    if joint.heel_mm is not None:
+        arm, heel = centre_m - start[0], joint.heel_mm / 1000
+        aside = float(np.linalg.norm(arm - (arm @ along[0]) * along[0]))
+        return float(np.hypot(1 + aside / heel, arm @ along[0] / heel)), 1.0
     if abs(along[0, 2]) > AXIAL or not _radial(joint):
         arms = start - start.mean(axis=0)
         stiffness = sum((arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))

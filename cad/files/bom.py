@@ -163,8 +163,10 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: dict[str, int] = {}
     inserts: dict[str, int] = {}
+    standards = {joint.screw.name: joint.screw.nut_standard for joint in joints}
     for joint in joints:
-        screws.setdefault(joint.number, []).append(joint)
+        if joint.stands_out_mm is None:
+            screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name] = nuts.get(joint.screw.name, 0) + joint.count
         if joint.inserts:
@@ -175,7 +177,7 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
         total = sum(joint.count for joint in used)
         yield BomItem("screw", kind, number, total, source=JOINTS, note=f"{where}; price unknown")
     for name, count in sorted(nuts.items()):
-        yield BomItem("nut", "hexagon nut", f"ISO 4032 {name}", count, source=JOINTS, note="price unknown")
+        yield BomItem("nut", "hexagon nut", f"{standards[name]} {name}", count, source=JOINTS, note="price unknown")
     for name, count in sorted(inserts.items()):
         note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm; price unknown"
         yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note)

@@ -94,6 +94,8 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
         lift = max(0.0, top + GAP_MM - low)
         lifts[product] = lift * axis
         top = high + lift
+    normal = np.array(assembly.layout.deck.normal)
+    lifts |= {product: -GAP_MM * normal for product in along if along[product] == "deck"}
     top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
     bar = assembly.layout.counterweight
     for product in (product for product in along if along[product] == "radius"):

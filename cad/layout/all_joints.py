@@ -11,7 +11,7 @@ from cad.layout.balance.counterweight import Counterweight
 from cad.layout.belt.joints import belt_joints
 from cad.layout.belt.stack import FOOT, BeltStack
 from cad.layout.belt.tower import UNDER_FOOT_NUT, tower_of
-from cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD
+from cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD, Deck
 from cad.layout.direct.joints import direct_joints
 from cad.layout.envelope import EAR_SCREW, PLATE_THICKNESS, SUB_PLATE_THICKNESS
 from cad.layout.joints import (
@@ -26,6 +26,8 @@ from cad.layout.joints import (
 )
 from cad.layout.layout import Layout
 from cad.layout.linkage import CROSS_SCREW, cross_floor_mm, cross_seat_mm, cross_thread_mm
+from cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, STANDS_OUT, TripodFoot
+from cad.screws import TRIPOD_SCREW
 
 
 def joints_of(layout: Layout) -> list[Joint]:
@@ -95,8 +97,38 @@ def _on_deck(layout: Layout) -> Iterator[Joint]:
         thread_mm=deep,
         thread=thread,
     )
+    if deck.tripod is not None:
+        yield from _on_tripod(deck, deck.tripod)
+        return
     axes = placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), deck.rotation(), deck.centre)
     yield Joint(names.BASE_MOUNT, names.DECK, "deck", deck.screw, axes, grip_mm=FOOT_THICKNESS, thread_mm=DECK_MM)
+
+
+def _on_tripod(deck: Deck, foot: TripodFoot) -> Iterator[Joint]:
+    """The mount on its plate, and that on the tripod."""
+    R = deck.rotation()
+    yield Joint(
+        names.BASE_MOUNT,
+        names.TRIPOD_FOOT,
+        held_in(foot.mount),
+        deck.screw,
+        placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), R, deck.centre),
+        grip_mm=FOOT_THICKNESS,
+        thread_mm=foot.thickness if foot.mount.trap is None else OVER_NUTS,
+        thread=foot.mount,
+    )
+    yield Joint(
+        names.TRIPOD,
+        names.TRIPOD_FOOT,
+        held_in(foot.tripod),
+        TRIPOD_SCREW,
+        placed_axes(upright_axes([(0.0, 0.0)], -foot.thickness - DECK_MM, 1.0), R, deck.centre),
+        grip_mm=DECK_MM,
+        thread_mm=foot.thickness if foot.tripod.trap is None else FLOOR,
+        thread=foot.tripod,
+        stands_out_mm=STANDS_OUT,
+        heel_mm=HEEL,
+    )
 
 
 def _bar(bar: Counterweight) -> Joint:

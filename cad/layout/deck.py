@@ -1,8 +1,9 @@
 """Where the deck lies that the scanner stands on or hangs from. No kernel: plain numpy.
 
 World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
-scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). Everything
-here is expressed in the rotation frame at gamma = 0, mm, unless its name says world.
+scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). A tripod's head
+is a deck under a plate of its own. Everything here is expressed in the rotation frame at gamma = 0, mm, unless its name
+says world.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.envelope import rotor_radius
 from cad.layout.hub import Hub
+from cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
 from cad.layout.names import BASE_MOUNT
 from cad.screws import SCREWS, Screw
 from design.arrays import Array
@@ -41,13 +43,14 @@ class Deck:
 
     normal: tuple[float, float, float]  # from the deck into the room
     along: tuple[float, float, float]  # world x
-    centre: tuple[float, float, float]  # world origin
+    centre: tuple[float, float, float]  # of the holes, on the lower face of the mount: world origin but for a plate
     flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
+    tripod: TripodFoot | None  # plate under the mount
     foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
 
     def rotation(self) -> Array:
@@ -70,13 +73,15 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
     half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
-    flat = mounted.stands_alone and scanner.deck is None and bool(R[2, 2] > 1.0 - 1e-9)
+    tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
+    bare = scanner.deck is None and tripod is None
+    flat = mounted.stands_alone and bare and bool(R[2, 2] > 1.0 - 1e-9)
     if flat:
         centre = np.array([0.0, 0.0, mounted.rear])
     else:
         height = _height_of_back(scanner, drive.stack, mounted, normal, back, half)
         centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
-    offset = -R @ centre
+    offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
         normal=_triple(normal),
@@ -88,6 +93,7 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         back_half=half,
         screw=screw,
         deck_holes=deck_holes,
+        tripod=tripod,
         foot=_foot(pattern, screw),
     )
 

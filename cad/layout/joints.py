@@ -61,6 +61,8 @@ class Joint:
         thread_mm: of thread, or of material before the nut.
         thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
         slot_mm: width and length of the slots that they may slide in, if not holes.
+        stands_out_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
+        heel_mm: from a lone screw to the edge over which the part tips off; None where there are several, or a fit.
     """
 
     part: str
@@ -72,6 +74,8 @@ class Joint:
     thread_mm: float
     thread: Thread | None = None
     slot_mm: tuple[float, float] | None = None
+    stands_out_mm: float | None = None
+    heel_mm: float | None = None
 
     @property
     def count(self) -> int:
@@ -81,11 +85,15 @@ class Joint:
     @property
     def length_mm(self) -> int:
         """Of a screw's shank."""
+        if self.stands_out_mm is not None:
+            return round(self.grip_mm + self.stands_out_mm)
         return shank_mm(self.screw, self.grip_mm, self.fixing, self.thread_mm)
 
     @property
     def number(self) -> str:
         """The standard's designation."""
+        if self.stands_out_mm is not None:
+            return f"{self.screw.name} of the {self.part}"
         return f"ISO {4026 if self.fixing == 'grub' else 4762} {self.screw.name} x {self.length_mm}"
 
     @property

@@ -14,7 +14,7 @@ from cad.layout.direct.drive import direct_drive
 from cad.layout.drive import DriveLayout, Stack
 from cad.layout.linkage import AlignmentLinkage, linkage_of
 from design.left_out import LeftOut
-from design.scanner import Scanner
+from design.scanner import NO_MODULES, Scanner
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def drive_of(scanner: Scanner) -> DriveLayout:
 
 
 def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
-    """`t_world_rot_mm`: the optical centre in the world, whose origin is the centre of the deck holes.
+    """`t_world_rot_mm`: the optical centre in the world; its origin is the centre of the deck holes, or on a tripod.
 
     Raises:
         BuildError: the scanner cannot be laid out.
@@ -84,4 +84,6 @@ def config_hash(scanner: Scanner) -> str:
         ]
         + others,
     }
+    if scanner.modules != NO_MODULES:
+        content["modules"] = scanner.modules.model_dump()
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]

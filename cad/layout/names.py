@@ -19,6 +19,7 @@ SHAFT_PULLEY = "shaft_pulley"
 SHAFT_RING = "shaft_ring"
 SLIP_RING_ADAPTER = "slip_ring_adapter"
 SUB_PLATE = "sub_plate"
+TRIPOD_FOOT = "tripod_foot"
 
 # bought products, and what they are screwed to
 BEARING = "bearing"
@@ -27,6 +28,7 @@ DECK = "deck"
 LIDAR = "lidar"
 RING = "ring"
 SERVO = "servo"
+TRIPOD = "tripod"
 
 # bodies of bought products
 LIDAR_BODY = "lidar_body"

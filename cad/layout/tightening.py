@@ -89,6 +89,8 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     head = math.pi / 4 * (screw.head_diameter**2 - hole**2)
     in_nut = joint.fixing in ("nut", "trap", "deck")
     engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
+    if in_nut and joint.stands_out_mm is not None:
+        engaged = min(engaged, joint.stands_out_mm - joint.thread_mm)
     pulls = {"the screw": proof, f"{under.name} under the head": head * under.strength_mpa}
     if joint.inserts:
         engaged = min(engaged, INSERT_LENGTH)
@@ -96,6 +98,8 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     elif in_nut:
         if joint.fixing == "trap":
             pulls[f"{into.name} under the nut"] = math.pi / 4 * (screw.nut_across**2 - hole**2) * into.strength_mpa
+            floor = math.pi * screw.nut_across * joint.thread_mm
+            pulls[f"{into.name} around the nut"] = SHEARED * floor * into.strength_mpa
     else:
         pulls[f"the thread in {into.name}"] = _strips(screw, engaged, into)
     preload = min(PRELOAD * proof, head * under.pressure_mpa, min(pulls.values()) / 1.5)
@@ -130,6 +134,8 @@ def _wall(joint: Joint, under: Material) -> float:
 
 
 def _loosens(joint: Joint, under: Material, into: Material) -> str:
+    if joint.stands_out_mm is not None:
+        return f"it is tightened by hand, and nothing but that holds it: look at the {joint.part} each time"
     creeps = "the plastic creeps: tighten once more after a day" if under.plastic or into.plastic else "vibration"
     if joint.inserts:
         return f"{creeps}; no threadlocker, it attacks plastics"

@@ -19,6 +19,7 @@ from cad.parts.servo_shaft import servo_shaft_spec
 from cad.parts.shaft_ring import shaft_ring_spec
 from cad.parts.slip_ring_adapter import adapter_spec
 from cad.parts.sub_plate import sub_plate_spec
+from cad.parts.tripod_foot import tripod_foot_spec
 
 OF_DIRECT = (servo_shaft_spec, adapter_spec, base_spec, bell_spec)
 OF_BELT = (
@@ -30,7 +31,7 @@ OF_BELT = (
     plate_spec,
     drive_pulley_spec,
 )
-OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec)
+OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec, tripod_foot_spec)
 
 
 def parts_of(layout: Layout) -> list[PartSpec]:

@@ -87,7 +87,7 @@ class PartSpec:
     shapes: Mapping[str, str] = field(default_factory=dict)
     angles: Literal["none", "rot", "laser"] = "none"
     seat: float | None = None
-    lifted: Literal["axis", "radius", "lidar"] = "axis"
+    lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"
     sweep: Callable[[], cq.Solid] | None = None
 
     @property

@@ -25,7 +25,7 @@ from design.deck_holes import DeckHoles
 from design.errors import ScanwrightError, TaskError
 from design.motion import Motion, Shortest, Sweep
 from design.record import Fault, Record, faults_of, tell
-from design.scanner import Scanner, scanner_of
+from design.scanner import NO_MODULES, Modules, Scanner, scanner_of
 from design.scene.surface import Surface, cast_surface
 from design.task.angle_ranges import NAMES, AngleRanges
 from design.task.map_file import read_map
@@ -96,6 +96,7 @@ class Task(Record):
     printer: str = Field(default="fdm-0.4", description="how the parts are made: `scanwright catalogue --kind printer`")
     catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
     deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
+    modules: Modules = Field(default=NO_MODULES, description="parts that it works without: none by default")
     motion: Annotated[Motion | Shortest, Field(discriminator="mode", description="how the servo moves in one scan")]
     angles: AngleRanges = Field(default=AngleRanges(), description="mounting angles: ranges to search, or values")
     density: DensityRules = Field(default=DensityRules(), description="how beams are counted and judged")
@@ -159,12 +160,12 @@ class LoadedTask:
         )
 
     def scanner(self, angles: AngleSet) -> Scanner:
-        """The scanner of an angle set, with the printer and the deck of this task.
+        """The scanner of an angle set, with the printer, the deck and the modules of this task.
 
         Raises:
             TaskError: a product of the angle set is not in the catalogue.
         """
-        return scanner_of(angles, self.task.printer, self.products, self.task.deck)
+        return scanner_of(angles, self.task.printer, self.products, self.task.deck, self.task.modules)
 
     @property
     def lidar(self) -> Lidar:

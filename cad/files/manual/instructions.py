@@ -99,16 +99,17 @@ def picture_name(number: int) -> str:
 def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     """One joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}"
+    nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
     where = {
         "thread": f"from {joint.part} into {joint.onto}",
-        "trap": f"from {joint.part} onto {joint.count} nuts {joint.screw.name} in {joint.onto}",
-        "nut": f"through {joint.part} into {joint.onto}, with {joint.count} nuts {joint.screw.name}",
-        "deck": f"through the foot into the deck, with {joint.count} nuts {joint.screw.name}",
+        "trap": f"from {joint.part} onto {nuts} in {joint.onto}",
+        "nut": f"through {joint.part} into {joint.onto}, with {nuts}",
+        "deck": f"through the foot into the deck, with {nuts}",
         "grub": f"in {joint.part}, against {joint.onto}",
     }[joint.fixing]
     held = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
-        held = f", through {joint.count} nuts {joint.screw.name} in its bore"
+        held = f", through {nuts} in its bore"
     return f"{what} {where}{held}, {torque_in_words(assembly, joint)}."
 
 

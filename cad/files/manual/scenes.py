@@ -131,6 +131,8 @@ def _way(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tu
     if lifted == "lidar":
         return R[:, 2], R
     bar = assembly.layout.counterweight
+    if lifted == "deck":
+        return -np.array(assembly.layout.deck.normal), np.eye(3)
     if lifted == "radius" and isinstance(bar, Counterweight):
         return np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0]), np.eye(3)
     order = {name: i for i, name in enumerate(assembly.layout.drive.stacked)}

@@ -22,6 +22,7 @@ BUILT = (
     names.DRIVE_PLATE,
     names.DRIVE_PULLEY,
     names.BASE_MOUNT,
+    names.TRIPOD_FOOT,
     names.LIDAR,
     names.SUB_PLATE,
     names.COUNTERWEIGHT,

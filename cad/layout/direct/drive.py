@@ -18,6 +18,7 @@ from design.scanner import Scanner
 # The order that always works: what comes over the shaft follows what carries it.
 BUILT = (
     names.BASE_MOUNT,
+    names.TRIPOD_FOOT,
     names.DECK,
     names.SERVO_SHAFT,
     names.SLIP_RING_ADAPTER,

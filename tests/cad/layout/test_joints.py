@@ -23,7 +23,8 @@ from cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
 from cad.screws import SCREWS, thread_hole, trap_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
+from design.deck_holes import Rectangle
+from design.scanner import Modules, scanner_of
 
 COAXIAL = 0.05
 LOOSE = 0.1  # the kernel bounds a face whose end is cut by bore and flat no better
@@ -169,6 +170,10 @@ def scanner_for(axis, mount, ring="UH1256-02-0610-06S", lidar="UTM-30LX", servo=
     return scanner_of(angles, printer, load_catalogue())
 
 
+def with_foot(scanner, deck=None):
+    return replace(scanner, modules=Modules(tripod_foot=True), deck=deck)
+
+
 SETTINGS = {
     "tilted, with a bearing": scanner_for((0, 55), (80, -75)),
     "tilted, nuts": scanner_for((0, 35), (-20, -70), printer="fdm-0.4-nut"),
@@ -177,6 +182,11 @@ SETTINGS = {
     "upright, a sub-plate": scanner_for((0, 0), (25.5, -21.4), lidar="URG-04LX"),
     "a sub-plate in nuts": scanner_for((40, 0), (21, -21), printer="fdm-0.4-nut"),
     "small, without a ring": scanner_for((0, 40), (-20, -70), ring=None, lidar="URG-04LX", servo="AX-12A"),
+    "a tripod": with_foot(scanner_for((0, 40), (20, 60), ring=None)),
+    "a belt on a tripod, nuts M5": with_foot(
+        scanner_for((0, 90), (0, -90), ring="SRC022A-6", printer="fdm-0.4-nut"),
+        Rectangle(shape="rectangle", size_mm=(90, 90), screw="M5"),
+    ),
     "a belt": scanner_for((0, 90), (0, -90), ring="SRC022A-6"),
     "a belt, nuts": scanner_for((60, 20), (10, 60), ring="SRC022A-6", printer="fdm-0.4-nut"),
 }
@@ -192,7 +202,9 @@ def parts_of(name):
 def test_the_declared_joints_are_those_that_the_solids_have(name):
     scanner, assembly = parts_of(name)
     read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
-    assert {key for key, joint in declared.items() if joint.slot_mm is None and key[0] != "deck"} == read.keys()
+    assert {
+        key for key, joint in declared.items() if joint.slot_mm is None and key[0] not in ("deck", "tripod")
+    } == read.keys()
     for key, ((fixing, screw, trap), holes) in read.items():
         joint = declared[key]
         assert (joint.fixing, joint.screw.name, joint.count, joint.traps) == (fixing, screw, len(holes), trap), key

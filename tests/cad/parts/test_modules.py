@@ -1,0 +1,118 @@
+"""Parts that a task may ask for: there with it, told as left out without, and held as all the others are."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cad.assembly.make import make_parts
+from cad.assembly.steps import steps_of
+from cad.checks.clearance import clearance_checks
+from cad.checks.remarks import left_out_of
+from cad.checks.retention import hanging_on, retention_checks, worst_shares
+from cad.files.bom import items_of
+from cad.layout.all_joints import joints_of
+from cad.layout.deck import FOOT_THICKNESS
+from cad.layout.layout import config_hash, layout_of
+from cad.layout.names import LIDAR
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import NO_MODULES, Modules, scanner_of
+
+RING = "UH1256-02-0610-06S"
+
+
+def scanner_for(angles, modules, ring=RING, **products):
+    names = {"sensor": "UTM-30LX", "servo": "MX-64R"} | products
+    keys = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    found = AngleSet(task="modules", angles_deg=Angles(**dict(zip(keys, angles, strict=True))), slip_ring=ring, **names)
+    return scanner_of(found, "fdm-0.4", load_catalogue(), modules=modules)
+
+
+def bought(assembly):
+    scanner = assembly.layout.scanner
+    masses = dict.fromkeys(assembly.made, 1.0)
+    return items_of(scanner, assembly, joints_of(assembly.layout), masses, config_hash(scanner))
+
+
+TILTED, UPRIGHT = (0, -55, -80, 75), (0, 0, 60, -30)
+
+
+@pytest.fixture(scope="module")
+def on_tripod():
+    return make_parts(scanner_for(TILTED, Modules(tripod_foot=True)))
+
+
+@pytest.mark.parametrize("name", Modules.model_fields)
+def test_what_is_not_asked_for_is_told_as_left_out_and_changes_nothing_that_is_made(name):
+    asked, without = (scanner_for(TILTED, Modules(**{name: value})) for value in (True, False))
+    assert without.modules == NO_MODULES
+    specs = [layout_of(scanner) for scanner in (asked, without)]
+    assert config_hash(asked) != config_hash(without)
+    assert specs[0].linkage == specs[1].linkage and specs[0].stack == specs[1].stack
+
+
+def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod):
+    without = make_parts(scanner_for(TILTED, NO_MODULES), lambda spec: spec.name == "base_mount")
+    assert "tripod_foot" in on_tripod.made and "tripod_foot" not in without.parts
+    assert "tripod_foot" not in [left.what for left in left_out_of(on_tripod)]
+    (left,) = [left for left in left_out_of(without) if left.what == "tripod_foot"]
+    assert left.why == "the task does not ask for it by modules.tripod_foot" and left.saved == 1
+    assert on_tripod.made["base_mount"].Volume() == pytest.approx(without.made["base_mount"].Volume())
+
+
+def test_the_world_begins_where_the_tripod_does(on_tripod):
+    deck, plain = on_tripod.layout.deck, layout_of(scanner_for(TILTED, NO_MODULES)).deck
+    assert deck.tripod.thickness == 8.0
+    np.testing.assert_allclose(np.subtract(deck.t_world_rot, plain.t_world_rot), [0, 0, 8.0], atol=1e-6)
+    turn = on_tripod.layout.scanner.angles.T_world_rot(0.0)[:3, :3]
+    world = on_tripod.mesh("tripod_foot").vertices @ turn.T + deck.t_world_rot
+    assert (world[:, 2].min(), world[:, 2].max()) == pytest.approx((0.0, 8.0), abs=1e-6)
+    below = world[np.abs(world[:, 2]) < 1e-6, :2]
+    rim = np.linalg.norm(below, axis=1)
+    assert rim.min() == pytest.approx((6.35 + 0.2) / 2, abs=0.01)  # the tripod's screw comes in at the origin
+
+
+def test_nothing_of_it_meets_anything(on_tripod):
+    assert {check.severity for check in clearance_checks(on_tripod)} == {"pass"}
+
+
+def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_tripod):
+    joints = {(joint.part, joint.onto): joint for joint in joints_of(on_tripod.layout)}
+    of_mount, of_tripod = joints["base_mount", "tripod_foot"], joints["tripod", "tripod_foot"]
+    assert ("base_mount", "deck") not in joints
+    assert of_mount.traps and of_tripod.traps and of_tripod.count == 1
+    assert LIDAR in hanging_on(on_tripod, of_tripod) and "base_mount" in hanging_on(on_tripod, of_tripod)
+    assert of_mount.length_mm <= FOOT_THICKNESS + on_tripod.layout.deck.tripod.thickness  # nothing stands out below
+    said = [check for check in retention_checks(on_tripod.layout.scanner, on_tripod) if "tripod" in check.message]
+    assert {check.kind for check in said} == {"retention", "screw"}
+    assert {check.severity for check in said} == {"pass"}
+
+
+def test_a_lone_screw_keeps_the_foot_from_tipping_over_its_edge(on_tripod):
+    """Against forces tried in many directions: the pull is what turns the foot about the edge it tips over."""
+    (joint,) = [joint for joint in joints_of(on_tripod.layout) if joint.part == "tripod"]
+    axis = joint.axes[0]
+    along, start, heel = np.array(axis.along), np.array(axis.start) / 1000, joint.heel_mm / 1000
+    centre = start + 0.12 * along + 0.19 * np.cross(along, [0.3, 0.5, 0.8])
+    rng = np.random.default_rng(1)
+    forces = rng.normal(size=(20000, 3))
+    forces /= np.linalg.norm(forces, axis=1)[:, None]
+    moments = np.cross(centre - start, forces)
+    tipping = np.linalg.norm(moments - np.outer(moments @ along, along), axis=1)
+    tried = (np.abs(forces @ along) + tipping / heel).max()
+    assert worst_shares(joint, centre)[0] == pytest.approx(tried, rel=1e-3)
+
+
+def test_the_nut_is_bought_and_the_screw_of_the_tripod_is_not(on_tripod):
+    items = bought(on_tripod)
+    assert [item.quantity for item in items if item.number == "ASME B18.2.2 1/4-20 UNC"] == [1]
+    assert not [item for item in items if item.kind == "screw" and "UNC" in item.number]
+    titles = [step.title for _, step in steps_of(on_tripod)]
+    assert titles.index("Tripod foot") == titles.index("Servo into the mount") + 1
+
+
+def test_an_upright_axis_gets_its_mount_for_the_tripod():
+    assert layout_of(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
+    layout = layout_of(scanner_for(UPRIGHT, Modules(tripod_foot=True)))
+    assert not layout.deck.flat and math.isclose(layout.deck.normal[2], 1.0)
