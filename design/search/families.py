@@ -19,7 +19,6 @@ from design.search.coarse import Landscape
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
 from design.search.simplex import Enough, lowest_by_simplex
-from design.search.tolerance import worst_within
 from design.task.angle_ranges import NAMES, AngleRanges
 
 FAMILIES = 10
