@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PROGRAM = "freecadcmd"
-SCRIPT = '''
+SCRIPT = """
 import collections, json, os, Part
 for file in json.loads(os.environ["SCANWRIGHT_STEP_FILES"]):
     shape = Part.read(file)
@@ -26,7 +26,7 @@ for file in json.loads(os.environ["SCANWRIGHT_STEP_FILES"]):
     except ValueError as error:
         told = [line.split(": ")[-1] for line in str(error).splitlines() if line.startswith("Error in Face")]
     print("READ", json.dumps([file, shape.isValid(), len(shape.Solids), shape.Volume, collections.Counter(told)]))
-'''
+"""
 WITHIN = 1e-6  # of the volume
 
 

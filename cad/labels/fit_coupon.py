@@ -3,8 +3,8 @@
 Frame: its own, mm, lying on the bed. A row of bores for the shaft's spigot, one of holes for each screw that the
 scanner's catalogue parts take, one of pockets where the profile traps nuts. The words above a row say what it is for
 and the clearance on the diameter of its first hole, and each hole has a tenth of a millimetre more than the one to its
-left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play, and the hole that the
-screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
+left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play, and
+the hole that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
 """
 
 from __future__ import annotations

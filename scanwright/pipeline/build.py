@@ -166,7 +166,7 @@ def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chos
 
 def _load_kernel() -> None:
     """Everything that a second process needs."""
-    for module in ("cad.checks.run", "cad.drawings.files", "design.search.with_parts"):
+    for module in ("cad.checks.run", "cad.drawings.files", "design.search.with_parts", "scanwright.report.page"):
         import_module(module)
 
 
