@@ -14,13 +14,14 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
+from cad.layout.modules.ring_cover import cover_of
+from cad.layout.modules.unasked import unasked
 from cad.layout.names import BASE_MOUNT, SERVO_SHAFT, TRIPOD_FOOT
 from cad.screws import passing_hole
 from design.catalogue.products import Printer, Product
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
-UNASKED = "the task does not ask for it by"
 # Values of a product that shape no part alone.
 SHAPING = {
     "lidar.mount_thread_depth_mm": "the length of the screws in the lidar",
@@ -62,8 +63,11 @@ def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     out = [*layout.drive.left_out]
     if isinstance(layout.counterweight, LeftOut):
         out.append(layout.counterweight)
-    if not layout.scanner.modules.tripod_foot:
-        out.append(LeftOut(TRIPOD_FOOT, f"{UNASKED} modules.{TRIPOD_FOOT}", 1, "parts"))
+    cover = cover_of(layout.scanner, layout.stack)
+    if isinstance(cover, LeftOut):
+        out.append(cover)
+    if layout.deck.tripod is None:
+        out.append(unasked(TRIPOD_FOOT))
     if layout.deck.flat:
         out.append(LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
     return tuple(out)

@@ -28,6 +28,7 @@ from design.scanner import Scanner
 
 SHOCK_G = 5.0
 LEAST_MARGIN = 2.0
+ROUNDING_MM = 1e-6  # where the thread is what limits the preload, it asks for just what there is
 AXIAL = 0.9  # cosine to the rotation axis above which a screw does not point at it
 
 
@@ -102,7 +103,7 @@ def _screws(joint: Joint, hold: Hold) -> Check:
         f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {said}, {hold.asked_mm:.1f} asked, "
         f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); what loosens it: {hold.loosens}"
     )
-    held = hold.engaged_mm >= hold.asked_mm
+    held = hold.engaged_mm >= hold.asked_mm - ROUNDING_MM
     value, limit = tidy(hold.engaged_mm), tidy(hold.asked_mm)
     return Check("screw", "pass" if held else "error", value, limit, "mm", _place(joint), message)
 

@@ -15,6 +15,7 @@ from cad.parts.journal_sleeve import sleeve_spec
 from cad.parts.main_shaft import main_shaft_spec
 from cad.parts.part_spec import PartSpec
 from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from cad.parts.ring_cover import ring_cover_spec
 from cad.parts.servo_shaft import servo_shaft_spec
 from cad.parts.shaft_ring import shaft_ring_spec
 from cad.parts.slip_ring_adapter import adapter_spec
@@ -31,7 +32,7 @@ OF_BELT = (
     plate_spec,
     drive_pulley_spec,
 )
-OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec, tripod_foot_spec)
+OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec, ring_cover_spec, tripod_foot_spec)
 
 
 def parts_of(layout: Layout) -> list[PartSpec]:

@@ -16,22 +16,20 @@ from functools import partial
 import cadquery as cq
 
 from cad import solids
-from cad.layout.direct.adapter import SlipRingAdapter, adapter_of
+from cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, SlipRingAdapter, adapter_of, arm_top
 from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
 from cad.layout.direct.stack import DirectStack
 from cad.layout.joints import screws
+from cad.layout.modules.ring_cover import RingCover, cover_of
 from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
 from cad.parts.bearing_cage import cage_base
 from cad.parts.part_spec import ON_CASE, PartSpec, Step
+from cad.parts.ring_cover import cover_threads
 from cad.solids import building
+from design.left_out import LeftOut
 from design.scanner import Scanner
 
 RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
-PLATE = 6.0
-PLAY = 0.25  # between arm and stator, on the radius
-ARM = 5.0
-ARM_HALF_WIDTH = 10.0
-UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
 
 
 def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
@@ -44,7 +42,9 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
+        make=partial(
+            slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack), cover_of(scanner, stack)
+        ),
         step=Step(
             "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
         ),
@@ -52,7 +52,7 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     )
 
 
-def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
+def slip_ring_adapter(p: SlipRingAdapter | BearingCage, cover: RingCover | LeftOut) -> cq.Solid:
     """Make the adapter: the fork, or the base of a cage, and the arms.
 
     Raises:
@@ -62,23 +62,24 @@ def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
     inner = stack.ring_radius + PLAY
     outer = inner + ARM
     if isinstance(p, SlipRingAdapter):
-        body, top, reach = _fork(p, outer), p.front + SEAT_GAP + PLATE, stack.ring_length - 5.0
+        body, top = _fork(p, outer), p.front + SEAT_GAP + PLATE
     else:
-        body, top, reach = cage_base(p), p.foot, stack.ring_length - UNDER_ROOF
-    arm_top = stack.ring_bottom + min(30.0, reach)
+        body, top = cage_base(p), p.foot
+    high_end = arm_top(stack, p)
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms = [
-            solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, arm_top))
+            solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
             for low, high in ((inner - 4.0, outer), (-outer, 4.0 - inner))
         ]
-        body = body.fuse(*arms).cut(solids.upright(inner, stack.ring_bottom - 1.0, arm_top + 9.0))
+        body = body.fuse(*arms).cut(solids.upright(inner, stack.ring_bottom - 1.0, high_end + 9.0))
         body = checked(body)
     with building(SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
-        tie = (stack.ring_bottom + arm_top) / 2
+        tie = (stack.ring_bottom + high_end) / 2
         cuts = [
             solids.box((low, -99.0, tie - 3.0), (high, 99.0, tie + 3.0))
             for low, high in ((outer - 1.5, outer + 5.0), (-outer - 5.0, 1.5 - outer))
         ]
+        cuts += cover_threads(cover, SLIP_RING_ADAPTER)
         return checked(body.cut(*cuts).clean())
 
 

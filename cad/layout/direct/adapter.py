@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.layout.direct.cage import FOOT_RADIUS, plate_half_x
+from cad.layout.direct.cage import FOOT_RADIUS, BearingCage, plate_half_x
 from cad.layout.direct.stack import DirectStack
 from cad.layout.names import SLIP_RING_ADAPTER
 from cad.screws import SCREWS, Screw, passing_hole
 from design.catalogue.products import Servo
 from design.errors import BuildError
 from design.scanner import Scanner
+
+PLATE = 6.0
+PLAY = 0.25  # between arm and stator, on the radius
+ARM = 5.0
+ARM_HALF_WIDTH = 10.0
+UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +58,12 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
         hole=hole,
         holes=holes,
     )
+
+
+def arm_top(stack: DirectStack, holder: SlipRingAdapter | BearingCage) -> float:
+    """Height of the arms' upper ends."""
+    below = 5.0 if isinstance(holder, SlipRingAdapter) else UNDER_ROOF
+    return stack.ring_bottom + min(30.0, stack.ring_length - below)
 
 
 def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:

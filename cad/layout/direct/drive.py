@@ -26,6 +26,7 @@ BUILT = (
     names.RING,
     names.JOURNAL_SLEEVE,
     names.BEARING_CAGE,
+    names.RING_COVER,
     names.LIDAR,
     names.SUB_PLATE,
     names.COUNTERWEIGHT,
@@ -41,6 +42,7 @@ STACKED = (
     names.BEARING_CAGE,
     names.BEARING,
     names.JOURNAL_SLEEVE,
+    names.RING_COVER,
     names.ALIGNMENT_LINKAGE,
 )
 ADAPTER_ARMS = 8.0  # beyond the ring

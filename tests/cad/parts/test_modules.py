@@ -1,9 +1,11 @@
 """Parts that a task may ask for: there with it, told as left out without, and held as all the others are."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from cad.assembly.make import make_parts
 from cad.assembly.steps import steps_of
@@ -14,9 +16,12 @@ from cad.files.bom import items_of
 from cad.layout.all_joints import joints_of
 from cad.layout.deck import FOOT_THICKNESS
 from cad.layout.layout import config_hash, layout_of
+from cad.layout.modules.ring_cover import cover_of
 from cad.layout.names import LIDAR
+from cad.parts.all_parts import parts_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
+from design.left_out import LeftOut
 from design.scanner import NO_MODULES, Modules, scanner_of
 
 RING = "UH1256-02-0610-06S"
@@ -116,3 +121,52 @@ def test_an_upright_axis_gets_its_mount_for_the_tripod():
     assert layout_of(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
     layout = layout_of(scanner_for(UPRIGHT, Modules(tripod_foot=True)))
     assert not layout.deck.flat and math.isclose(layout.deck.normal[2], 1.0)
+
+
+@pytest.fixture(scope="module", params=[TILTED, UPRIGHT])
+def covered(request):
+    return make_parts(scanner_for(request.param, Modules(ring_cover=True)))
+
+
+def test_the_cover_hides_the_ring_from_the_side_and_touches_nothing(covered):
+    assert {check.severity for check in clearance_checks(covered)} == {"pass"}
+    assert "ring_cover" not in [left.what for left in left_out_of(covered)]
+    mesh, stack = covered.mesh("ring_cover"), covered.layout.stack
+    tube = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    z = np.linspace(stack.ring_bottom + 12.5, min(mesh.vertices[:, 2].max(), stack.ring_top) - 0.5, 9)
+    azimuth = np.linspace(0, 2 * np.pi, 48, endpoint=False) + 0.01
+    out = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros(48)], axis=1)
+    starts = np.array([[0, 0, height] for height in z for _ in azimuth])
+    hit = tube.ray.intersects_any(starts, np.tile(out, (len(z), 1)))
+    assert hit.mean() > 0.98  # all but the holes of its two screws
+
+
+def test_the_cover_goes_over_what_holds_the_ring_before_the_lidar_comes(covered):
+    titles = [step.title for _, step in steps_of(covered)]
+    before = "Bearing and cage" if covered.layout.stack.bearing else "Slip ring"
+    assert titles.index(before) < titles.index("Cover around the ring") < titles.index("Lidar on its seat")
+    (joint,) = [joint for joint in joints_of(covered.layout) if joint.part == "ring_cover"]
+    assert joint.count == 2 and joint.length_mm < joint.grip_mm + joint.thread_mm  # no screw reaches the ring
+    assert LIDAR not in hanging_on(covered, joint)
+    said = [check for check in retention_checks(covered.layout.scanner, covered) if "ring_cover" in check.message]
+    assert len(said) == 2 and {check.severity for check in said} == {"pass"}
+
+
+@pytest.mark.parametrize(
+    ("ring", "why"), [(None, "this scanner has no slip ring"), ("SRC022A-6", "the tower is around the ring")]
+)
+def test_a_cover_without_a_ring_to_cover_is_left_out_with_the_reason(ring, why):
+    layout = layout_of(scanner_for(TILTED, Modules(ring_cover=True), ring))
+    left = cover_of(layout.scanner, layout.stack)
+    assert isinstance(left, LeftOut) and left.why == why
+    assert "ring_cover" not in [spec.name for spec in parts_of(layout)]
+
+
+def test_without_a_cover_nothing_is_drilled_for_it(covered):
+    scanner = replace(covered.layout.scanner, modules=NO_MODULES)
+    onto = "bearing_cage" if covered.layout.stack.bearing else "slip_ring_adapter"
+    plain = make_parts(scanner, lambda spec: spec.name == onto)
+    (left,) = [left for left in left_out_of(plain) if left.what == "ring_cover"]
+    assert left.why == "the task does not ask for it by modules.ring_cover"
+    missing = plain.made[onto].Volume() - covered.made[onto].Volume()
+    assert missing == pytest.approx(2 * math.pi * 1.25**2 * 5.0, rel=0.02)
