@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from cad.assembly.assembly import Assembly
+from cad.assembly.beds import refuse_what_no_bed_holds
 from cad.assembly.bought import BodySpec, bought_of
 from cad.assembly.masses import rotor_moment
 from cad.layout.layout import layout_of
@@ -23,7 +24,8 @@ def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
     """Make every part that this scanner needs, and the bought ones around them; of these, those that are wanted.
 
     Raises:
-        BuildError: a part cannot be made; the message names part, feature, parameter and value.
+        BuildError: a part cannot be made, or lies on no bed of the printer; the message names part, feature, parameter
+            and value.
     """
     layout = layout_of(scanner)
     parts = {spec.name: spec for spec in parts_of(layout)}
@@ -32,6 +34,7 @@ def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
     made = {name: spec.make() for name, spec in parts.items() if wanted(spec)}
     bought = {name: spec.make() for name, spec in bodies.items() if wanted(spec)}
     assembly = Assembly(layout, parts, bodies, made, bought)
+    refuse_what_no_bed_holds(assembly)
     return assembly if last is None or not wanted(last) else _balanced(assembly)
 
 

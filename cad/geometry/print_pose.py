@@ -3,7 +3,7 @@
 Of all poses in which the part lies on one of its larger flats, those that fit the bed; of these the least support,
 counted as the volume of the columns from overhanging faces down to the bed; of equal ones (to a cubic centimetre) the
 larger contact, then the lower pose. A face overhangs where it leans more than 45 deg out of the vertical. About the
-vertical the part is turned so that its smallest rectangle lies along the bed.
+vertical the part is turned so that its smallest rectangle lies along the bed, or aslant where it only fits so.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _directions(faces: _Faces) -> list[Array]:
 
 def _pose(mesh: TriMesh, faces: _Faces, down: Array, bed: tuple[float, float, float]) -> PrintPose:
     up = -down
-    R = _along_bed(mesh.vertices, _upright(up))
+    R = _turned_to_fit(mesh.vertices, _along_bed(mesh.vertices, _upright(up)), bed)
     placed = mesh.vertices @ R.T
     low, high = placed.min(axis=0), placed.max(axis=0)
     middle = np.array([bed[0] / 2, bed[1] / 2, 0.0]) - [*(low + high)[:2] / 2, low[2]]
@@ -142,6 +142,17 @@ def _upright(up: Array) -> Array:
     x = np.cross(helper, up)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(up, x), up])
+
+
+def _turned_to_fit(vertices: Array, R: Array, bed: tuple[float, float, float]) -> Array:
+    """R as it is where the part fits the bed so; else turned about z to where it does: across the bed, or aslant."""
+    flat = (vertices @ R.T)[:, :2]
+    outline = flat[ConvexHull(flat).vertices]
+    for turn in (0.0, math.pi / 2, *np.radians(np.arange(1.0, 180.0))):
+        c, s = math.cos(turn), math.sin(turn)
+        if (np.ptp(outline @ np.array([[c, s], [-s, c]]), axis=0) <= np.array(bed[:2]) + FLAT).all():
+            return R if turn == 0.0 else np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
+    return R
 
 
 def _along_bed(vertices: Array, R: Array) -> Array:

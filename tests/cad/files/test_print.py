@@ -53,6 +53,18 @@ def test_a_table_is_printed_upside_down_whichever_way_it_was_modelled(quaternion
     assert lying.volume() == pytest.approx(TABLE.volume, rel=1e-5)  # turned, not mirrored
 
 
+@pytest.mark.parametrize(
+    ("size", "fits"), [((260, 20, 10), True), ((150, 215, 10), True), ((215, 150, 10), True), ((280, 40, 10), False)]
+)
+def test_a_part_is_turned_on_the_bed_until_it_fits(size, fits):
+    bed = (160.0, 220.0, 50.0)
+    pose = print_pose(mesh(trimesh.creation.box(size)), bed)
+    lying = on_bed(mesh(trimesh.creation.box(size)), pose)
+    inside = (lying.vertices.min(axis=0) > -1e-3).all() and (lying.vertices.max(axis=0) < np.add(bed, 1e-3)).all()
+    assert pose.fits == inside == fits
+    assert np.linalg.det(pose.T_bed_part[:3, :3]) == pytest.approx(1)
+
+
 def test_support_is_counted_by_area_and_by_column():
     discs = [trimesh.creation.cylinder(10, segment=[[0, 0, z], [0, 0, z + 3]], sections=128) for z in (0, 23)]
     spool = trimesh.boolean.union([*discs, trimesh.creation.cylinder(2, segment=[[0, 0, 1], [0, 0, 25]], sections=128)])

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from cad.assembly.make import make_parts
+from cad.assembly.shadow import PartsWorkshop
 from cad.assembly.steps import steps_of
 from cad.checks.clearance import clearance_checks
 from cad.checks.remarks import left_out_of
@@ -21,8 +22,10 @@ from cad.layout.names import LIDAR
 from cad.parts.all_parts import parts_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
+from design.errors import BuildError
 from design.left_out import LeftOut
 from design.scanner import NO_MODULES, Modules, scanner_of
+from design.search.with_parts import Refused
 
 RING = "UH1256-02-0610-06S"
 
@@ -170,3 +173,26 @@ def test_without_a_cover_nothing_is_drilled_for_it(covered):
     assert left.why == "the task does not ask for it by modules.ring_cover"
     missing = plain.made[onto].Volume() - covered.made[onto].Volume()
     assert missing == pytest.approx(2 * math.pi * 1.25**2 * 5.0, rel=0.02)
+
+
+def on_bed_of(scanner, bed_mm):
+    printer = scanner.printer.model_copy(update={"bed_mm": bed_mm})
+    return replace(scanner, printer=printer)
+
+
+def test_a_part_that_no_bed_holds_is_refused_with_its_size_and_what_would_serve():
+    scanner = scanner_for(TILTED, Modules(tripod_foot=True))
+    small, foot = on_bed_of(scanner, (99.0, 200.0, 99.0)), lambda spec: spec.name == "tripod_foot"
+    with pytest.raises(BuildError) as refused:
+        make_parts(small, foot)
+    assert str(refused.value) == (
+        "tripod_foot: 100 x 100 x 8 mm as it is printed: the bed of fdm-0.4 is 99 x 200 x 99 mm (bed_mm); a printer "
+        "with bed_mm = [100.0, 100.0, 8.0] would hold it, or a smaller pattern of holes in [deck], or other angles"
+    )
+    assert "tripod_foot" in make_parts(on_bed_of(scanner, (100.0, 100.0, 8.0)), foot).made
+
+
+def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
+    scanner = on_bed_of(scanner_for(TILTED, NO_MODULES), (60.0, 60.0, 60.0))
+    answer = PartsWorkshop(scanner).shadow(np.radians(TILTED))
+    assert isinstance(answer, Refused) and "as it is printed: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
