@@ -36,7 +36,7 @@ SETTING_DEG = (0.0, -55.0, -80.0, 75.0)
 
 @dataclass(slots=True)
 class Products:
-    """What the searches multiplied: operations, the time that took, and the largest product (planes, nodes, axes)."""
+    """What the searches multiplied: operations, seconds of all threads, the largest (planes, nodes, axes)."""
 
     flops: float = 0.0
     seconds: float = 0.0
@@ -100,7 +100,7 @@ def main() -> None:
     print(f"plain float32 matmul, {sizes:17} {machine / 1e9:6.0f} Gflop/s")
     print(f"products of the search                 {reached / 1e9:6.0f} Gflop/s, {reached / machine:.0%} of it")
     plain = products.flops / machine
-    work = f"{products.flops / 1e9:6.0f} Gflop, {products.seconds:.2f} of {counted:.2f} s"
+    work = f"{products.flops / 1e9:6.0f} Gflop, {products.seconds:.2f} s of all threads, {counted:.2f} s of search"
     print(f"products in all                        {work}")
     print(f"all that as plain matmul               {plain:8.2f} s   {plain / counted:.0%} of the search")
 

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Array, Ints, Mask, Setting
+from design.concurrency.blocked_product import product
 from design.density.beams import polar_of_planes
 from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import Problem
@@ -72,8 +73,8 @@ class AtMost:
         """See `Constraint`."""
         rows = self.of_planes[planes].astype(np.float32)
         columns = self.of_axes[axes].T
-        straight = rows @ columns > self.most
-        return straight, np.ascontiguousarray(rows[:, ::-1]) @ columns > self.most if self.turns else straight
+        straight = product(rows, columns) > self.most
+        return straight, product(np.ascontiguousarray(rows[:, ::-1]), columns) > self.most if self.turns else straight
 
     def of(self, planes: slice | Ints, axes: slice) -> AtMost:
         """See `Constraint`."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +12,7 @@ from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Ints, Mask
+from design.concurrency.blocked_product import blocked_product, product
 from design.concurrency.parallel import in_chunks
 from design.objective.named_objectives import Moment, Objective
 from design.search.constraints import Constraint
@@ -66,25 +68,33 @@ def lowest(
     """
     closed_axis, closed_plane = (np.where(has, 0, np.inf).astype(np.float32, "C") for has in (has_axis, has_plane))
     plain, kept = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
-    for part in _slices(has_axis.shape[1], PART):
-        for piece in _slices(has_plane.shape[1], PIECE):
-            pairs = [way(piece, part) for way in ways]
-            straight, turned = (_joined(objective, [pair[i] for pair in pairs]) for i in (0, 1))
-            plain.meets(straight, turned, piece, part)
-            for constraint in constraints:
-                for J, broken in zip((straight, turned), constraint.broken(piece, part), strict=True):
-                    np.copyto(J, np.inf, where=broken)
-            if constraints:
-                kept.meets(straight, turned, piece, part)
-    return plain.lowest, kept.lowest if constraints else plain.lowest
+
+    def met(planes: slice) -> tuple[_Running, _Running]:
+        """With some of the planes; the axes are those of all threads, so their lowest are kept apart."""
+        of_all, of_kept = plain.about_the_same_axes(), kept.about_the_same_axes()
+        for part in _slices(0, has_axis.shape[1], PART):
+            for piece in _slices(planes.start, planes.stop, PIECE):
+                pairs = [way(piece, part) for way in ways]
+                straight, turned = (_joined(objective, [pair[i] for pair in pairs]) for i in (0, 1))
+                of_all.meets(straight, turned, piece, part)
+                for constraint in constraints:
+                    for J, broken in zip((straight, turned), constraint.broken(piece, part), strict=True):
+                        np.copyto(J, np.inf, where=broken)
+                if constraints:
+                    of_kept.meets(straight, turned, piece, part)
+        return of_all, of_kept
+
+    parts = in_chunks(met, has_plane.shape[1], smallest=PIECE)
+    lows = [side.lowest([part[i].by_axis for part in parts]) for i, side in enumerate((plain, kept))]
+    return lows[0], lows[1] if constraints else lows[0]
 
 
 def _joined(objective: Objective, moments: list[Array]) -> Array:
     return np.asarray(objective.join(np.stack(moments) if len(moments) > 1 else moments[0][None]), dtype=np.float32)
 
 
-def _slices(count: int, size: int) -> list[slice]:
-    return [slice(first, min(first + size, count)) for first in range(0, count, size)]
+def _slices(start: int, stop: int, size: int) -> list[slice]:
+    return [slice(first, min(first + size, stop)) for first in range(start, stop, size)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,18 +115,21 @@ class _Running:
         by_plane, by_axis = (np.full(closed.shape, np.inf, np.float32) for closed in (closed_plane, closed_axis))
         return cls(closed_plane, closed_axis, by_plane, none, none.copy(), by_axis)
 
+    def about_the_same_axes(self) -> _Running:
+        """The same planes, with axes that met nothing yet: for one of several threads, each with planes of its own."""
+        return replace(self, by_axis=np.full_like(self.by_axis, np.inf))
+
     def meets(self, straight: Array, turned: Array, piece: slice, part: slice) -> None:
         """Lower it by a tile of J, of a piece of the planes about a part of the axes."""
-        # one thread: handing a tile to others takes as long as looking through it
         first = (piece.start, part.start)
         closed = (self.closed_plane, self.closed_axis)
         _lower_planes(straight, turned, *first, *closed, self.by_plane, self.its_class, self.its_flip)
         _lower_axes(straight, turned, *first, *closed, self.by_axis)
 
-    @property
-    def lowest(self) -> Lowest:
-        """What was met."""
-        return Lowest(self.by_plane.astype(float), self.its_class, self.its_flip, self.by_axis.astype(float))
+    def lowest(self, by_axis: list[Array]) -> Lowest:
+        """What was met, about the axes in some threads."""
+        lowest_about = np.min(by_axis, axis=0).astype(float)
+        return Lowest(self.by_plane.astype(float), self.its_class, self.its_flip, lowest_about)
 
 
 @njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "reassoc"})
@@ -191,13 +204,15 @@ def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:
     w_even[:-1] *= 2
     w_odd *= 2
 
-    room = np.empty((3, PIECE, min(PART, len(weights))), np.float32)  # fresh memory costs as much as the product
+    rooms = threading.local()  # of each thread one: fresh memory costs as much as the product
 
     def pair(piece: slice, part: slice) -> tuple[Array, Array]:
         rows, columns = len(range(len(g))[piece]), len(range(len(weights))[part])
-        even, odd, straight = (flat[: rows * columns].reshape(rows, columns) for flat in room.reshape(3, -1))
-        np.matmul(g_even[piece], w_even[:, part], out=even)
-        np.matmul(g_odd[piece], w_odd[:, part], out=odd)
+        if not hasattr(rooms, "own"):
+            rooms.own = np.empty((3, PIECE * min(PART, len(weights))), np.float32)
+        even, odd, straight = (flat[: rows * columns].reshape(rows, columns) for flat in rooms.own)
+        blocked_product(g_even[piece], w_even[:, part], even)
+        blocked_product(g_odd[piece], w_odd[:, part], odd)
         np.add(even, odd, out=straight)
         return straight, np.subtract(even, odd, out=even)
 
@@ -209,8 +224,13 @@ def one_way(moment: Moment, g: Array, weights: Array) -> BothWays:
     if moment.gathered == "highest":
         seen = weights > 0
         return lambda piece, part: (_highest(g[piece], seen[part]),) * 2
-    single = np.ascontiguousarray(weights.T, dtype=np.float32)
-    return lambda piece, part: (g[piece].astype(np.float32) @ single[:, part],) * 2
+    single, rows = np.ascontiguousarray(weights.T, dtype=np.float32), g.astype(np.float32)
+
+    def same(piece: slice, part: slice) -> tuple[Array, Array]:
+        out = product(rows[piece], single[:, part])
+        return out, out
+
+    return same
 
 
 def _highest(g: Array, seen: Mask) -> Array:

@@ -30,7 +30,7 @@ def run_studio(
         TaskError: the port is taken, or the task has no region.
     """
     with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
-        say("reading the task (the first run compiles the numerics: some 20 s)")
+        say("reading the task (the first run compiles the numerics: some 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
             print(f"open {gate.address}", flush=True)
