@@ -14,6 +14,7 @@ from cad.layout.direct.drive import direct_drive
 from cad.layout.drive import DriveLayout, Stack
 from cad.layout.linkage import AlignmentLinkage, linkage_of
 from design.left_out import LeftOut
+from design.motion import Sweep
 from design.scanner import NO_MODULES, Scanner
 
 
@@ -84,6 +85,8 @@ def config_hash(scanner: Scanner) -> str:
         ]
         + others,
     }
+    if isinstance(angles.motion, Sweep):
+        content["sweep"] = angles.motion.limits_deg  # one that keeps the gears on a flank needs no counterweight
     if scanner.modules != NO_MODULES:
         content["modules"] = scanner.modules.model_dump()
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()[:12]

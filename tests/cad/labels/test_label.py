@@ -15,8 +15,10 @@ from cad.labels.flats import flat_at, flats_of
 from cad.labels.glyphs import letters, text_width
 from cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
 from cad.labels.sight import Sight
-from cad.layout.layout import config_hash
+from cad.layout.layout import config_hash, layout_of
 from cad.solids import box, upright
+from design.left_out import LeftOut
+from design.motion import Sweep
 
 STROKE = 0.8
 
@@ -42,6 +44,18 @@ def test_the_parts_that_hold_the_angles_say_them(made):
     assert set(made.result.meshes) >= {"alignment_linkage", "base_mount"}
     named = made.scanner.angles.model_copy(update={"task": "another"})
     assert config_hash(replace(made.scanner, angles=named)) != digest
+
+
+def test_scanners_whose_parts_may_differ_have_labels_that_do(made):
+    def swept(*limits_deg, period_s=18.0):
+        motion = Sweep(limits_deg=limits_deg, period_s=period_s)
+        return replace(made.scanner, angles=made.scanner.angles.model_copy(update={"motion": motion}))
+
+    scanners = [made.scanner, swept(-10.0, 10.0), swept(-90.0, 90.0)]
+    assert len({config_hash(scanner) for scanner in scanners}) == 3
+    assert config_hash(swept(-10.0, 10.0, period_s=9.0)) == config_hash(scanners[1])
+    bars = [layout_of(scanner).counterweight for scanner in scanners[1:]]
+    assert [isinstance(bar, LeftOut) for bar in bars] == [True, False]  # the narrow one keeps the gears on a flank
 
 
 def test_a_printed_part_has_a_label_or_is_told_to_have_none(made):
