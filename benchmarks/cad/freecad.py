@@ -27,7 +27,7 @@ for file in json.loads(os.environ["SCANWRIGHT_STEP_FILES"]):
         told = [line.split(": ")[-1] for line in str(error).splitlines() if line.startswith("Error in Face")]
     print("READ", json.dumps([file, shape.isValid(), len(shape.Solids), shape.Volume, collections.Counter(told)]))
 """
-WITHIN = 1e-6  # of the volume
+WITHIN = 1e-5  # of the volume
 
 
 @dataclass(frozen=True, slots=True)
