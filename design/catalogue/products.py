@@ -44,6 +44,11 @@ class Product(Record):
         """Names of the values that nobody has verified."""
         return [field for field, origin in self._provenance.items() if not origin.verified]
 
+    def doubt(self, field: str) -> str:
+        """Words behind a value that something is refused for, where nobody has verified it."""
+        origin = self._provenance.get(field)
+        return "" if origin is None or origin.verified else " (nobody has verified it: measure yours)"
+
     def facts(self) -> dict[str, Any]:
         """Every value, and under `provenance` where it comes from, for a program to read."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}

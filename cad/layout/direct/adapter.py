@@ -44,8 +44,9 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
     hole = passing_hole(screw, scanner.printer)
     holes = fork_holes(servo, stack)
     if not holes:
+        doubt = servo.doubt("case_holes_mm")
         raise BuildError(
-            f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two "
+            f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
             f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
         )
     return SlipRingAdapter(

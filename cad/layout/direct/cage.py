@@ -82,8 +82,9 @@ def cage_of(scanner: Scanner, stack: DirectStack) -> BearingCage | None:
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
     if len(holes) < 4:
+        doubt = servo.doubt("case_holes_mm")
         raise BuildError(
-            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}: {servo.name} needs two pairs of front "
+            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two pairs of front "
             f"holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
     thread = thread_in_part(CAGE_SCREW, printer, carries=True)

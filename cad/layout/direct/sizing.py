@@ -17,9 +17,10 @@ from design.catalogue.products import Servo
 from design.errors import BuildError
 from design.scanner import Scanner
 
-SHAFT_PLAIN = 12.0  # without a ring
+SHAFT_PLAIN = 12.0  # without a ring, where the heads of the horn's screws leave room
 SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
 SHAFT_MIN = 8.0
+COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only where the heads beside it stand close
 
 
 def direct_stack(scanner: Scanner) -> DirectStack:
@@ -64,7 +65,7 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     """Shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
     ring = scanner.slip_ring
     if ring is None:
-        return SHAFT_PLAIN, 0.0, 0.0, 0.0
+        return _between_heads(scanner.servo), 0.0, 0.0, 0.0
     if ring.bore_mm == 0:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
@@ -85,6 +86,16 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
 
 
+def _between_heads(servo: Servo) -> float:
+    """Diameter of a shaft that no ring asks for: thinner where the heads of the horn's screws stand close."""
+    return max(SHAFT_MIN, min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(servo)) / 2))
+
+
+def _room_on_horn(servo: Servo) -> float:
+    """Radius that the heads of the horn's screws leave."""
+    return (servo.horn_circle_mm - SCREWS[servo.horn_screw].head_diameter) / 2
+
+
 def _least_bore() -> float:
     return SHAFT_MIN + SHAFT_RUNNING_GAP
 
@@ -94,12 +105,13 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     screw = SCREWS[servo.horn_screw]
     circle = servo.horn_circle_mm / 2
     radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)
-    collar = max(shaft_diameter / 2, servo.horn_boss_diameter_mm / 2 + 2.4)
-    room = circle - screw.head_diameter / 2
+    room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
+    collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
     if collar > room:
+        doubt = servo.doubt("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
-            f"{servo.horn_circle_mm:g} mm leave {room:g} mm; take a ring with a smaller bore"
+            f"{servo.horn_circle_mm:g} mm{doubt} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"
         )
     thickness = 4.0
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)
