@@ -141,6 +141,8 @@ def _loosens(joint: Joint, under: Material, into: Material) -> str:
         return f"{creeps}; no threadlocker, it attacks plastics"
     if joint.fixing in ("nut", "trap", "deck"):
         return f"{creeps}; a drop of medium threadlocker in the nut"
+    if into.plastic:
+        return f"{creeps}; no threadlocker, it attacks plastics"
     return f"{creeps}; a drop of medium threadlocker in the thread of the metal"
 
 

@@ -46,8 +46,8 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
     if len(ys) < 2:
         doubt = servo.doubt("case_holes_mm")
         raise BuildError(
-            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two pairs of front "
-            f"holes at least {least:.2f} mm from its axis, beside the pulley"
+            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
+            f"pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
         )
     return DrivePlate(
         stack=stack,

@@ -84,8 +84,8 @@ def cage_of(scanner: Scanner, stack: DirectStack) -> BearingCage | None:
     if len(holes) < 4:
         doubt = servo.doubt("case_holes_mm")
         raise BuildError(
-            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two pairs of front "
-            f"holes at least {least:.2f} mm from the axis, outside the turning flange"
+            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
+            f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
     thread = thread_in_part(CAGE_SCREW, printer, carries=True)
     front = stack.horn + servo.case_max_mm[2]
