@@ -42,6 +42,10 @@ class Zones:
     least: Float[ndarray, " n"]
     most: Float[ndarray, " n"]
 
+    def of(self, some: slice) -> Zones:
+        """What is seen at some of the angles."""
+        return Zones(self.mean_g[some], self.mean[some], self.least[some], self.most[some])
+
 
 def mean_count(
     polar_rad: Float[ndarray, " n"], beam_polar_rad: Float[ndarray, " beams"], lines: ScanLines, ball_rad: float

@@ -22,7 +22,7 @@ from design.frames import R_world_rot
 from design.objective.named_objectives import Moment
 from design.objective.problem import Problem
 from design.objective.quadrature import polar_rule
-from design.sphere.directions import sample_set
+from design.sphere.directions import sample_sets
 
 MOST_NODES = 200_000
 ROUNDING = 1e-6  # floor of the stated error
@@ -162,18 +162,20 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     moment = problem.objective.moments[index]
     R = R_world_rot(angles_rad[0], angles_rad[1])
     beams = problem.beams_rot(angles_rad[2:])
-    sets = [sample_set(moment.field, problem.grid_step_deg, nodes // SETS, k) for k in range(SETS)]
-    found = []
+    sets = sample_sets(moment.field, problem.grid_step_deg, nodes // SETS, SETS)
+    directions = np.concatenate([samples.directions for samples in sets]) @ R
+    z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, problem.tables[index])
+    blind = blind_to_sweep(problem, directions, beams, z.mean)
+    lower = moment.g(z.mean)
+    found, first = [], 0
     for samples in sets:
-        z = zones_swept(samples.directions @ R, beams, problem.sweep, problem.ball_rad, problem.tables[index])
-        blind = blind_to_sweep(problem, samples.directions @ R, beams, z.mean)
-        lower = moment.g(z.mean)
+        own = slice(first, first := first + len(samples.weights))
         if moment.gathered == "highest":
-            found.append(_highest(moment, z, lower, samples.weights, blind))
+            found.append(_highest(moment, z.of(own), lower[own], samples.weights, blind[own]))
         else:
             share = samples.weights / samples.weights.sum()
-            value, bound, hidden = float(share @ z.mean_g), float(share @ lower), float(share @ blind)
-            found.append(_Found(value, 0.0, bound, int(z.least.min()), hidden))
+            value, bound, hidden = (float(share @ of[own]) for of in (z.mean_g, lower, blind))
+            found.append(_Found(value, 0.0, bound, int(z.least[own].min()), hidden))
     values, least = np.array([f.value for f in found]), min(f.least for f in found)
     gather = np.max if moment.gathered == "highest" else np.mean
     if moment.gathered == "highest":

@@ -211,7 +211,9 @@ def _weights_over_polar(
         rows = _histogram(weighted_samples(field, DIRECTIONS), axes, nodes)
     else:
         polar = (np.arange(circles) + 0.5) * (np.pi / circles)
-        rows = _share_between_nodes(field.on_circles_about(axes, polar) * np.sin(polar), nodes)
+        rows = _share_between_nodes(
+            field.on_circles_about(axes, polar, reach_about(field, axes)) * np.sin(polar), nodes
+        )
         around = rows.sum(axis=1) * (2 * np.pi * np.pi / circles)
         samples = weighted_samples(field, DIRECTIONS // 10)
         # what is narrower than the step between circles they meet about some axes and miss about others

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
@@ -80,6 +81,16 @@ def require_weight(field: Field) -> None:
     patches = len(field.patches)
     if not any(len(_in_patch(field, k, A_FEW // patches + 1, 0.0, 0.5).weights) for k in range(patches)):
         raise TaskError(NO_WEIGHT)
+
+
+@lru_cache(maxsize=8)
+def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: int) -> tuple[Samples, ...]:
+    """The first so many of `sample_set`, kept: a search asks for the same ones for every setting.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    return tuple(sample_set(field, grid_step_deg, wanted, index) for index in range(count))
 
 
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from design.concurrency.blocked_product import product
 from design.concurrency.parallel import in_chunks
 from design.sphere.painting import MAP
 from design.sphere.polar_rule import around, edge_corners
 from design.sphere.regions import Field, frames_about
 
 AROUND = 3600  # points of each edge: what an arc reaches further between two of them is below 4e-7 rad
+PIECE = 1024  # points that axes are compared with at a time
 BETWEEN = 9  # points of each edge of a cell of a map
 
 
@@ -22,32 +25,74 @@ def reach_about(field: Field, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, 
 
     The way from an axis to a region ends at its outline, but for a region that the axis itself lies in.
     """
-    points = _outline(field)
-    if not len(points):  # all of the sphere
+    arcs, points = _outline(field)
+    if not arcs and not len(points):  # all of the sphere
         return np.tile([0.0, np.pi], (len(axes), 1))
-    parts = in_chunks(lambda chunk: _reach(points, axes[chunk]), len(axes), smallest=16)
-    reach = np.concatenate(parts)
+    cosines = [arc.cosines(axes) for arc in arcs]
+    if len(points):
+        parts = in_chunks(lambda chunk: _cosines(points, axes[chunk]), len(axes), smallest=16)
+        cosines.append(np.concatenate(parts))
+    both = np.stack(cosines)
+    reach = np.arccos(np.clip(np.stack([both[:, :, 0].max(axis=0), both[:, :, 1].min(axis=0)], axis=1), -1, 1))
     reach[field.weight_at(axes) > 0, 0] = 0.0
     reach[field.weight_at(-axes) > 0, 1] = np.pi
     return reach
 
 
-def _reach(points: Float[ndarray, "n 3"], axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
-    cosine = np.clip(axes @ points.T, -1, 1)
-    return np.arccos(np.stack([cosine.max(axis=1), cosine.min(axis=1)], axis=1))
+def _cosines(points: Float[ndarray, "n 3"], axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
+    """Cosines from axes to the nearest point and to the farthest, shape (axes, 2)."""
+    pieces = [points[i : i + PIECE].T for i in range(0, len(points), PIECE)]  # the cache holds a piece
+    cosine = np.stack([[c.max(axis=1), c.min(axis=1)] for c in (product(axes, piece) for piece in pieces)])
+    return np.stack([cosine[:, 0].max(axis=0), cosine[:, 1].min(axis=0)], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Arcs:
+    """Where the weight begins along a circle `x . m = c`: azimuths about m, in order, in a frame (e1, e2, m)."""
+
+    frame: Float[ndarray, "3 3"]
+    offset: float
+    azimuth_rad: Float[ndarray, " n"]
+
+    def points(self) -> Float[ndarray, "n 3"]:
+        """The same as unit vectors, shape (n, 3)."""
+        e1, e2, normal = self.frame
+        turn = self.azimuth_rad[:, None]
+        return self.offset * normal + self._radius * (np.cos(turn) * e1 + np.sin(turn) * e2)
+
+    @property
+    def _radius(self) -> float:
+        return float(np.sqrt(max(0.0, 1 - self.offset**2)))
+
+    def cosines(self, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
+        """As `_cosines`: the nearest point is next in azimuth to the axis, the farthest to the other side."""
+        x, y, along = (axes @ self.frame.T).T
+        turn = np.arctan2(y, x)
+        out = [self._next(turn), -self._next(turn + np.pi)]
+        return (self.offset * along + self._radius * np.hypot(x, y) * np.stack(out)).T
+
+    def _next(self, azimuth_rad: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
+        """Cosine of the way around to the nearest azimuth of the arcs."""
+        behind = np.searchsorted(self.azimuth_rad, azimuth_rad % (2 * np.pi)) % len(self.azimuth_rad)
+        return np.asarray(np.cos(self.azimuth_rad[[behind - 1, behind]] - azimuth_rad).max(axis=0))
 
 
 @lru_cache(maxsize=64)
-def _outline(field: Field) -> Float[ndarray, "n 3"]:
-    """Points where the weight begins, along every edge, and all corners, shape (n, 3)."""
-    circles = [_on_circle(plane) for plane in field.planes]
+def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
+    """Where the weight begins: arcs of edges, and points of cells of maps and all corners, shape (n, 3)."""
+    arcs = []
+    for plane in field.planes:
+        whole = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
+        begins = _begins(field, whole.points())
+        if begins.any():
+            arcs.append(replace(whole, azimuth_rad=whole.azimuth_rad[begins]))
     cells = [
         _on_cells(layers.tables[int(row[1])], row)
         for layers in (field.weight, field.mask)
         for row in layers.rows[layers.rows[:, 0] == MAP]
     ]
-    points = np.concatenate([np.empty((0, 3)), *circles, *cells, edge_corners(field)])
-    return points[_begins(field, points)]
+    points = np.concatenate([np.empty((0, 3)), *cells, edge_corners(field)])
+    return tuple(arcs), points[_begins(field, points)]
 
 
 def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
@@ -56,13 +101,6 @@ def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
         return np.zeros(0, dtype=bool)
     weighted = field.weight_at(around(points).reshape(-1, 3)).reshape(len(points), -1) > 0
     return np.asarray(weighted.any(axis=1) & ~weighted.all(axis=1))
-
-
-def _on_circle(plane: Float[ndarray, " 4"]) -> Float[ndarray, "n 3"]:
-    """Points all along the circle that a plane (m, c) cuts from the sphere."""
-    e1, e2, normal = frames_about(plane[None, :3])[0]
-    turn = 2 * np.pi * np.arange(AROUND)[:, None] / AROUND
-    return plane[3] * normal + np.sqrt(max(0.0, 1 - plane[3] ** 2)) * (np.cos(turn) * e1 + np.sin(turn) * e2)
 
 
 def _on_cells(table: Float[ndarray, "rows columns"], row: Float[ndarray, " 14"]) -> Float[ndarray, "n 3"]:

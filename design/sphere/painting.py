@@ -101,6 +101,7 @@ def _sort(values: Array, n: int) -> None:
 def circle_means(
     frames: Array,
     polar: Array,
+    within: Array,
     planes: Array,
     weight_rows: Array,
     weight_tables: Array,
@@ -108,9 +109,12 @@ def circle_means(
     mask_tables: Array,
     background: float,
 ) -> tuple[Array, Array]:
-    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles)."""
-    weights = np.empty((len(frames), len(polar)))
-    shares = np.empty((len(frames), len(polar)))
+    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles).
+
+    Circles beyond the polar angles `within` (frames, 2) are not looked at: 0 both.
+    """
+    weights = np.zeros((len(frames), len(polar)))
+    shares = np.zeros((len(frames), len(polar)))
     cuts = np.empty(2 * len(planes) + 1)
     inside = np.empty((len(planes), 3))
     for f in range(len(frames)):
@@ -120,6 +124,8 @@ def circle_means(
                 m = planes[k]
                 inside[k, axis] = m[0] * frame[axis, 0] + m[1] * frame[axis, 1] + m[2] * frame[axis, 2]
         for i in range(len(polar)):
+            if not within[f, 0] <= polar[i] <= within[f, 1]:
+                continue
             st, ct = np.sin(polar[i]), np.cos(polar[i])
             n = 0
             for k in range(len(planes)):
@@ -128,8 +134,9 @@ def circle_means(
                 r = np.sqrt(a * a + b * b)
                 if r > abs(c):
                     middle, half = np.arctan2(b, a), np.arccos(c / r)
-                    cuts[n] = (middle - half) % (2 * np.pi)
-                    cuts[n + 1] = (middle + half) % (2 * np.pi)
+                    first, last = middle - half, middle + half  # from -2 pi to 2 pi: no division is needed
+                    cuts[n] = first if first >= 0.0 else first + 2 * np.pi
+                    cuts[n + 1] = last if last >= 0.0 else last + 2 * np.pi
                     n += 2
             if n == 0:
                 cuts[0] = 0.0

@@ -45,6 +45,7 @@ from design.task.shapes import (
 from design.task.task import LoadedTask
 
 FEW_CIRCLES = 1024  # up to here one thread is done before others have begun
+EVERYWHERE = np.array([[-np.inf, np.inf]])
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 
@@ -111,16 +112,23 @@ class Field:
         """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
         numbers = _numbers(self)
         frame = frames_about(axis[None])
-        parts = in_chunks(lambda chunk: circle_means(frame, polar_rad[chunk], *numbers), len(polar_rad), FEW_CIRCLES)
+        parts = in_chunks(
+            lambda chunk: circle_means(frame, polar_rad[chunk], EVERYWHERE, *numbers), len(polar_rad), FEW_CIRCLES
+        )
         return np.concatenate([p[0][0] for p in parts]), np.concatenate([p[1][0] for p in parts])
 
     def on_circles_about(
-        self, axes: Float[ndarray, "axes 3"], polar_rad: Float[ndarray, " n"]
+        self, axes: Float[ndarray, "axes 3"], polar_rad: Float[ndarray, " n"], reach_rad: Float[ndarray, "axes 2"]
     ) -> Float[ndarray, "axes n"]:
-        """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact."""
+        """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact.
+
+        Only circles between the polar angles at which there is weight, `reach_rad` (n, 2), are looked at.
+        """
         numbers = _numbers(self)
         frames = frames_about(axes)
-        parts = in_chunks(lambda chunk: circle_means(frames[chunk], polar_rad, *numbers)[0], len(axes), smallest=8)
+        parts = in_chunks(
+            lambda chunk: circle_means(frames[chunk], polar_rad, reach_rad[chunk], *numbers)[0], len(axes), smallest=8
+        )
         return np.concatenate(parts)
 
 

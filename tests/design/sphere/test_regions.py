@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from design.catalogue.catalogue import load_catalogue
+from design.sphere.outline import reach_about
 from design.sphere.regions import field_of
 from design.task.task import LoadedTask, Task
 
@@ -155,8 +156,9 @@ def test_circle_means_agree_with_dense_sampling(seed):
     axis = [random_axis / np.linalg.norm(random_axis), np.eye(3)[2], -np.eye(3)[2], np.eye(3)[0]][seed % 4]
     polar = np.concatenate([[1e-7, pi - 1e-7], rng.uniform(0, pi, 5)])
     means, shares = f.on_circles(axis, polar)
+    both = np.array([axis, -axis])
     np.testing.assert_allclose(
-        f.on_circles_about(np.array([axis, -axis]), polar), [means, f.on_circles(-axis, polar)[0]]
+        f.on_circles_about(both, polar, reach_about(f, both)), [means, f.on_circles(-axis, polar)[0]]
     )
     count = 20_000
     jump = max([background, *(r["value"] * 3 for r in weight)])
