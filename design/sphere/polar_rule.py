@@ -52,7 +52,8 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
     """
     ends = np.array(weighted_segments(field, axis, breaks_rad)).reshape(-1, 2)
     length = ends[:, 1] - ends[:, 0]
-    thirds = np.maximum(3, np.round(nodes / 3 * length / length.sum())).astype(int)
+    least = 3 if 9 * len(ends) <= nodes else 1  # thirds of a segment: of a map there are many
+    thirds = np.maximum(least, np.round(nodes / 3 * length / length.sum())).astype(int)
     segment = np.repeat(np.arange(len(ends)), 3 * thirds)
     k = np.arange(len(segment)) - np.repeat(np.cumsum(3 * thirds) - 3 * thirds, 3 * thirds)
     step = (np.pi / (3 * thirds))[segment]

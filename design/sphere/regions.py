@@ -136,7 +136,7 @@ class Field:
 def _numbers(field: Field) -> tuple[Array, Array, Array, Array, Array, float]:
     """What the kernel of circle means takes of a field."""
     weight, mask = field.weight, field.mask
-    planes = np.concatenate([field.planes, field.map_planes])
+    planes = np.unique(np.concatenate([field.planes, field.map_planes]), axis=0)  # of a scene both have the same cells
     return planes, weight.rows, weight.tables, mask.rows, mask.tables, field.background
 
 
@@ -208,7 +208,7 @@ def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of
             table = maps.pop(0)
             rows.append(_row(MAP, [len(tables), *table.shape], value))
             tables.append(table)
-            map_planes.append(_edges_of_map(*table.shape))
+            map_planes.append(_edges_of_map(table))
     return Layers(
         np.array(rows, dtype=float).reshape(-1, COLUMNS),
         np.concatenate(planes),
@@ -231,10 +231,14 @@ def _edges_of_band(theta: Array, phi: Array) -> Float[ndarray, "edges 4"]:
     return np.array(edges).reshape(-1, 4)
 
 
-def _edges_of_map(rows: int, columns: int) -> Float[ndarray, "edges 4"]:
-    theta = np.pi * np.arange(1, rows) / rows
-    phi = 2 * np.pi * np.arange(columns) / columns
-    phi = phi[: columns // 2] if columns % 2 == 0 else phi  # a meridian plane serves phi and phi + 180 deg
+def _edges_of_map(table: Float[ndarray, "rows columns"]) -> Float[ndarray, "edges 4"]:
+    """Planes between cells, where any two on both sides of one differ."""
+    rows, columns = table.shape
+    theta = np.pi * np.arange(1, rows)[(table[1:] != table[:-1]).any(axis=1)] / rows
+    differ = (table != np.roll(table, 1, axis=1)).any(axis=0)
+    if columns % 2 == 0:  # a meridian plane serves phi and phi + 180 deg
+        differ = differ[: columns // 2] | differ[columns // 2 :]
+    phi = 2 * np.pi * np.flatnonzero(differ) / columns
     across = np.stack([0 * theta, 0 * theta, 1 + 0 * theta, np.cos(theta)], axis=1)
     along = np.stack([-np.sin(phi), np.cos(phi), 0 * phi, 0 * phi], axis=1)
     return np.concatenate([across, along])

@@ -130,9 +130,9 @@ def every_segment(field, axis, more_rad):
     return list(pairwise(breaks))
 
 
-def every_direction(field, _, wanted, index):
-    directions = spiral(4 * wanted + 17 * index, turn_rad=float(index))
-    return Samples(directions, field.weight_at(directions))
+def every_direction(field, _, wanted, count):
+    sets = [spiral(4 * wanted + 17 * index, turn_rad=float(index)) for index in range(count)]
+    return tuple(Samples(directions, field.weight_at(directions)) for directions in sets)
 
 
 @pytest.mark.parametrize("motion", [{}, SWEEP], ids=["spin", "sweep"])
@@ -141,7 +141,7 @@ def test_directions_of_weight_zero_looked_at_and_not(motion, monkeypatch):
     assert [entry.what for entry in directions_left_out(problem)] == ["directions of weight zero"]
     skipped = [score(problem, setting) for setting in SETTINGS]
     monkeypatch.setattr(polar_rule, "weighted_segments", every_segment)
-    monkeypatch.setattr(scoring, "sample_set", every_direction)
+    monkeypatch.setattr(scoring, "sample_sets", every_direction)
     looked_at = [score(problem, setting) for setting in SETTINGS]
     for one, other in zip(skipped, looked_at, strict=True):
         assert one.J != other.J, "another sum"
@@ -156,7 +156,7 @@ def test_masked_directions_left_out_or_looked_at_with_weight_zero(motion, monkey
     assert told == {"masked directions", "directions of weight zero"}
     left_out = [score(masked, setting) for setting in SETTINGS]
     monkeypatch.setattr(polar_rule, "weighted_segments", every_segment)
-    monkeypatch.setattr(scoring, "sample_set", every_direction)
+    monkeypatch.setattr(scoring, "sample_sets", every_direction)
     for one, setting in zip(left_out, SETTINGS, strict=True):
         other = score(painted, setting)
         assert abs(one.J - other.J) <= one.J_error + other.J_error

@@ -200,3 +200,15 @@ def test_the_total_weight_of_a_map_is_the_sum_over_its_cells():
     edges = np.cos(np.linspace(0, pi, 8))
     cells = (edges[:-1] - edges[1:])[:, None] / 24
     assert total(f, [0.3, -0.5, 0.8])[0] == pytest.approx(2.5 * (table * cells).sum(), abs=1e-6)
+
+
+def test_only_edges_between_cells_that_differ_are_looked_at():
+    """A map of one bright patch has the four edges of it, and its means along circles stay those of all its cells."""
+    table = np.zeros((18, 36))
+    table[4:9, 10:16] = 2.0
+    f = field([{"shape": "map", "file": "m.png"}], maps=[table])
+    assert len(f.map_planes) == 4
+    axis = np.array([0.6, 0.0, 0.8])
+    polar = np.radians([20.0, 70.0, 110.0])
+    seen = [f.weight_at(circle(axis, t, 100_000)).mean() for t in polar]
+    assert f.on_circles(axis, polar)[0] == pytest.approx(seen, abs=1e-4)
