@@ -10,6 +10,7 @@ import cadquery as cq
 from cad.assembly.bought import BodySpec
 from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import PrintPose, print_pose
+from cad.layout.cables.leads import Lead
 from cad.layout.layout import Layout
 from cad.parts.part_spec import Colour, PartSpec
 
@@ -24,6 +25,7 @@ class Assembly:
         bodies: what is known of the bought ones.
         made: parts of this project.
         bought: bodies of bought products.
+        leads: between lidar and ring, as they were laid out.
     """
 
     layout: Layout
@@ -31,6 +33,7 @@ class Assembly:
     bodies: dict[str, BodySpec]
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
+    leads: tuple[Lead, ...] = ()
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -61,7 +64,10 @@ class Assembly:
     def mesh(self, name: str) -> TriMesh:
         """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
         if name not in self._meshes:
-            self._meshes[name] = mesh_of(self.made[name] if name in self.made else self.bought[name])
+            if name in self.made:
+                self._meshes[name] = mesh_of(self.made[name])
+            else:
+                self._meshes[name] = mesh_of(self.bought[name], *self.bodies[name].chords)
         return self._meshes[name]
 
     def meshes(self) -> dict[str, TriMesh]:

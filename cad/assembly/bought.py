@@ -6,7 +6,7 @@ own `T_rot_laser`, the one that the point cloud goes through.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -15,8 +15,11 @@ import cadquery as cq
 
 from cad import solids
 from cad.assembly import bought_shapes as draw
+from cad.assembly.tube import LEAD_CHORDS, lead_solid
+from cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from cad.layout import names
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.leads import Lead
 from cad.layout.direct.stack import DirectStack
 from cad.layout.layout import Layout
 from cad.parts.part_spec import STEEL, Colour
@@ -24,6 +27,7 @@ from design.catalogue.products import Bearing
 
 CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
 WINDOW = (0.35, 0.05, 0.08)
+LEAD = (0.62, 0.12, 0.10)
 LOWER = "_lower"
 
 
@@ -43,6 +47,7 @@ class BodySpec:
         meets: body that it may touch though the other one moves: the other half of a ring, or what it drives.
         clear: whether beams pass it.
         from_below: whether it is put in from below, where its product comes twice.
+        chords: what the mesh may be off by [mm], and the angle between two of its facets [rad].
     """
 
     name: str
@@ -53,6 +58,7 @@ class BodySpec:
     meets: str = ""
     clear: bool = False
     from_below: bool = False
+    chords: tuple[float, float] = (CHORD_ERROR, CHORD_ANGLE)
 
     @property
     def turns(self) -> bool:
@@ -60,11 +66,11 @@ class BodySpec:
         return self.frame != "servo"
 
 
-def bought_of(layout: Layout) -> list[BodySpec]:
-    """The bodies of everything that one scanner is bought with."""
+def bought_of(layout: Layout, leads: Sequence[Lead] = ()) -> list[BodySpec]:
+    """The bodies of everything that one scanner is bought with, and of the leads that join lidar and ring."""
     stack = layout.stack
     drive = _of_belt(stack) if isinstance(stack, BeltStack) else _of_direct(layout, stack)
-    return [*drive, *_of_lidar(layout)]
+    return [*drive, *_of_lidar(layout), *_of_leads(leads)]
 
 
 def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
@@ -138,6 +144,20 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
             make=partial(_on_axis, layout, make),
             clear=window,
         )
+
+
+def _of_leads(leads: Sequence[Lead]) -> Iterator[BodySpec]:
+    """Those that have a way."""
+    for i, lead in enumerate(leads, start=1):
+        if lead.path is not None:
+            yield BodySpec(
+                name=f"{names.ROTOR_LEAD}_{i}",
+                product=names.ROTOR_LEADS,
+                frame="rot",
+                colour=LEAD,
+                make=partial(lead_solid, lead),
+                chords=LEAD_CHORDS,
+            )
 
 
 def _beside(stack: BeltStack, make: Callable[[], cq.Solid]) -> cq.Solid:

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cad.assembly.assembly import Assembly
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.leads import Lead
+from cad.layout.cables.words import leads_words
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
-from cad.layout.names import BEARING_TOWER, DECK, LIDAR, LIDAR_BODY, RING, SERVO, SERVO_CASE, SLIP_RING_ADAPTER
+from cad.layout.names import (
+    BEARING_TOWER,
+    DECK,
+    LIDAR,
+    LIDAR_BODY,
+    RING,
+    ROTOR_LEADS,
+    SERVO,
+    SERVO_CASE,
+    SLIP_RING_ADAPTER,
+)
 from cad.parts.part_spec import Step
 
 ON_DECK = Step(
@@ -28,6 +42,8 @@ RING_STEP = Step(
     "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
     "turned by hand, the shaft takes the rotor along and the stator stays; no lead is pulled",
 )
+LEADS_TITLE = "Leads of the lidar to the ring"
+LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
 CAPSULE_STEP = Step(
     "Capsule into the tower",
     "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
@@ -38,14 +54,16 @@ CAPSULE_STEP = Step(
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
     """Part or product that a step puts in, and the step."""
-    steps = {name: assembly.parts[name].step for name in assembly.made} | _of_bought(assembly.layout)
+    steps = {name: assembly.parts[name].step for name in assembly.made} | _of_bought(assembly.layout, assembly.leads)
     return sorted(steps.items(), key=lambda item: assembly.layout.drive.built.index(item[0]))
 
 
-def _of_bought(layout: Layout) -> dict[str, Step]:
+def _of_bought(layout: Layout, leads: Sequence[Lead]) -> dict[str, Step]:
     steps = {LIDAR: LIDAR_STEP}
     if layout.scanner.slip_ring is not None:
         steps[RING] = CAPSULE_STEP if isinstance(layout.stack, BeltStack) else RING_STEP
+    if any(lead.path is not None for lead in leads):
+        steps[ROTOR_LEADS] = Step(LEADS_TITLE, leads_words(layout, leads), LEADS_CHECK)
     if layout.deck.flat:
         steps[DECK] = ON_DECK
     return steps

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 
 from cad.assembly.masses import rotor_of, rotor_weight
-from cad.checks.belt_loads import belt_loads
 from cad.checks.check import Check, Severity, at_most, note, tidy
-from cad.checks.direct_loads import direct_loads
+from cad.checks.loads.belt import belt_loads
+from cad.checks.loads.direct import direct_loads
 from cad.geometry.inertia import Inertial
 from cad.layout.balance.counterweight import RUBS_NM
 from cad.layout.balance.imbalance import keeps_flank, play_matters

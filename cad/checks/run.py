@@ -15,6 +15,7 @@ from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
 from cad.checks.deflection import deflection_checks
+from cad.checks.leads import lead_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
@@ -70,6 +71,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *mechanics_checks(scanner, layout.stack, bodies),
         *retention_checks(scanner, assembly),
         *electric_checks(scanner),
+        *lead_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *doubts,

@@ -198,6 +198,9 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
+        ties = 2 * len(scanner.lidar.cable_y_mm)
+        note = "on both sides of each joint; price unknown"
+        yield BomItem("consumable", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:

@@ -17,7 +17,7 @@ from cad.assembly.assembly import Assembly
 from cad.files.glb import Node, glb_bytes
 from cad.geometry.mesh import TriMesh
 from cad.layout.balance.counterweight import Counterweight
-from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR
+from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, ROTOR_LEADS
 from design.arrays import Array
 from design.scanner import Scanner
 
@@ -96,6 +96,8 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
         top = high + lift
     normal = np.array(assembly.layout.deck.normal)
     lifts |= {product: -GAP_MM * normal for product in along if along[product] == "deck"}
+    if ROTOR_LEADS in points:  # they stay where they run, at the linkage
+        lifts[ROTOR_LEADS] = lifts[ALIGNMENT_LINKAGE]
     top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
     bar = assembly.layout.counterweight
     for product in (product for product in along if along[product] == "radius"):

@@ -219,6 +219,12 @@ class SlipRing(Product):
     max_rpm: float | None = Field(default=None, gt=0)
     circuits: str
     ways: tuple[Ways, ...] | None = Field(default=None, exclude=True, description="circuits by current; shapes no part")
+    lead_diameter_mm: float | None = Field(
+        default=None, gt=0, exclude=True, description="of the bundle that goes to one outlet; shapes no part"
+    )
+    lead_bend_radius_mm: float | None = Field(
+        default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
+    )
     price_usd: float | None = Field(default=None, gt=0)
     # left out of the record where there is none, so that a ring with a bore keeps its digest
     flange: Flange | None = Field(default=None, exclude_if=lambda value: value is None)

@@ -27,6 +27,7 @@ LOCKED = (
 )
 LOOK = "Look, then wire"
 LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
+TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
 IN_A_LOOP = "Leave the lidar's cables a loose loop for the whole sweep, then join them to USB and power."
 
@@ -79,10 +80,18 @@ def instructions_text(
     lines += [
         f"## {len(scenes) + 1}. {LOOK}",
         "",
-        LAST + (IN_A_LOOP if scanner.slip_ring is None else THROUGH_RING),
+        LAST + _joined(assembly),
         "",
     ]
     return "\n".join(lines)
+
+
+def _joined(assembly: Assembly) -> str:
+    """What is left to be joined when all parts are together: the leads with a way are joined in their own step."""
+    if assembly.layout.scanner.slip_ring is None:
+        return IN_A_LOOP
+    laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
+    return TO_COMPUTER if laid else THROUGH_RING
 
 
 def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from cad.assembly.assembly import Assembly
 from cad.assembly.steps import steps_of
 from cad.layout.balance.counterweight import Counterweight
 from cad.layout.joints import ALL_SCREWS, Joint, screws
-from cad.layout.names import DECK, LIDAR, LIDAR_BODY
+from cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS
 from cad.parts.part_spec import Step
 from design.arrays import Rotation, Vector
 
@@ -31,7 +31,7 @@ class StepScene:
         there: bodies that stand already, in alphabetical order.
         comes: bodies that it brings.
         against: those of them that come the other way.
-        along: unit vector, rotation frame, from which they come.
+        along: unit vector, rotation frame, from which they come; 0 for leads, which are shown where they are laid.
         R_rot_picture: the frame that stands upright on the bench: the lidar's own, or the rotation frame.
     """
 
@@ -128,6 +128,8 @@ def _way(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tu
     """From where it comes: as the exploded view lifts it, from below where all that stands is above it."""
     lifted = "lidar" if thing == LIDAR else assembly.parts[thing].lifted if thing in assembly.parts else "axis"
     R = assembly.layout.stack.R()
+    if thing == ROTOR_LEADS:
+        return np.zeros(3), np.eye(3)
     if lifted == "lidar":
         return R[:, 2], R
     bar = assembly.layout.counterweight

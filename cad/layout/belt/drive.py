@@ -27,6 +27,7 @@ BUILT = (
     names.SUB_PLATE,
     names.COUNTERWEIGHT,
     names.ALIGNMENT_LINKAGE,
+    names.ROTOR_LEADS,
 )
 STACKED = (
     names.BASE_MOUNT,

@@ -1,0 +1,48 @@
+"""A lead as a solid: a round section along its path, thicker where its joint sits. Millimetres."""
+
+from __future__ import annotations
+
+import cadquery as cq
+import numpy as np
+
+from cad import solids
+from cad.geometry.mesh import mesh_of
+from cad.layout.cables.leads import JOINT, JOINT_WALL, Lead
+from cad.layout.cables.path import Path, Piece
+from cad.layout.names import ROTOR_LEAD
+from cad.solids import building
+from design.errors import BuildError
+
+LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not as round as a bore
+
+
+def lead_solid(lead: Lead) -> cq.Solid:
+    """The bundle of wires between ring and lidar, with the shrink tube over its joint.
+
+    Raises:
+        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
+    """
+    assert lead.path is not None
+    with building(ROTOR_LEAD, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
+        tube: cq.Shape = _tube(lead.path, lead.diameter / 2)
+        joint = lead.path.joint_piece()
+        if joint is not None and joint.length >= JOINT:
+            along = (joint.end - joint.start) / joint.length
+            start = joint.middle - JOINT / 2 * along
+            tube = tube.fuse(solids.cylinder(lead.diameter / 2 + JOINT_WALL, start, along, JOINT))
+        solid = checked(tube)
+        if not mesh_of(solid, *LEAD_CHORDS).is_closed():
+            raise BuildError(f"{ROTOR_LEAD}: mesh: tolerance = {LEAD_CHORDS[0]} mm: the surface is not closed")
+    return solid
+
+
+def _tube(path: Path, half: float) -> cq.Shape:
+    pieces, corners = path.pieces(), np.array(path.corners, dtype=float)
+    wire = cq.Wire.assembleEdges([_edge(piece) for piece in pieces])
+    ring = cq.Wire.makeCircle(half, solids.vector(corners[0]), solids.vector(corners[1] - corners[0]))
+    return cq.Solid.sweep(ring, [], wire)
+
+
+def _edge(piece: Piece) -> cq.Edge:
+    start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
+    return cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)

@@ -1,0 +1,41 @@
+"""The leads between lidar and ring: that each has a way, keeps its bend radius, and has room for its joint. mm.
+
+What they touch, and the beams that they hide, is checked with all other bodies: they are bodies of the assembly.
+"""
+
+from __future__ import annotations
+
+from cad.assembly.assembly import Assembly
+from cad.checks.check import Check, at_least, note
+from cad.layout.cables.leads import JOINT, Lead
+from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
+
+
+def lead_checks(assembly: Assembly) -> list[Check]:
+    """Three values of every lead; one word where there are none to check."""
+    ring = assembly.layout.scanner.slip_ring
+    if not assembly.leads:
+        what = "no ring: the cables of the lidar need a loose loop for the sweep"
+        if ring is not None:
+            what = f"lead_diameter_mm of {ring.name} is not in the catalogue, nor how its leads bend: no way was laid"
+        return [Check("leads", "note", None, None, "", ROTOR_LEADS, f"{ROTOR_LEADS}: {what}")]
+    return [check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}")]
+
+
+def _checks(lead: Lead, where: str) -> list[Check]:
+    if lead.path is None:
+        what = (
+            f"{where}: from the outlet at y = {lead.y:g} mm no way to the ring bends by {lead.radius:g} mm or more and "
+            f"clears all parts with a bundle of {lead.diameter:g} mm: thinner leads, or another azimuth of the cable"
+        )
+        return [Check("lead_bend", "warning", None, lead.radius, "mm", where, what)]
+    joint = lead.path.joint_piece()
+    return [
+        at_least("lead_bend", lead.path.least_radius(), lead.radius, "mm", where, "least bend radius of its middle"),
+        at_least(
+            "lead_joint", 0.0 if joint is None else joint.length, JOINT, "mm", where, "straight piece for its joint"
+        ),
+        note(
+            "lead_length", lead.path.length(), "mm", where, "from the ring's rotor to the jacket of the lidar's cable"
+        ),
+    ]

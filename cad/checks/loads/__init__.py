@@ -1,0 +1,1 @@
+"""What each drive bears, as checks."""

@@ -1,0 +1,154 @@
+"""The leads between lidar and slip ring: where they begin and end on this scanner, and the way that each one takes.
+
+Behind the straight piece that its maker draws, the jacket of the lidar's cable is taken off; its wires go on, bend like
+the leads of the ring, and meet them in a joint on the longest straight piece. Both turn with the lidar: they bend when
+they are laid, and then no more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.path import Path
+from cad.layout.cables.room import Room, room_of
+from cad.layout.cables.way import Ending, short_way
+from cad.layout.direct.loads import JOURNAL_WALL
+from cad.layout.direct.stack import DirectStack
+from cad.layout.layout import Layout
+from design.arrays import Array
+from design.catalogue.products import SlipRing
+
+SAMPLE = 1.5  # mm between the points that stand for a lead that is laid
+BESIDE = 0.25  # between two leads, and a lead and its channel's wall
+ABOVE_CAGE = 1.9  # height of a lead over the lower face of the hub where it leaves through the hub's channel
+WINDOW_BELOW = 8.3  # the hub's lower end: middle of the windows of a hollow shaft
+OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
+HELD = 1.0  # beyond the face that a lead leaves by, and its own radius
+BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
+ASIDE = 15.0  # deg between two azimuths that a ring's lead may leave at
+JOINT = 12.0  # length of a joint: crimps beside each other, and a shrink tube over them
+JOINT_WALL = 0.5  # of the shrink tube over the crimps; of what a lead keeps to all others it leaves a tenth
+
+
+@dataclass(frozen=True, slots=True)
+class Lead:
+    """The lead to one outlet of the lidar.
+
+    Attributes:
+        y: of the outlet in the lidar's frame, which tells it from the others.
+        diameter: of the bundle.
+        radius: least one that it may be bent to.
+        path: its middle from the ring to the lidar, rotation frame at gamma = 0; None where there is no way.
+    """
+
+    y: float
+    diameter: float
+    radius: float
+    path: Path | None
+
+
+def leads_of(layout: Layout) -> tuple[Lead, ...]:
+    """One lead for each outlet of the lidar; none without a ring, or where nobody tells what its leads are like."""
+    scanner = layout.scanner
+    ring, lidar = scanner.slip_ring, scanner.lidar
+    if ring is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
+        return ()
+    numbers = range(len(lidar.cable_y_mm))
+    found: tuple[Lead, ...] = ()
+    # who comes first takes the short way, and may bar it to the others: then they come first, or change places
+    for order, places in product((numbers, numbers[::-1]), repeat=2):
+        leads = _laid(layout, ring, order, places)
+        if not found or _ways(leads) > _ways(found):
+            found = leads
+        if _ways(found) == len(numbers):
+            break
+    return found
+
+
+def _ways(leads: Sequence[Lead]) -> int:
+    return sum(lead.path is not None for lead in leads)
+
+
+def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence[int]) -> tuple[Lead, ...]:
+    """The leads in the order of the outlets, laid in an order, each from its place among those that leave the ring."""
+    assert ring.lead_diameter_mm is not None and ring.lead_bend_radius_mm is not None
+    half, radius, room = ring.lead_diameter_mm / 2, ring.lead_bend_radius_mm, room_of(layout)
+    hub, outlets = layout.stack.hub_radius, layout.scanner.lidar.cable_y_mm
+    leads: dict[int, Lead] = {}
+    for i in order:
+        exits = _exits(layout, ring, places[i], len(outlets))
+        starts = [Ending(np.array(corners), out, OUT, radius, 0.0) for corners, out in exits]
+        starts = [_from_hub(start, hub, half) for start in starts if room.beside_others(start.corners).all()]
+        outlet = _outlet(layout, outlets[i], half)
+        path = short_way(room, starts, outlet, half, radius, hub)
+        if path is None:  # rather in the fan, where its shadow counts, than not at all
+            path = short_way(replace(room, bearings_rad=None), starts, outlet, half, radius, hub)
+        leads[i] = Lead(outlets[i], 2 * half, radius, path)
+        if path is not None:
+            room = _with(room, path, 2 * half + BESIDE / 2)
+    return tuple(leads[i] for i in sorted(leads))
+
+
+def outlet_mm(layout: Layout, y: float, out: float) -> Array:
+    """Point at a distance behind the lidar on the middle of the cable that leaves at a y, shape (3,)."""
+    scanner = layout.scanner
+    lidar, T = scanner.lidar, scanner.angles.T_rot_laser()
+    at = [-lidar.body_mm[0] / 2 - out, y, lidar.cable_z_mm - lidar.optical_height_mm]
+    return np.asarray(layout.stack.R() @ at + T[:3, 3] * 1000)
+
+
+def _outlet(layout: Layout, y: float, half: float) -> Ending:
+    """Behind the straight piece of the lidar's cable."""
+    start = outlet_mm(layout, y, layout.scanner.lidar.cable_straight_mm)
+    return Ending(start[None], -layout.stack.R()[:, 0], BACK, 0.0, half + HELD)
+
+
+def _from_hub(start: Ending, hub: float, half: float) -> Ending:
+    """The same end with its lengths counted from beside the hub."""
+    inside = hub - float(np.hypot(*start.corners[-1, :2]))
+    return replace(start, lengths=tuple(inside + out for out in OUT), held=inside + half + HELD)
+
+
+def _exits(layout: Layout, ring: SlipRing, number: int, count: int) -> Iterator[tuple[Array, Array]]:
+    """Corners from the ring's rotor to where the lead turns outwards, and the direction in which it does."""
+    stack, half, radius = layout.stack, ring.lead_diameter_mm or 0.0, ring.lead_bend_radius_mm or 0.0
+    half /= 2
+    if isinstance(stack, BeltStack):
+        # up the bore and out by its two windows
+        assert ring.rotor is not None
+        middle = stack.hub_bottom - WINDOW_BELOW
+        for sign in (1.0, -1.0) if count == 1 else (1.0 - 2.0 * (number % 2),):
+            low, side = stack.ring_top + ring.rotor.length_mm, sign * (half + BESIDE)
+            yield np.array([[side, 0.0, low], [side, 0.0, middle]]), np.array([sign, 0.0, 0.0])
+        return
+    if stack.bearing is not None:
+        aside = (2 * half + BESIDE) * (number - (count - 1) / 2)
+        inner = stack.shaft_diameter / 2 + JOURNAL_WALL + half + BESIDE
+        points = np.array([[inner, aside, stack.ring_top], [inner, aside, stack.shoulder + ABOVE_CAGE]])
+        yield _turned(points, sum(layout.linkage.cross_azimuths) / 2)
+        return
+    for azimuth in np.radians(np.arange(0.0, 360.0, ASIDE)).tolist():
+        inner = _on_rotor(stack, half)
+        points = np.array([[inner, 0.0, stack.ring_top], [inner, 0.0, stack.ring_top + radius]])
+        yield _turned(points, azimuth)
+
+
+def _on_rotor(stack: DirectStack, half: float) -> float:
+    """Distance from the axis at which a lead leaves the rotor of a through-bore ring."""
+    return stack.ring_bore / 2 + half + BESIDE
+
+
+def _turned(points: Array, azimuth: float) -> tuple[Array, Array]:
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
+
+
+def _with(room: Room, path: Path, apart: float) -> Room:
+    """The room that is left beside a lead."""
+    return replace(room, others=(np.concatenate([path.points(SAMPLE), room.others[0]]), apart))

@@ -1,0 +1,127 @@
+"""A smooth path: straight pieces with an arc of one radius at each corner. Millimetres.
+
+The arcs are tangent to what they join, so the radius is kept by construction: what is too short for it has no path.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.arrays import Array
+
+STRAIGHT = 1e-6  # rad: less is no corner
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One straight piece or arc.
+
+    Attributes:
+        start: shape (3,).
+        middle: on the arc, or halfway along the straight, shape (3,).
+        end: shape (3,).
+        length: along it.
+        straight: whether it is no arc.
+    """
+
+    start: Array
+    middle: Array
+    end: Array
+    length: float
+    straight: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Corners (n, 3) and the radius of the arcs between them."""
+
+    corners: tuple[tuple[float, float, float], ...]
+    radius: float
+
+    def tangents(self) -> Array:
+        """What the arc at each corner takes of both neighbours, 0 at the ends, shape (n,)."""
+        inner = self.radius * np.tan(turns(np.array(self.corners)) / 2)
+        return np.concatenate([[0.0], inner, [0.0]])
+
+    def slack(self) -> float:
+        """Least length that is left of a straight piece between its arcs; below zero there is no such path."""
+        lengths = np.linalg.norm(np.diff(np.array(self.corners), axis=0), axis=1)
+        tangents = self.tangents()
+        return float((lengths - tangents[:-1] - tangents[1:]).min())
+
+    def pieces(self) -> list[Piece]:
+        """Straights and arcs in their order; a straight of no length is left out.
+
+        Raises:
+            ValueError: the corners are too near to each other for the radius.
+        """
+        if self.slack() < -1e-6:
+            raise ValueError(
+                f"radius {self.radius:g} mm: the corners are {-self.slack():.2f} mm too near to each other"
+            )
+        corners, tangents = np.array(self.corners, dtype=float), self.tangents()
+        along = np.diff(corners, axis=0)
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        angles = np.concatenate([[0.0], turns(corners), [0.0]])
+        found, here = [], corners[0]
+        for i, direction in enumerate(along):
+            there = corners[i + 1] - tangents[i + 1] * direction
+            length = float((there - here) @ direction)
+            if length > 1e-6:
+                found.append(Piece(here, (here + there) / 2, there, length, True))
+            here = there
+            if angles[i + 1] > STRAIGHT:
+                here = corners[i + 1] + tangents[i + 1] * along[i + 1]
+                inwards = along[i + 1] - direction
+                inwards /= np.linalg.norm(inwards)
+                depth = self.radius * (1 / math.cos(angles[i + 1] / 2) - 1)
+                middle = corners[i + 1] + depth * inwards
+                found.append(Piece(there, middle, here, float(self.radius * angles[i + 1]), False))
+        return found
+
+    def length(self) -> float:
+        """From end to end."""
+        return sum(piece.length for piece in self.pieces())
+
+    def least_radius(self) -> float:
+        """Of the circles through the ends and the middle of its arcs: what was drawn, not what was asked for."""
+        found = [math.inf]
+        for piece in self.pieces():
+            if not piece.straight:
+                chord = float(np.linalg.norm(piece.end - piece.start))
+                depth = float(np.linalg.norm((piece.start + piece.end) / 2 - piece.middle))
+                found.append(depth / 2 + chord**2 / (8 * depth))
+        return round(min(found), 6)
+
+    def joint_piece(self) -> Piece | None:
+        """The longest straight piece behind the first bend, where hands reach; None where all of it is bent."""
+        pieces = self.pieces()
+        bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
+        return max((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda p: p.length, default=None)
+
+    def points(self, step: float) -> Array:
+        """Points along it, no further apart than a step, shape (n, 3)."""
+        found = []
+        for piece in self.pieces():
+            share = np.linspace(0.0, 1.0, max(2, math.ceil(piece.length / step) + 1))[:, None]
+            if piece.straight:
+                found.append(piece.start + share * (piece.end - piece.start))
+                continue
+            # on the circle: start and end seen from its centre, turned from one to the other
+            chord = (piece.start + piece.end) / 2 - piece.middle
+            centre = piece.middle + self.radius * chord / np.linalg.norm(chord)
+            angle, one, other = piece.length / self.radius, piece.start - centre, piece.end - centre
+            found.append(centre + (np.sin((1 - share) * angle) * one + np.sin(share * angle) * other) / math.sin(angle))
+        return np.concatenate(found)
+
+
+def turns(corners: Array) -> Array:
+    """By how much a polyline turns at each inner corner [rad], shape (n - 2,)."""
+    along = np.diff(corners, axis=0)
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    cosine = np.einsum("ij,ij->i", along[:-1], along[1:])
+    sine = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
+    return np.asarray(np.arctan2(sine, cosine))

@@ -1,0 +1,168 @@
+"""Where a lead may run on the rotor: beside all that turns with it, above all that stands still, out of the fan.
+
+Rotation frame at gamma = 0, mm. Distances from convex shapes are those from their planes: never more than the true one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from cad.layout.balance.counterweight import LONGER, Counterweight
+from cad.layout.belt.stack import BeltStack
+from cad.layout.deck import FOOT_THICKNESS, Deck
+from cad.layout.envelope import Box, box_corners, envelope_of
+from cad.layout.layout import Layout
+from cad.layout.linkage import neck_corners
+from cad.screws import SCREWS
+from design.arrays import Array, Mask
+from design.catalogue.products import Lidar
+
+BAR_SCREW = SCREWS["M4"]
+BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
+HUB_SIDES = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A convex shape: its planes (n, 4), outwards, the sphere around it, and whether channels are cut from it."""
+
+    planes: Array
+    middle: Array
+    reach: float
+    carved: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """What a lead on the rotor must stay clear of.
+
+    Attributes:
+        shapes: convex shapes that turn.
+        channels: cut from the neck, from their lower ends upwards, in the laser frame.
+        R_rot_laser: shape (3, 3).
+        bearings_rad: first and last beam; None where a lead may stand in the fan.
+        hidden_half_angle: of the cone about -z in which no beam sees anything anyway [rad].
+        floor: height of all that stands still under the rotor.
+        deck: that the rotor turns over.
+        others: middles of leads that run already, shape (n, 3), and how far to keep from them.
+    """
+
+    shapes: tuple[Shape, ...]
+    channels: tuple[Box, ...]
+    R_rot_laser: Array
+    bearings_rad: tuple[float, float] | None
+    hidden_half_angle: float
+    floor: float
+    deck: Deck
+    others: tuple[Array, float]
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        room = half + gap
+        clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room) & ~self._in_fan(points, half)
+        for shape in self.shapes:  # the planes of a shape are asked for what its sphere does not clear
+            near = np.flatnonzero(clear)
+            near = near[np.linalg.norm(points[near] - shape.middle, axis=1) < shape.reach + room]
+            beside = (points[near] @ shape.planes[:, :3].T + shape.planes[:, 3]).max(axis=1) > room
+            clear[near] = beside | self._carved(points[near], room) if shape.carved else beside
+        return np.asarray(clear & self.beside_others(points))
+
+    def beside_others(self, points: Array) -> Mask:
+        """Whether each point, shape (n, 3), is far enough from the leads that run already, shape (n,)."""
+        middles, apart = self.others
+        near = np.linalg.norm(points[:, None] - middles, axis=2).min(axis=1, initial=np.inf)
+        return np.asarray(near > apart)
+
+    def _carved(self, points: Array, room: float) -> Mask:
+        """In the channels that the linkage leaves free for the cables and for putting in the lidar."""
+        at = points @ self.R_rot_laser
+        inside = [
+            (at > np.array(low) + room).all(axis=1) & (at[:, :2] < np.array(high[:2]) - room).all(axis=1)
+            for low, high in self.channels
+        ]
+        return np.asarray(np.any(inside, axis=0))
+
+    def _over_deck(self, points: Array, room: float) -> Mask:
+        """Over the foot of the mount in every position of the turn."""
+        normal = np.array(self.deck.normal)
+        lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + room)
+
+    def _in_fan(self, points: Array, half: float) -> Mask:
+        """Where a beam would meet the lead: lead and beams turn together."""
+        if self.bearings_rad is None:
+            return np.zeros(len(points), dtype=bool)
+        x, y, z = (points @ self.R_rot_laser).T
+        wide = (half + BEAM) / np.maximum(np.hypot(x, y), half + BEAM)
+        first, last = self.bearings_rad
+        bearing = (np.arctan2(y, x) - first + wide) % (2 * math.pi)
+        distance = np.linalg.norm(points, axis=1)
+        polar = np.arccos(np.clip(-points[:, 2] / distance, -1.0, 1.0)) + np.arcsin(np.minimum(1.0, half / distance))
+        seen = (np.abs(z) < half + BEAM) & (bearing < last - first + 2 * wide)
+        return np.asarray(seen & (polar > self.hidden_half_angle))
+
+
+def room_of(layout: Layout) -> Room:
+    """The room on the rotor of one scanner, no lead in it yet."""
+    stack, p = layout.stack, layout.linkage
+    R = stack.R()
+    envelope = envelope_of(layout.scanner.lidar, stack.sub_plate)
+    boxes = [envelope.body, envelope.plate, envelope.under]
+    corners = [box_corners(box) @ R.T for box in (*boxes, *_stubs(layout.scanner.lidar))]
+    corners.append(_hub(stack.hub_radius, stack.shoulder, -stack.h))
+    if isinstance(layout.counterweight, Counterweight):
+        corners.extend(_bar(layout.counterweight))
+    bearings = layout.scanner.lidar.bearings_rad()
+    return Room(
+        shapes=(*(_shape(points) for points in corners), _shape(neck_corners(p, 0), carved=True)),
+        channels=envelope.cables,
+        R_rot_laser=R,
+        bearings_rad=(float(bearings.min()), float(bearings.max())),
+        hidden_half_angle=stack.sure_half_angle,
+        floor=_floor(layout),
+        deck=layout.deck,
+        others=(np.zeros((0, 3)), 0.0),
+    )
+
+
+def _shape(corners: Array, carved: bool = False) -> Shape:
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
+
+
+def _floor(layout: Layout) -> float:
+    """Height over all that stands still, or is as wide, below the hub."""
+    stack = layout.stack
+    if isinstance(stack, BeltStack):
+        return stack.pulley_top
+    return stack.ring_top if stack.bearing is None else stack.cage_top
+
+
+def _stubs(lidar: Lidar) -> list[Box]:
+    """The straight pieces of its cables, in the laser frame."""
+    half, back, z = lidar.cable_diameter_mm / 2, -lidar.body_mm[0] / 2, lidar.cable_z_mm - lidar.optical_height_mm
+    return [
+        ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
+    ]
+
+
+def _hub(radius: float, low: float, high: float) -> Array:
+    turn = 2 * math.pi * np.arange(HUB_SIDES) / HUB_SIDES
+    around = radius / math.cos(math.pi / HUB_SIDES)
+    ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.concatenate([np.column_stack([ring, np.full(HUB_SIDES, z)]) for z in (low, high)])
+
+
+def _bar(bar: Counterweight) -> list[Array]:
+    """Corners of the room of a counterweight on its ear, and of the heads of its screws wherever it slides."""
+    ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
+    above, below = ear.high + bar.section[1], ear.low - BAR_SCREW.head_height
+    wide = BAR_SCREW.head_diameter / 2
+    boxes: list[Box] = [((0.0, -half, ear.low), (max(bar.end + LONGER, ear.end), half, above))]
+    boxes += [((first - wide, -wide, below), (last + wide, wide, ear.low)) for first, last in ear.slots]
+    c, s = math.cos(ear.azimuth), math.sin(ear.azimuth)
+    return [box_corners(box) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T for box in boxes]

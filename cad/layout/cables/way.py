@@ -1,0 +1,207 @@
+"""A short way of a lead through the room on the rotor, as the corners of a smooth path.
+
+Straight pieces between the points of a lattice about the axis make the graph; what is found is a short chain of
+them whose corners leave room for their arcs. Each piece pays for at most half of the arc at either end, so that any
+chain of allowed neighbours is a path.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cad.layout.cables.path import Path
+from cad.layout.cables.room import Room
+from design.arrays import Array
+
+SAMPLE = 3.0  # mm between two points that are looked at
+AZIMUTHS = 24
+FROM_HUB = 4.0  # first radius of the lattice
+STEP = 12.0  # of its radii and heights
+BEYOND = 12.0  # of the furthest end, where the lattice stops
+REACH = 40.0  # of a piece between two points of the lattice
+GREED = 1.2  # how much the length that is left counts: a way a fifth longer at most, found in half the time
+ARRIVALS = 6  # at a point from which one goes on: no way of 28 was lost or longer than with all of them
+SHARPEST = math.radians(125.0)
+GAP = 0.6  # between a lead and what it passes
+ROUNDING = 0.3  # more along the straight pieces
+Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and the length that an arc may take of it
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """A stiff end of a lead: points that it must pass, the last of them with a free length behind.
+
+    Attributes:
+        corners: from the very end on, shape (k, 3); what follows goes on along `direction`.
+        direction: unit vector, shape (3,).
+        lengths: of the piece behind the last corner that may be tried.
+        used: what the arc at the last corner takes of that piece.
+        held: length of that piece along which it may be near: it leaves its device there.
+    """
+
+    corners: Array
+    direction: Array
+    lengths: tuple[float, ...]
+    used: float
+    held: float
+
+    def tips(self) -> Array:
+        """Where the free part of the lead may begin, shape (m, 3)."""
+        return np.asarray(self.corners[-1] + np.array(self.lengths)[:, None] * self.direction)
+
+
+def short_way(
+    room: Room, starts: Sequence[Ending], goal: Ending, half: float, radius: float, hub: float
+) -> Path | None:
+    """A short path from one of some ends to the goal, within GREED of the shortest; None where there is none.
+
+    Args:
+        room: that it runs through.
+        starts: ends at the ring; any of them will do.
+        goal: the end at the lidar.
+        half: radius of the lead.
+        radius: that it may be bent to.
+        hub: radius of the hub.
+    """
+    ends = [(start, tip) for start in starts for tip in range(len(start.lengths))]
+    ends = [(start, tip) for start, tip in ends if _clear(room, start, tip, half)]
+    goals = [tip for tip in range(len(goal.lengths)) if _clear(room, goal, tip, half)]
+    if not ends or not goals:
+        return None
+    first, last = np.array([start.tips()[tip] for start, tip in ends]), goal.tips()[goals]
+    lattice = _lattice(room.floor + half + GAP + ROUNDING, hub, np.concatenate([first, last]))
+    lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
+    graph = Graph(room, half, radius, np.concatenate([first, lattice, last]))
+    chain = graph.chain(
+        {i: (start.direction, start.lengths[tip] - start.used) for i, (start, tip) in enumerate(ends)},
+        {
+            i: (-goal.direction, goal.lengths[tip] - goal.used)
+            for i, tip in enumerate(goals, start=len(first) + len(lattice))
+        },
+    )
+    if not chain:
+        return None
+    corners = np.concatenate([ends[chain[0]][0].corners, graph.points[chain], goal.corners[::-1]])
+    return Path(tuple((float(x), float(y), float(z)) for x, y, z in corners), radius)
+
+
+def _lattice(low: float, hub: float, ends: Array) -> Array:
+    """Points about the axis, from beside the hub to beyond the ends, shape (n, 3)."""
+    turn = 2 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    radius = np.arange(hub + FROM_HUB, float(np.hypot(ends[:, 0], ends[:, 1]).max()) + BEYOND, STEP)
+    height = np.arange(low + 0.5, float(ends[:, 2].max()) + BEYOND, STEP)
+    t, r, z = (a.ravel() for a in np.meshgrid(turn, radius, height, indexing="ij"))
+    return np.column_stack([r * np.cos(t), r * np.sin(t), z])
+
+
+def _clear(room: Room, end: Ending, tip: int, half: float) -> bool:
+    """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
+    first, last = min(end.held, end.lengths[tip]), end.lengths[tip]
+    along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
+    return bool(room.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
+
+    Attributes:
+        room: that the lead runs through.
+        half: radius of the lead.
+        radius: of the arcs between two pieces.
+        points: first those at the ring, last those at the lidar.
+    """
+
+    room: Room
+    half: float
+    radius: float
+    points: Array
+    _joined: dict[int, tuple[NDArray[np.int64], Array, Array]] = field(default_factory=dict, init=False, repr=False)
+
+    def chain(self, starts: dict[int, Stiff], goals: dict[int, Stiff]) -> list[int]:
+        """Points of a short chain of pieces from a start to a goal; empty where there is none.
+
+        Args:
+            starts: first points, the direction of the stiff piece that ends there, and its length left for an arc.
+            goals: last points, and the same of the stiff piece that begins there.
+        """
+        left = GREED * np.linalg.norm(self.points[:, None] - self.points[list(goals)], axis=2).min(axis=1)
+        # a piece is known by its two points; before the first one stands the stiff end
+        best: dict[tuple[int, int], float] = {}
+        came: dict[tuple[int, int], tuple[int, int]] = {}
+        arrived: dict[int, int] = {}
+        queue = [(float(left[i]), 0.0, -1, i) for i in starts]
+        heapq.heapify(queue)
+        while queue:
+            _, length, before, here = heapq.heappop(queue)
+            if best.get((before, here), math.inf) < length:
+                continue
+            if here in goals and before >= 0:
+                return _back(came, (before, here))
+            arrived[here] = arrived.get(here, 0) + 1
+            if arrived[here] > ARRIVALS:
+                continue
+            stiff = starts[here] if before < 0 else self._piece(before, here)
+            for there, more in self._onwards(here, stiff, goals):
+                found = length + more
+                if found < best.get((here, there), math.inf) - 1e-9:
+                    best[here, there], came[here, there] = found, (before, here)
+                    heapq.heappush(queue, (found + float(left[there]), found, here, there))
+        return []
+
+    def _piece(self, start: int, end: int) -> Stiff:
+        along = self.points[end] - self.points[start]
+        length = float(np.linalg.norm(along))
+        return along / length, length / 2
+
+    def _onwards(self, here: int, stiff: Stiff, goals: dict[int, Stiff]) -> list[tuple[int, float]]:
+        """The points that one may go on to from a piece, and how far they are."""
+        others, along, lengths = self._pieces_at(here)
+        direction, left = stiff
+        fits = _arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2)
+        for goal, (onto, after) in goals.items():
+            at = np.flatnonzero(others == goal)
+            fits[at] &= _arc(self.radius, along[at] @ onto) <= np.minimum(after, lengths[at] / 2)
+        chosen = np.flatnonzero(fits)
+        inside = self.points[here] + _inwards(self.radius, direction, along[chosen])
+        chosen = chosen[self.room.free(inside, self.half, GAP)]
+        return [(int(others[i]), float(lengths[i])) for i in chosen]
+
+    def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
+        """Points that a free straight piece leads to from one, directions (m, 3) and lengths (m,)."""
+        if here not in self._joined:
+            along = self.points - self.points[here]
+            lengths = np.linalg.norm(along, axis=1)
+            others = np.flatnonzero((lengths > self.radius) & (lengths < REACH))
+            share = np.linspace(0.0, 1.0, math.ceil(REACH / SAMPLE) + 1)[1:, None, None]
+            samples = self.points[here] + share * along[others]
+            free = self.room.free(samples.reshape(-1, 3), self.half, GAP + ROUNDING).reshape(len(share), -1).all(axis=0)
+            others = others[free]
+            self._joined[here] = others, along[others] / lengths[others, None], lengths[others]
+        return self._joined[here]
+
+
+def _back(came: dict[tuple[int, int], tuple[int, int]], last: tuple[int, int]) -> list[int]:
+    chain = [last[1]]
+    while last[0] >= 0:
+        chain.append(last[0])
+        last = came[last]
+    return chain[::-1]
+
+
+def _arc(radius: float, cosine: Array) -> Array:
+    """What an arc takes of the pieces that it joins, without end where they turn back."""
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.where(angle < SHARPEST, radius * np.tan(np.minimum(angle, SHARPEST) / 2), np.inf)
+
+
+def _inwards(radius: float, direction: Array, along: Array) -> Array:
+    """From a corner to the middle of its arc, for each way on (m, 3)."""
+    half = np.arccos(np.clip(along @ direction, -1.0, 1.0)) / 2
+    return (along - direction) * (radius * (1 / np.cos(half) - 1) / np.maximum(2 * np.sin(half), 1e-9))[:, None]

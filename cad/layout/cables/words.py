@@ -1,0 +1,48 @@
+"""How the leads are laid, in words: where each leaves the ring, how long it is, where its joint sits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.leads import JOINT, Lead
+from cad.layout.layout import Layout
+
+SPARE = 15.0  # mm more than its way, so that a joint can be made once again
+
+
+def leads_words(layout: Layout, leads: Sequence[Lead]) -> str:
+    """The words of the step."""
+    straight = layout.scanner.lidar.cable_straight_mm
+    laid = [lead for lead in leads if lead.path is not None]
+    said = [
+        f"Take the jacket of the lidar's cable off {straight:g} mm behind the lidar: that much stays straight, and the "
+        "bare wires behind it go on as one bundle with the leads of the ring, the way that the picture shows.",
+        *(_one(layout, lead) for lead in laid),
+        f"Crimp the wires of each bundle side by side on its longest straight piece, with {JOINT:g} mm of shrink tube "
+        "over all of them; the wiring diagram tells which belong together. A cable tie around bundle and neck on each "
+        "side of the joint takes the pull off it.",
+    ]
+    missing = [lead for lead in leads if lead.path is None]
+    said += [
+        f"For the cable that leaves the lidar at y = {lead.y:g} mm no way was found: see `lead_bend` in `checks.json`."
+        for lead in missing
+    ]
+    return " ".join(said)
+
+
+def _one(layout: Layout, lead: Lead) -> str:
+    assert lead.path is not None
+    x, y, _ = lead.path.corners[2]
+    azimuth = math.degrees(math.atan2(y, x)) % 360.0
+    out = "by the shaft's window" if isinstance(layout.stack, BeltStack) else "under the hub"
+    if layout.stack.bearing is not None:
+        out = "by the channel of the hub"
+    joint = lead.path.joint_piece()
+    where = "" if joint is None else f", its joint {math.dist(joint.middle, lead.path.corners[-1]):.0f} mm from there"
+    return (
+        f"The cable at y = {lead.y:g} mm: the bundle leaves {out} at {azimuth:.0f} deg (counter-clockwise from above, "
+        f"90 at the index), is {lead.path.length():.0f} mm long to the jacket{where}, and is bent by no less than "
+        f"{lead.radius:g} mm; cut it {lead.path.length() + SPARE:.0f} mm long."
+    )

@@ -1,0 +1,79 @@
+"""The leads as bodies: they touch nothing, hide no beam, and a bad way is seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cad.assembly.make import make_parts
+from cad.assembly.shadow import shadow_of, triangles_of
+from cad.assembly.steps import steps_of
+from cad.assembly.tube import lead_solid
+from cad.checks.clearance import clearance_checks
+from cad.checks.leads import lead_checks
+from cad.layout.cables.leads import JOINT, JOINT_WALL
+from cad.layout.cables.path import Path
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+
+def scanner_for(alpha, beta):
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=alpha, beta_laser=beta),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        slip_ring="UH1256-02-0610-06S",
+    )
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+@pytest.fixture(scope="module")
+def lying():
+    return make_parts(scanner_for(90, 0))
+
+
+def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):
+    checks = [*lead_checks(lying), *clearance_checks(lying)]
+    assert [check.message for check in checks if check.severity not in ("pass", "note")] == []
+    assert [check.kind for check in checks].count("lead_bend") == 2
+
+
+def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
+    for number, lead in enumerate(lying.leads, start=1):
+        half, wide = lead.diameter / 2, lead.diameter / 2 + JOINT_WALL
+        wanted = np.pi * (
+            half**2 * (lead.path.length() - JOINT) + wide**2 * JOINT
+        )  # Pappus: the middle is the centroid
+        assert lying.bought[f"rotor_lead_{number}"].Volume() == pytest.approx(wanted, rel=1e-4)
+
+
+def test_a_lead_straight_through_the_linkage_is_seen(lying):
+    first = lying.leads[0]
+    short = Path((first.path.corners[0], first.path.corners[-1]), first.radius)
+    bad = replace(lying, bought=lying.bought | {"rotor_lead_1": lead_solid(replace(first, path=short))})
+    (found,) = [check for check in clearance_checks(bad) if check.kind == "interference"]
+    assert found.severity == "error" and "rotor_lead_1" in found.where and found.value > 10
+
+
+def test_no_beam_meets_a_lead_that_was_not_hidden_before(lying):
+    triangles = triangles_of(lying)
+    assert {"rotor_lead_1", "rotor_lead_2"} <= triangles.keys()
+    without = {name: corners for name, corners in triangles.items() if not name.startswith("rotor_lead")}
+    scanner, turning = lying.layout.scanner, lying.turning()
+    hidden, before = (shadow_of(scanner, each, turning).hidden() for each in (triangles, without))
+    assert float(np.sum(hidden >= 1.0)) == float(np.sum(before >= 1.0))
+
+
+def test_no_way_is_told_with_its_numbers(lying):
+    blocked = replace(lying, leads=(replace(lying.leads[0], path=None, radius=32.0),))
+    (check,) = lead_checks(blocked)
+    assert check.severity == "warning" and check.limit == 32.0 and "y = -15 mm" in check.message
+
+
+def test_the_last_step_tells_where_each_lead_runs(lying):
+    thing, step = steps_of(lying)[-1]
+    assert thing == "rotor_leads"
+    for lead in lying.leads:
+        assert f"is {lead.path.length():.0f} mm long" in step.words

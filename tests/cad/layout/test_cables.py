@@ -1,0 +1,98 @@
+"""Leads between lidar and ring: paths that keep their radius, and ways through the room on the rotor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cad.layout.cables.leads import leads_of, outlet_mm
+from cad.layout.cables.path import Path
+from cad.layout.cables.room import room_of
+from cad.layout.layout import layout_of
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
+
+BORE, CAPSULE = "UH1256-02-0610-06S", "SRC022A-6"
+SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a hollow shaft
+    "upright": ((0, 0, 0, 0), "UTM-30LX", BORE),
+    "lying": ((0, 0, 90, 0), "UTM-30LX", BORE),
+    "bearing": ((-41, 56, 30, -90), "UTM-30LX", "SNU11-P0210"),
+    "belt": ((0, 19, 84, 41), "URG-04LX", CAPSULE),
+}
+
+
+def layout_for(setting, **of_ring):
+    (alpha_rot, beta_rot, alpha, beta), lidar, ring = SETTINGS[setting]
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
+        sensor=lidar,
+        servo="MX-64R",
+        slip_ring=ring,
+    )
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    return layout_of(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update=of_ring)))
+
+
+def bend_radii(points):
+    """Of the circles through neighbours: side lengths over four times the area (Heron)."""
+    a, b, c = points[:-2], points[1:-1], points[2:]
+    sides = [np.linalg.norm(q - p, axis=1) for p, q in ((a, b), (b, c), (a, c))]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.prod(sides, axis=0) / (4 * np.maximum(area, 1e-12))
+
+
+def test_a_path_keeps_its_radius_and_is_as_long_as_its_points():
+    path = Path(((0, 0, 0), (0, 0, 30), (40, 0, 30), (40, 30, 60), (0, 40, 60)), 7.0)
+    points = path.points(0.05)
+    points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])]
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(path.length(), abs=1e-3)
+    assert bend_radii(points[::4]).min() == pytest.approx(7.0, rel=1e-3)
+    assert path.least_radius() == 7.0
+    np.testing.assert_allclose(points[[0, -1]], np.array(path.corners)[[0, -1]])
+
+
+def test_what_is_too_short_for_its_radius_has_no_path():
+    with pytest.raises(ValueError, match=r"4\.00 mm too near"):
+        Path(((0, 0, 0), (0, 0, 10), (10, 0, 10), (10, 0, 30)), 7.0).pieces()
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_every_lead_leaves_the_ring_and_meets_its_cable_in_line(setting):
+    layout = layout_for(setting)
+    lidar, stack = layout.scanner.lidar, layout.stack
+    leads = leads_of(layout)
+    assert [lead.y for lead in leads] == list(lidar.cable_y_mm)
+    for lead in leads:
+        corners = np.array(lead.path.corners)
+        np.testing.assert_allclose(corners[-1], outlet_mm(layout, lead.y, lidar.cable_straight_mm))
+        last = corners[-1] - corners[-2]
+        np.testing.assert_allclose(last / np.linalg.norm(last), stack.R()[:, 0], atol=1e-9)
+        assert corners[0, 2] >= stack.ring_top and np.allclose(corners[0, :2], corners[1, :2])
+        assert lead.path.slack() > -1e-6
+        assert lead.path.least_radius() >= layout.scanner.slip_ring.lead_bend_radius_mm
+    one, *others = [lead.path.points(0.5) for lead in leads]
+    for other in others:
+        assert np.linalg.norm(one[:, None] - other, axis=2).min() > leads[0].diameter
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_a_lead_turns_above_all_that_stands_still(setting):
+    layout = layout_for(setting)
+    room = room_of(layout)
+    for lead in leads_of(layout):
+        points = lead.path.points(1.0)
+        outside = points[np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + lead.diameter]
+        assert outside[:, 2].min() > room.floor + lead.diameter / 2
+        assert room.free(outside[3:-6], lead.diameter / 2, 0.4).all()
+
+
+def test_where_no_way_is_wide_enough_there_is_none():
+    assert [lead.path for lead in leads_of(layout_for("upright", lead_bend_radius_mm=60.0))] == [None, None]
+
+
+def test_without_ring_or_facts_nothing_is_laid():
+    assert leads_of(layout_for("upright", lead_diameter_mm=None)) == ()
+    layout = layout_for("upright")
+    assert leads_of(replace(layout, scanner=replace(layout.scanner, slip_ring=None))) == ()
