@@ -123,7 +123,8 @@ def turned(
         forces = share[:, None] * (force / share.sum() + np.cross(np.linalg.solve(inertia, moment), arms))
         text += ["*STEP", "*STATIC", "*CLOAD, OP=NEW"]
         text += [f"{n + 1}, {axis + 1}, {f[axis]:.9g}" for n, f in zip(nodes, forces, strict=True) for axis in range(3)]
-        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY:.6f}, {down[0]:.9f}, {down[1]:.9f}, {down[2]:.9f}"]
+        along = ", ".join(f"{share:.9f}" for share in down)
+        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY:.6f}, {along}"]
         text += ["*NODE PRINT, NSET=SEAT", "U", "*END STEP"]
     (folder / "part.inp").write_text("\n".join(text) + "\n", encoding="ascii")
     _run(["ccx", "-i", "part"], folder)
