@@ -10,7 +10,7 @@ import cadquery as cq
 from cad.assembly.bought import BodySpec
 from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import PrintPose, print_pose
-from cad.layout.cables.leads import Lead
+from cad.layout.cables.leads import RotorLead
 from cad.layout.layout import Layout
 from cad.parts.part_spec import Colour, PartSpec
 
@@ -33,7 +33,7 @@ class Assembly:
     bodies: dict[str, BodySpec]
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
-    leads: tuple[Lead, ...] = ()
+    leads: tuple[RotorLead, ...] = ()
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
 

@@ -19,7 +19,7 @@ from cad.assembly.tube import LEAD_CHORDS, lead_solid
 from cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from cad.layout import names
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import Lead
+from cad.layout.cables.leads import RotorLead
 from cad.layout.direct.stack import DirectStack
 from cad.layout.layout import Layout
 from cad.parts.part_spec import STEEL, Colour
@@ -66,7 +66,7 @@ class BodySpec:
         return self.frame != "servo"
 
 
-def bought_of(layout: Layout, leads: Sequence[Lead] = ()) -> list[BodySpec]:
+def bought_of(layout: Layout, leads: Sequence[RotorLead] = ()) -> list[BodySpec]:
     """The bodies of everything that one scanner is bought with, and of the leads that join lidar and ring."""
     stack = layout.stack
     drive = _of_belt(stack) if isinstance(stack, BeltStack) else _of_direct(layout, stack)
@@ -130,8 +130,9 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
     makes = {
         names.LIDAR_BODY: partial(draw.lidar_body, lidar),
         names.LIDAR_WINDOW: partial(draw.lidar_window, lidar),
-        names.LIDAR_CAP: partial(draw.lidar_cap, lidar),
     }
+    if lidar.window_z_mm[1] < lidar.body_mm[2]:  # else the window reaches to the top
+        makes[names.LIDAR_CAP] = partial(draw.lidar_cap, lidar)
     for i, y in enumerate(lidar.cable_y_mm, start=1):
         makes[f"{names.LIDAR_CABLE}_{i}"] = partial(draw.lidar_cable, lidar, y)
     for name, make in makes.items():
@@ -146,7 +147,7 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
         )
 
 
-def _of_leads(leads: Sequence[Lead]) -> Iterator[BodySpec]:
+def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
     """Those that have a way."""
     for i, lead in enumerate(leads, start=1):
         if lead.path is not None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cad.assembly.assembly import Assembly
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import Lead
+from cad.layout.cables.leads import RotorLead
 from cad.layout.cables.words import leads_words
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
@@ -46,7 +46,7 @@ LEADS_TITLE = "Leads of the lidar to the ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
 CAPSULE_STEP = Step(
     "Capsule into the tower",
-    "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
+    "RotorLead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
     f"below until the soft tube sits in the shaft. {screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
     "turned by hand, the shaft takes the rotor along without slipping",
 )
@@ -58,7 +58,7 @@ def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
     return sorted(steps.items(), key=lambda item: assembly.layout.drive.built.index(item[0]))
 
 
-def _of_bought(layout: Layout, leads: Sequence[Lead]) -> dict[str, Step]:
+def _of_bought(layout: Layout, leads: Sequence[RotorLead]) -> dict[str, Step]:
     steps = {LIDAR: LIDAR_STEP}
     if layout.scanner.slip_ring is not None:
         steps[RING] = CAPSULE_STEP if isinstance(layout.stack, BeltStack) else RING_STEP

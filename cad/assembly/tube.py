@@ -7,8 +7,8 @@ import numpy as np
 
 from cad import solids
 from cad.geometry.mesh import mesh_of
-from cad.layout.cables.leads import JOINT, JOINT_WALL, Lead
-from cad.layout.cables.path import Path, Piece
+from cad.layout.cables.leads import JOINT, JOINT_WALL, RotorLead
+from cad.layout.cables.path import Path, PathPiece
 from cad.layout.names import ROTOR_LEAD
 from cad.solids import building
 from design.errors import BuildError
@@ -16,7 +16,7 @@ from design.errors import BuildError
 LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not as round as a bore
 
 
-def lead_solid(lead: Lead) -> cq.Solid:
+def lead_solid(lead: RotorLead) -> cq.Solid:
     """The bundle of wires between ring and lidar, with the shrink tube over its joint.
 
     Raises:
@@ -43,6 +43,6 @@ def _tube(path: Path, half: float) -> cq.Shape:
     return cq.Solid.sweep(ring, [], wire)
 
 
-def _edge(piece: Piece) -> cq.Edge:
+def _edge(piece: PathPiece) -> cq.Edge:
     start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
     return cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)

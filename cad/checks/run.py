@@ -15,11 +15,11 @@ from cad.checks.beams import beam_checks
 from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
 from cad.checks.deflection import deflection_checks
-from cad.checks.leads import lead_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
+from cad.checks.rotor_leads import lead_checks
 from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
 from design.scanner import Scanner

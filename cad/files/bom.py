@@ -200,7 +200,7 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
         )
         ties = 2 * len(scanner.lidar.cable_y_mm)
         note = "on both sides of each joint; price unknown"
-        yield BomItem("consumable", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
+        yield BomItem("wiring", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.path import Path
-from cad.layout.cables.room import Room, room_of
+from cad.layout.cables.room import RotorRoom, room_of
 from cad.layout.cables.way import Ending, short_way
 from cad.layout.direct.loads import JOURNAL_WALL
 from cad.layout.direct.stack import DirectStack
@@ -37,7 +37,7 @@ JOINT_WALL = 0.5  # of the shrink tube over the crimps; of what a lead keeps to 
 
 
 @dataclass(frozen=True, slots=True)
-class Lead:
+class RotorLead:
     """The lead to one outlet of the lidar.
 
     Attributes:
@@ -53,14 +53,14 @@ class Lead:
     path: Path | None
 
 
-def leads_of(layout: Layout) -> tuple[Lead, ...]:
+def leads_of(layout: Layout) -> tuple[RotorLead, ...]:
     """One lead for each outlet of the lidar; none without a ring, or where nobody tells what its leads are like."""
     scanner = layout.scanner
     ring, lidar = scanner.slip_ring, scanner.lidar
     if ring is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
         return ()
     numbers = range(len(lidar.cable_y_mm))
-    found: tuple[Lead, ...] = ()
+    found: tuple[RotorLead, ...] = ()
     # who comes first takes the short way, and may bar it to the others: then they come first, or change places
     for order, places in product((numbers, numbers[::-1]), repeat=2):
         leads = _laid(layout, ring, order, places)
@@ -71,16 +71,16 @@ def leads_of(layout: Layout) -> tuple[Lead, ...]:
     return found
 
 
-def _ways(leads: Sequence[Lead]) -> int:
+def _ways(leads: Sequence[RotorLead]) -> int:
     return sum(lead.path is not None for lead in leads)
 
 
-def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence[int]) -> tuple[Lead, ...]:
+def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence[int]) -> tuple[RotorLead, ...]:
     """The leads in the order of the outlets, laid in an order, each from its place among those that leave the ring."""
     assert ring.lead_diameter_mm is not None and ring.lead_bend_radius_mm is not None
     half, radius, room = ring.lead_diameter_mm / 2, ring.lead_bend_radius_mm, room_of(layout)
     hub, outlets = layout.stack.hub_radius, layout.scanner.lidar.cable_y_mm
-    leads: dict[int, Lead] = {}
+    leads: dict[int, RotorLead] = {}
     for i in order:
         exits = _exits(layout, ring, places[i], len(outlets))
         starts = [Ending(np.array(corners), out, OUT, radius, 0.0) for corners, out in exits]
@@ -89,7 +89,7 @@ def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence
         path = short_way(room, starts, outlet, half, radius, hub)
         if path is None:  # rather in the fan, where its shadow counts, than not at all
             path = short_way(replace(room, bearings_rad=None), starts, outlet, half, radius, hub)
-        leads[i] = Lead(outlets[i], 2 * half, radius, path)
+        leads[i] = RotorLead(outlets[i], 2 * half, radius, path)
         if path is not None:
             room = _with(room, path, 2 * half + BESIDE / 2)
     return tuple(leads[i] for i in sorted(leads))
@@ -149,6 +149,6 @@ def _turned(points: Array, azimuth: float) -> tuple[Array, Array]:
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
 
 
-def _with(room: Room, path: Path, apart: float) -> Room:
+def _with(room: RotorRoom, path: Path, apart: float) -> RotorRoom:
     """The room that is left beside a lead."""
     return replace(room, others=(np.concatenate([path.points(SAMPLE), room.others[0]]), apart))

@@ -16,7 +16,7 @@ STRAIGHT = 1e-6  # rad: less is no corner
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class PathPiece:
     """One straight piece or arc.
 
     Attributes:
@@ -52,7 +52,7 @@ class Path:
         tangents = self.tangents()
         return float((lengths - tangents[:-1] - tangents[1:]).min())
 
-    def pieces(self) -> list[Piece]:
+    def pieces(self) -> list[PathPiece]:
         """Straights and arcs in their order; a straight of no length is left out.
 
         Raises:
@@ -71,7 +71,7 @@ class Path:
             there = corners[i + 1] - tangents[i + 1] * direction
             length = float((there - here) @ direction)
             if length > 1e-6:
-                found.append(Piece(here, (here + there) / 2, there, length, True))
+                found.append(PathPiece(here, (here + there) / 2, there, length, True))
             here = there
             if angles[i + 1] > STRAIGHT:
                 here = corners[i + 1] + tangents[i + 1] * along[i + 1]
@@ -79,7 +79,7 @@ class Path:
                 inwards /= np.linalg.norm(inwards)
                 depth = self.radius * (1 / math.cos(angles[i + 1] / 2) - 1)
                 middle = corners[i + 1] + depth * inwards
-                found.append(Piece(there, middle, here, float(self.radius * angles[i + 1]), False))
+                found.append(PathPiece(there, middle, here, float(self.radius * angles[i + 1]), False))
         return found
 
     def length(self) -> float:
@@ -96,7 +96,7 @@ class Path:
                 found.append(depth / 2 + chord**2 / (8 * depth))
         return round(min(found), 6)
 
-    def joint_piece(self) -> Piece | None:
+    def joint_piece(self) -> PathPiece | None:
         """The longest straight piece behind the first bend, where hands reach; None where all of it is bent."""
         pieces = self.pieces()
         bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)

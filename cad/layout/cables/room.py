@@ -37,7 +37,7 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class RotorRoom:
     """What a lead on the rotor must stay clear of.
 
     Attributes:
@@ -106,7 +106,7 @@ class Room:
         return np.asarray(seen & (polar > self.hidden_half_angle))
 
 
-def room_of(layout: Layout) -> Room:
+def room_of(layout: Layout) -> RotorRoom:
     """The room on the rotor of one scanner, no lead in it yet."""
     stack, p = layout.stack, layout.linkage
     R = stack.R()
@@ -117,7 +117,7 @@ def room_of(layout: Layout) -> Room:
     if isinstance(layout.counterweight, Counterweight):
         corners.extend(_bar(layout.counterweight))
     bearings = layout.scanner.lidar.bearings_rad()
-    return Room(
+    return RotorRoom(
         shapes=(*(_shape(points) for points in corners), _shape(neck_corners(p, 0), carved=True)),
         channels=envelope.cables,
         R_rot_laser=R,

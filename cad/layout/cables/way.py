@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cad.layout.cables.path import Path
-from cad.layout.cables.room import Room
+from cad.layout.cables.room import RotorRoom
 from design.arrays import Array
 
 SAMPLE = 3.0  # mm between two points that are looked at
@@ -57,7 +57,7 @@ class Ending:
 
 
 def short_way(
-    room: Room, starts: Sequence[Ending], goal: Ending, half: float, radius: float, hub: float
+    room: RotorRoom, starts: Sequence[Ending], goal: Ending, half: float, radius: float, hub: float
 ) -> Path | None:
     """A short path from one of some ends to the goal, within GREED of the shortest; None where there is none.
 
@@ -77,7 +77,7 @@ def short_way(
     first, last = np.array([start.tips()[tip] for start, tip in ends]), goal.tips()[goals]
     lattice = _lattice(room.floor + half + GAP + ROUNDING, hub, np.concatenate([first, last]))
     lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
-    graph = Graph(room, half, radius, np.concatenate([first, lattice, last]))
+    graph = WayGraph(room, half, radius, np.concatenate([first, lattice, last]))
     chain = graph.chain(
         {i: (start.direction, start.lengths[tip] - start.used) for i, (start, tip) in enumerate(ends)},
         {
@@ -100,7 +100,7 @@ def _lattice(low: float, hub: float, ends: Array) -> Array:
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def _clear(room: Room, end: Ending, tip: int, half: float) -> bool:
+def _clear(room: RotorRoom, end: Ending, tip: int, half: float) -> bool:
     """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
     first, last = min(end.held, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
@@ -108,7 +108,7 @@ def _clear(room: Room, end: Ending, tip: int, half: float) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Graph:
+class WayGraph:
     """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
 
     Attributes:
@@ -118,7 +118,7 @@ class Graph:
         points: first those at the ring, last those at the lidar.
     """
 
-    room: Room
+    room: RotorRoom
     half: float
     radius: float
     points: Array

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import JOINT, Lead
+from cad.layout.cables.leads import JOINT, RotorLead
 from cad.layout.layout import Layout
 
 SPARE = 15.0  # mm more than its way, so that a joint can be made once again
 
 
-def leads_words(layout: Layout, leads: Sequence[Lead]) -> str:
+def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
     """The words of the step."""
     straight = layout.scanner.lidar.cable_straight_mm
     laid = [lead for lead in leads if lead.path is not None]
@@ -32,7 +32,7 @@ def leads_words(layout: Layout, leads: Sequence[Lead]) -> str:
     return " ".join(said)
 
 
-def _one(layout: Layout, lead: Lead) -> str:
+def _one(layout: Layout, lead: RotorLead) -> str:
     assert lead.path is not None
     x, y, _ = lead.path.corners[2]
     azimuth = math.degrees(math.atan2(y, x)) % 360.0

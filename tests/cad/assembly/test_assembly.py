@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from cad.assembly.assembly import as_tree
+from cad.assembly.bought import bought_of
 from cad.assembly.make import make_parts
 from cad.files.step import step_text
+from cad.layout.layout import layout_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.scanner import scanner_of
@@ -64,3 +66,16 @@ def test_the_servo_stands_behind_the_rotor_with_its_long_end_at_minus_y(read_bac
     assert case[2] < centre(parts["servo_horn"])[2] < centre(parts["ring_rotor"])[2] < -50
     assert -20 < case[1] < -15
     np.testing.assert_allclose(centre(parts["ring_stator"])[:2], 0, atol=1e-6)
+
+
+def test_every_body_of_a_lidar_whose_window_reaches_its_top_has_a_mesh():
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0),
+        sensor="RPLIDAR A1",
+        servo="MX-64R",
+        slip_ring="SNU11-P0210",
+    )
+    bodies = bought_of(layout_of(scanner_of(angles, "sla", load_catalogue())))
+    assert all(body.make().Volume() > 0 for body in bodies)
+    assert not [body for body in bodies if body.name == "lidar_cap"]

@@ -10,7 +10,7 @@ from cad.assembly.shadow import shadow_of, triangles_of
 from cad.assembly.steps import steps_of
 from cad.assembly.tube import lead_solid
 from cad.checks.clearance import clearance_checks
-from cad.checks.leads import lead_checks
+from cad.checks.rotor_leads import lead_checks
 from cad.layout.cables.leads import JOINT, JOINT_WALL
 from cad.layout.cables.path import Path
 from design.angles import Angles, AngleSet

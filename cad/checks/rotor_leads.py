@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from cad.assembly.assembly import Assembly
 from cad.checks.check import Check, at_least, note
-from cad.layout.cables.leads import JOINT, Lead
+from cad.layout.cables.leads import JOINT, RotorLead
 from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 
 
@@ -22,7 +22,7 @@ def lead_checks(assembly: Assembly) -> list[Check]:
     return [check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}")]
 
 
-def _checks(lead: Lead, where: str) -> list[Check]:
+def _checks(lead: RotorLead, where: str) -> list[Check]:
     if lead.path is None:
         what = (
             f"{where}: from the outlet at y = {lead.y:g} mm no way to the ring bends by {lead.radius:g} mm or more and "
