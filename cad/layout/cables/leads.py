@@ -62,12 +62,12 @@ def leads_of(layout: Layout) -> tuple[RotorLead, ...]:
     numbers = range(len(lidar.cable_y_mm))
     found: tuple[RotorLead, ...] = ()
     # who comes first takes the short way, and may bar it to the others: then they come first, or change places
-    for order, places in product((numbers, numbers[::-1]), repeat=2):
+    for places, order in product((numbers, numbers[::-1]), repeat=2):
         leads = _laid(layout, ring, order, places)
         if not found or _ways(leads) > _ways(found):
             found = leads
-        if _ways(found) == len(numbers):
-            break
+        if _ways(found) == len(numbers) or leads[order[0]].path is None:
+            break  # the first has all the room: what has no way then has none
     return found
 
 
