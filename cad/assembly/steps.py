@@ -42,7 +42,7 @@ RING_STEP = Step(
     "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
     "turned by hand, the shaft takes the rotor along and the stator stays; no lead is pulled",
 )
-LEADS_TITLE = "Leads of the lidar to the ring"
+LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
 CAPSULE_STEP = Step(
     "Capsule into the tower",

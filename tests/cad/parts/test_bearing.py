@@ -20,6 +20,7 @@ from cad.layout.direct.misalignment import contributions, offsets_mm, worst_mome
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.layout import config_hash, layout_of
 from cad.layout.loads import Weight
+from cad.layout.names import ROTOR_LEAD
 from cad.parts.all_parts import parts_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -141,7 +142,7 @@ def test_wires_of_the_ring_pass_the_bearing(made):
     out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     radius = stack.bearing.bore_mm / 2 - 2.5
     start = radius * out + [0, 0, stack.ring_top + 1]
-    for mesh in meshes.values():
+    for mesh in (mesh for name, mesh in meshes.items() if not name.startswith(ROTOR_LEAD)):
         # straight up from the ring's end face, then out above the cage
         up = mesh.ray.intersects_location([start], [[0, 0, 1.0]])[0]
         assert not (up[:, 2] < stack.shoulder + 6).any()

@@ -169,6 +169,7 @@ def test_the_rotor_turns_freely(built):
         return manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
 
     rotor = ("lidar", "alignment", "counterweight", "servo_shaft", "servo_horn", "ring_rotor", "bearing_inner")
+    rotor += ("journal_sleeve", "rotor_lead")
     turning = [name for name in built.meshes if name.startswith(rotor)]
     standing = [name for name in built.meshes if name not in turning]
     still = body(standing)
