@@ -3,9 +3,9 @@
 Gmsh meshes the parts with tetrahedra of second order, CalculiX solves them (Debian: `apt-get install gmsh
 calculix-ccx`): nothing is shared with `cad/statics` but loads and material. The linkage is held all around the shaft,
 the mount under the heads of the deck's screws. Two lines for each folder: how far gravity turns the lidar by the
-linkage alone, how far what `scanwright check` works with is off and what share of its stated error that is, worst of
-three directions of gravity; and how far the mount gives way, which a check takes for nothing: what stays the same and
-what changes over a turn.
+linkage alone, along the axis that bends it most, how far what `scanwright check` works with is off, and what share of
+its stated error that is; and how far the mount gives way, which a check takes for nothing: what stays the same and what
+changes over a turn.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def linkage_line(scanner: Scanner, assembly: Assembly, folder: Path) -> str:
     off, bend = (np.linalg.norm(rotation, axis=1) for rotation in (own.rotation_rad.T - found, found))
     stated = np.linalg.norm(own.rotation_error_rad, axis=0)
     stated = np.maximum(stated, LEAST_ERROR * np.linalg.norm(own.rotation_rad, axis=0))
-    worst = int(np.argmax(off / stated))
+    worst = int(np.argmax(bend))
     return (
         f"linkage turns {_deg(bend[worst])} deg, off by {off[worst] / bend[worst]:.0%}, "
         f"{off[worst] / stated[worst]:.2f} of the stated error ({len(body.nodes)} nodes)"

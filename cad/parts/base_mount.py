@@ -9,16 +9,14 @@ the foot on the deck.
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import cadquery as cq
 import numpy as np
-import shapely
 
 from cad import outlines, solids
 from cad.layout.belt.stack import BeltStack
-from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, HOLE_MARGIN, PAD_HALF, PLUG_GAP, UNDER_MOUNT_HEAD, Deck
+from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, UNDER_MOUNT_HEAD, Deck
 from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
@@ -26,7 +24,6 @@ from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import passing_hole
 from cad.solids import building
-from design.arrays import Array
 
 OF_SERVO = (
     "servo.case_min_mm",
@@ -81,7 +78,7 @@ def base_mount(layout: Layout) -> cq.Solid:
     on_deck = solids.location(deck.rotation(), deck.centre)
     back = deck.back_centre[2]
     with building(BASE_MOUNT, "strut and foot", "deck normal", axis) as checked:
-        foot = solids.prism(_foot(deck), 0.0, FOOT_THICKNESS).moved(on_deck)
+        foot = solids.prism(outlines.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
         body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
     with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
         rails = [_rail(deck, mounted, side) for side in (1.0, -1.0)]
@@ -94,17 +91,6 @@ def base_mount(layout: Layout) -> cq.Solid:
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
         return checked(body.cut(*cuts).clean())
-
-
-def _foot(deck: Deck) -> Array:
-    """Outline of a pad below the strut with an arm to each of the deck's holes: nothing is carried between the arms."""
-    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
-    end = outlines.octagon(HOLE_MARGIN, HOLE_MARGIN, HOLE_MARGIN * (2 - math.sqrt(2)))
-    arms = [shapely.convex_hull(shapely.MultiPoint([*end, *(end + hole)])) for hole in np.array(deck.deck_holes)]
-    whole = shapely.unary_union([shapely.Polygon(pad), *arms]).intersection(
-        shapely.Polygon(outlines.octagon(*deck.foot))
-    )
-    return np.asarray(whole.simplify(0.05).exterior.coords)[:-1]
 
 
 def _back_plate(deck: Deck) -> cq.Solid:
