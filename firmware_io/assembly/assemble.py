@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.angles import AngleSet
+from design.concurrency.ahead import ahead
 from design.errors import RecordingError, suggest
 from firmware_io.assembly.axis_curve import axis_curve
 from firmware_io.assembly.beam_outcome import Verdict, between_surfaces
+from firmware_io.assembly.cloud_rows import COLUMNS, cloud_fields, cloud_rows
 from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.turns import turn_starts
@@ -29,11 +31,9 @@ from firmware_io.clouds.cloud import COLUMN_TYPES
 from firmware_io.clouds.ply import PlyWriter
 from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import Recording, open_recording
-from firmware_io.samples import AxisCurve, Block, Scan, blocks, straight
+from firmware_io.samples import Block, straight
 
 Per = Literal["recording", "turn", "half"]
-COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
-"""What a cloud can tell of each point beside x y z."""
 _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
@@ -65,12 +65,10 @@ class BeamLimits:
         if self.edges_deg is not None and not 0 < self.edges_deg < 45:
             raise RecordingError(f"--edges-deg = {self.edges_deg}: above 0, below 45; 8 is usual")
 
-    def limited(self, scan: Scan) -> Scan:
-        """The scan, as if its sensor saw no nearer and no farther."""
-        near_m, far_m = max(scan.range_min_m, self.min_range_m), min(scan.range_max_m, self.max_range_m)
-        if (near_m, far_m) == (scan.range_min_m, scan.range_max_m):
-            return scan
-        return replace(scan, range_min_m=near_m, range_max_m=far_m)
+    def limited(self, block: Block) -> Block:
+        """The scans, as if their sensor saw no nearer and no farther."""
+        near_m, far_m = max(block.first.range_min_m, self.min_range_m), min(block.first.range_max_m, self.max_range_m)
+        return replace(block, first=replace(block.first, range_min_m=near_m, range_max_m=far_m))
 
     def leave_out(self, block: Block, placed: PlacedBlock) -> None:
         """Take what hangs between two surfaces out of a placed block."""
@@ -170,17 +168,23 @@ def assemble_recording(
     counts: Counter[int] = Counter()
     written = 0
     clouds: list[Path] = []
-    for which, tagged in groupby(zip(cloud_from_rows.tolist(), source.scans(), strict=True), key=itemgetter(0)):
+
+    def rows_of(block: Block) -> NDArray[np.void]:
+        block, with_joint = beams.limited(block), "joint_rad" in columns
+        placed = place_block(block, curve, angles, lag_s, poses=poses, own_body=own_body, with_joint=with_joint)
+        beams.leave_out(block, placed)
+        counts.update(dict(enumerate(np.bincount(placed.verdict.ravel()).tolist())))
+        rows = cloud_rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
+        # a mask would take ten times as long
+        return rows if organised else rows.ravel().take(np.flatnonzero(placed.verdict == Verdict.POINT))
+
+    for which, tagged in groupby(_by_cloud(source.blocks(), cloud_from_rows), key=itemgetter(0)):
         path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
         comments = _comments(source, angles, width, int(np.sum(cloud_from_rows == which)), lag_s, poses is not None)
         before = counts[Verdict.POINT]
         with PlyWriter(path, fields, comments) as cloud:
-            scans = (beams.limited(scan) for _, scan in tagged)
-            for block, placed in _placed(scans, curve, angles, lag_s, poses, own_body, columns):
-                beams.leave_out(block, placed)
-                counts.update({verdict: int(np.sum(placed.verdict == verdict)) for verdict in Verdict})
-                rows = _rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
-                cloud.write(rows if organised else rows[placed.verdict == Verdict.POINT])
+            for _ in ahead(cloud.write, (rows_of(block) for _, block in tagged)):
+                pass
             if not counts[Verdict.POINT] and which == cloud_from_rows[-1]:
                 reasons = ", ".join(f"{count} {reason}" for reason, count in _left_out(counts).items())
                 raise RecordingError(f"{recording}: none of the {source.beams.sum()} beams becomes a point: {reasons}")
@@ -204,13 +208,6 @@ def assemble_recording(
     )
 
 
-def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dtype[np.void]:
-    """Columns of our clouds. A recording without intensities has no such column."""
-    # joint_rad counts turns: after ten minutes float32 would be a hundredth of a degree coarse
-    wanted = [name for name in COLUMNS if name in columns and (has_intensity or name != "intensity")]
-    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, COLUMN_TYPES[name]) for name in wanted)])
-
-
 def _check(out: Path, lag_s: float, columns: list[str]) -> None:
     if out.suffix != ".ply":
         raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")
@@ -230,41 +227,18 @@ def _cloud_of(source: Recording, per: Per, lag_ns: int) -> NDArray[np.int64]:
     return np.maximum.accumulate(np.searchsorted(starts_ns, logged_ns, side="right"))
 
 
-def _placed(
-    scans: Iterable[Scan],
-    curve: AxisCurve,
-    angles: AngleSet,
-    lag_s: float,
-    poses: Trajectory | None,
-    own_body: OwnBody | None,
-    columns: list[str],
-) -> Iterator[tuple[Block, PlacedBlock]]:
-    for block in blocks(scans):
-        with_joint = "joint_rad" in columns
-        yield block, place_block(block, curve, angles, lag_s, poses=poses, own_body=own_body, with_joint=with_joint)
-
-
-def _rows(block: Block, placed: PlacedBlock, fields: np.dtype[np.void], start_ns: int, width: int) -> NDArray[np.void]:
-    """Rows of a cloud, shape (scans, width); those behind the last beam are NaN."""
-    scans, beams = block.range_m.shape
-    rows = np.empty((scans, width), fields)
-    for column, name in enumerate("xyz"):
-        rows[name][:, :beams] = placed.points_m[:, :, column]
-        rows[name][:, beams:] = np.nan
-    names = fields.names or ()
-    if "intensity" in names:
-        rows["intensity"] = np.nan
-        rows["intensity"][:, : block.intensity.shape[1]] = block.intensity
-    if "time_s" in names:
-        after_ns = block.first.time_ns - block.first.stamp_ns
-        rows["time_s"][:, :beams] = (np.add.outer(block.stamp_ns - start_ns, after_ns)) / 1e9
-        rows["time_s"][:, beams:] = np.nan
-    if "joint_rad" in names:
-        rows["joint_rad"][:, :beams] = placed.joint_rad
-        rows["joint_rad"][:, beams:] = np.nan
-    if "ring" in names:
-        rows["ring"] = np.arange(width)
-    return rows
+def _by_cloud(found: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Iterator[tuple[int, Block]]:
+    """The blocks, none of them in two clouds, each behind the number of its cloud."""
+    at = 0
+    for block in found:
+        numbers = cloud_from_rows[at : at + len(block.stamp_ns)]
+        at += numbers.size
+        ends = [*(np.flatnonzero(np.diff(numbers)) + 1).tolist(), numbers.size]
+        for a, b in zip([0, *ends[:-1]], ends, strict=True):
+            part = replace(
+                block, stamp_ns=block.stamp_ns[a:b], range_m=block.range_m[a:b], intensity=block.intensity[a:b]
+            )
+            yield int(numbers[a]), part
 
 
 def _left_out(counts: Counter[int]) -> dict[str, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Collection, Iterator
+from contextlib import closing
 from operator import itemgetter
 from pathlib import Path
 from typing import BinaryIO
@@ -18,6 +19,7 @@ from mcap.records import Chunk, ChunkIndex
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
+from design.concurrency.ahead import ahead
 from design.errors import RecordingError
 from firmware_io.foreign import foreign
 
@@ -50,7 +52,7 @@ def read_note(path: Path, name: str) -> dict[str, str]:
 def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, bytes]]:
     """Topic and bytes of each message, in the order of the log times, as they stand in the file where those are equal.
 
-    Holds the chunks that overlap in time, commonly one.
+    Holds the chunks that overlap in time, commonly one, and unpacks the next ones while these are used.
 
     Raises:
         RecordingError: the file is missing, not MCAP, or damaged.
@@ -63,11 +65,16 @@ def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, by
             key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset),
         )
         waiting = [] if summary.chunk_indexes else foreign(f"{path}: damaged", _unchunked, stream, topics)
-        for chunk in chunks:
-            ready = [message for message in waiting if message[0] < chunk.message_start_time]
-            yield from (message[2:] for message in ready)
-            waiting = waiting[len(ready) :] + foreign(f"{path}: damaged", _chunk, stream, chunk, wanted)
-            waiting.sort(key=itemgetter(0, 1))  # stable: the order within a chunk remains
+
+        def unpack(chunk: ChunkIndex) -> list[_Timed]:
+            return foreign(f"{path}: damaged", _chunk, stream, chunk, wanted)
+
+        with closing(ahead(unpack, chunks)) as unpacked:
+            for chunk, messages in zip(chunks, unpacked, strict=True):
+                ready = [message for message in waiting if message[0] < chunk.message_start_time]
+                yield from (message[2:] for message in ready)
+                waiting = waiting[len(ready) :] + messages
+                waiting.sort(key=itemgetter(0, 1))  # stable: the order within a chunk remains
         yield from (message[2:] for message in waiting)
 
 

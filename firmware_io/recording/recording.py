@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, cast
@@ -25,19 +26,22 @@ from jaxtyping import Int64
 from mcap.writer import Writer
 from numpy import ndarray
 
+from design.arrays import Floats, Times
 from design.atomic_file import whole_file
 from design.errors import RecordingError, suggest
 from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.arrays import RecordingArrays, arrays_of
 from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
+from firmware_io.recording.message_batches import blocks_in, joints_in
 from firmware_io.recording.metadata import NOTE, held_by
 from firmware_io.recording.ros_messages import Beams
-from firmware_io.samples import JointLog, Scan
+from firmware_io.samples import Block, JointLog, Scan, blocks
 
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"
 BEAMS_TOPIC = "/scan_beams"
+_AT_ONCE = 256  # messages that are held
 _TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
 
 
@@ -188,6 +192,15 @@ class Recording:
                 scan = replace(scan, beam_bearing_rad=beams[1][0], beam_offset_ns=beams[1][1])
             yield scan
 
+    def blocks(self, most: int = 256) -> Iterator[Block]:
+        """The same scans, up to `most` at once: a tenth of the time where they differ in nothing else."""
+        if BEAMS_TOPIC in read_topics(self.path):
+            yield from blocks(self.scans(), most)
+            return
+        messages = (data for _, data in read_messages(self.path, {SCAN_TOPIC}))
+        while some := list(islice(messages, most)):
+            yield from _blocks_in(self.path, some)
+
     def arrays(self) -> RecordingArrays:
         """All of it in memory."""
         return arrays_of(list(self.scans()), self.joint_log)
@@ -200,43 +213,35 @@ def open_recording(path: Path) -> Recording:
         RecordingError: the file is missing, cut off, not MCAP, not of our topics and types, or empty.
     """
     _check_topics(path)
-    times: list[int] = []
-    positions: list[float] = []
-    stamps: list[int] = []
+    logs: list[tuple[Times, Floats]] = []
+    stamps: list[Times] = []
     beams: list[int] = []
     has_intensity = False
-    for topic, data in read_messages(path, set(_TYPES)):
-        if topic == JOINT_TOPIC:
-            time_ns, position_rad = foreign(f"{path}: a message of {JOINT_TOPIC}", ros_messages.decode_joint, data)
-            if np.isnan(position_rad):
-                raise RecordingError(
-                    f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'"
-                )
-            times.append(time_ns)
-            positions.append(position_rad)
-        else:
-            scan = _decoded_scan(path, data)
-            has_intensity |= bool(scan.intensity.size)
-            stamps.append(scan.stamp_ns)
-            beams.append(scan.range_m.size)
-    if not times:
+    messages = read_messages(path, set(_TYPES))
+    while some := list(islice(messages, _AT_ONCE)):
+        logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
+        for block in _blocks_in(path, [data for topic, data in some if topic == SCAN_TOPIC]):
+            has_intensity |= bool(block.intensity.size)
+            stamps.append(block.stamp_ns)
+            beams += [block.range_m.shape[1]] * len(block.range_m)
+    if not any(time_ns.size for time_ns, _ in logs):
         raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
     if not beams:
         raise RecordingError(f"{path}: {SCAN_TOPIC} has no message: there is nothing to assemble")
     return Recording(
         path=path,
-        joint_log=_sorted_log(path, times, positions),
+        joint_log=_sorted_log(path, *map(np.concatenate, zip(*logs, strict=True))),
         beams=np.array(beams),
-        stamp_ns=np.array(stamps, np.int64),
+        stamp_ns=np.concatenate(stamps),
         has_intensity=has_intensity,
         held=held_by(read_note(path, NOTE)),
     )
 
 
-def _sorted_log(path: Path, times: list[int], positions: list[float]) -> JointLog:
-    order = np.argsort(np.array(times, np.int64), kind="stable")
+def _sorted_log(path: Path, time_ns: Times, position_rad: Floats) -> JointLog:
+    order = np.argsort(time_ns, kind="stable")
     try:
-        return JointLog(np.array(times, np.int64)[order], np.array(positions)[order])
+        return JointLog(time_ns[order], position_rad[order])
     except RecordingError as error:
         raise RecordingError(f"{path}: {JOINT_TOPIC}: {error}") from error
 
@@ -252,3 +257,14 @@ def _check_topics(path: Path) -> None:
 
 def _decoded_scan(path: Path, data: bytes) -> Scan:
     return foreign(f"{path}: a message of {SCAN_TOPIC}", ros_messages.decode_scan, data)
+
+
+def _blocks_in(path: Path, messages: list[bytes]) -> list[Block]:
+    return foreign(f"{path}: a message of {SCAN_TOPIC}", lambda: list(blocks_in(messages)))
+
+
+def _joints_in(path: Path, messages: list[bytes]) -> tuple[Times, Floats]:
+    time_ns, position_rad = foreign(f"{path}: a message of {JOINT_TOPIC}", joints_in, messages)
+    if np.isnan(position_rad).any():
+        raise RecordingError(f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'")
+    return time_ns, position_rad

@@ -11,7 +11,7 @@ import math
 import struct
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,22 +66,51 @@ def encode_scan(scan: Scan) -> bytes:
     return bytes(_store().serialize_cdr(message, LASER_SCAN))
 
 
+class ScanPlaces(NamedTuple):
+    """Where a LaserScan in CDR has its numbers.
+
+    Attributes:
+        order: of the bytes, for `struct`.
+        numbers: the seven that all beams share.
+        ranges: float32 each.
+        intensities: the same; empty where they do not match the ranges one by one and say nothing about a beam.
+        shared: what messages have in common that differ in time and measurement only.
+    """
+
+    order: str
+    numbers: slice
+    ranges: slice
+    intensities: slice
+    shared: tuple[slice, ...]
+
+    @classmethod
+    def of(cls, data: bytes) -> ScanPlaces:
+        """Those of a message; ValueError, or that of `struct`, where it is cut off."""
+        order, _, at = _cdr_header(data)
+        ranges = _floats(data, order, at + 28)
+        intensities = _floats(data, order, ranges.stop)
+        # of the seven the largest bearing says nothing new, and the time from scan to scan may wander
+        told = slice(1, 2), slice(12, at + 4), slice(at + 8, at + 16), slice(at + 20, ranges.start)
+        shared = (*told, slice(intensities.start - 4, intensities.start))
+        if intensities.stop - intensities.start != ranges.stop - ranges.start:
+            intensities = slice(intensities.start, intensities.start)
+        return cls(order, slice(at, at + 28), ranges, intensities, shared)
+
+
 def decode_scan(data: bytes) -> Scan:
     """Inverse of `encode_scan`, for any CDR LaserScan."""
-    order, time_ns, at = _cdr_header(data)
-    numbers = struct.unpack_from(f"{order}7f", data, at)
-    ranges, at = _cdr_floats(data, order, at + 28)
-    intensities, _ = _cdr_floats(data, order, at)
+    places = ScanPlaces.of(data)
+    numbers = struct.unpack_from(f"{places.order}7f", data, places.numbers.start)
     return Scan(
-        stamp_ns=time_ns,
+        stamp_ns=_cdr_header(data)[1],
         angle_min_rad=numbers[0],
         angle_increment_rad=numbers[2],
         time_increment_s=numbers[3],
         scan_time_s=numbers[4],
         range_min_m=numbers[5],
         range_max_m=numbers[6],
-        range_m=ranges,
-        intensity=_one_by_one(intensities, ranges),
+        range_m=np.frombuffer(data[places.ranges], f"{places.order}f4").astype(np.float32),
+        intensity=np.frombuffer(data[places.intensities], f"{places.order}f4").astype(np.float32),
     )
 
 
@@ -187,21 +216,46 @@ def encode_text(text: str) -> bytes:
     return bytes(_store().serialize_cdr(_store().types[TEXT](data=text), TEXT))
 
 
+class JointPlaces(NamedTuple):
+    """Where a JointState in CDR has the position of the spin joint.
+
+    Attributes:
+        order: of the bytes, for `struct`.
+        position: float64.
+        shared: what messages have in common that name the same joints.
+    """
+
+    order: str
+    position: slice
+    shared: tuple[slice, ...]
+
+    @classmethod
+    def of(cls, data: bytes) -> JointPlaces | None:
+        """Those of a message, None where it tells no position of the joint; errors as of `ScanPlaces`."""
+        order, _, at = _cdr_header(data)
+        (count,) = struct.unpack_from(f"{order}I", data, at)
+        at += 4
+        names = []
+        for _ in range(count):
+            name, at = _cdr_string(data, order, at)
+            names.append(name)
+        at = _aligned(at, 4)
+        (positions,) = struct.unpack_from(f"{order}I", data, at)
+        at = _aligned(at + 4, 8)
+        if _SPIN_JOINT_BYTES not in names or names.index(_SPIN_JOINT_BYTES) >= positions:
+            return None
+        start = at + 8 * names.index(_SPIN_JOINT_BYTES)
+        if start + 8 > len(data):
+            raise ValueError(f"{positions} positions in a message of {len(data)} bytes")
+        return cls(order, slice(start, start + 8), (slice(1, 2), slice(12, at)))
+
+
 def decode_joint(data: bytes) -> tuple[int, float]:
     """Time [ns] and position [rad] of the spin joint in a CDR JointState; NaN where it does not name the joint."""
-    order, time_ns, at = _cdr_header(data)
-    (count,) = struct.unpack_from(f"{order}I", data, at)
-    at += 4
-    names = []
-    for _ in range(count):
-        name, at = _cdr_string(data, order, at)
-        names.append(name)
-    at = _aligned(at, 4)
-    (positions,) = struct.unpack_from(f"{order}I", data, at)
-    at = _aligned(at + 4, 8)
-    if _SPIN_JOINT_BYTES not in names or names.index(_SPIN_JOINT_BYTES) >= positions:
+    places, time_ns = JointPlaces.of(data), _cdr_header(data)[1]
+    if places is None:
         return time_ns, math.nan
-    return time_ns, struct.unpack_from(f"{order}d", data, at + 8 * names.index(_SPIN_JOINT_BYTES))[0]
+    return time_ns, struct.unpack_from(f"{places.order}d", data, places.position.start)[0]
 
 
 def decode_message(data: bytes, message_type: str) -> Any:
@@ -244,10 +298,12 @@ def _cdr_string(data: bytes, order: str, at: int) -> tuple[bytes, int]:
     return data[at + 4 : at + 4 + max(size - 1, 0)], at + 4 + size
 
 
-def _cdr_floats(data: bytes, order: str, at: int) -> tuple[Float32s, int]:
-    """A sequence of float32, and where it ends."""
+def _floats(data: bytes, order: str, at: int) -> slice:
+    """Where the numbers of a sequence of float32 stand."""
     (count,) = struct.unpack_from(f"{order}I", data, at)
-    return np.frombuffer(data, f"{order}f4", count, at + 4).astype(np.float32), at + 4 + 4 * count
+    if at + 4 + 4 * count > len(data):
+        raise ValueError(f"{count} numbers in a message of {len(data)} bytes")
+    return slice(at + 4, at + 4 + 4 * count)
 
 
 def _aligned(at: int, size: int) -> int:

@@ -11,7 +11,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 
-LAUNCH = Path(__file__).parents[3] / "firmware_io/recording/replay_launch.py"
+LAUNCH = Path(__file__).parents[3] / "firmware_io/ros/replay_launch.py"
 
 
 class Told:

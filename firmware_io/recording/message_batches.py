@@ -1,0 +1,94 @@
+"""Many messages of a topic at once, as arrays: those that differ in time and measurement only are one block of bytes.
+
+What tells the layout of a message (byte order, lengths, numbers that all beams share) is read of the first one and
+compared in the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from design.arrays import Bytes, Floats, Ints, Times
+from firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
+from firmware_io.samples import Block
+
+_STAMP = 4  # seconds and nanoseconds, behind the encapsulation
+
+
+def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
+    """Blocks of LaserScan messages in CDR, in their order, each as long as they differ in nothing else.
+
+    Raises:
+        ValueError: a message is no LaserScan; so of `struct`, where it is cut off.
+        RecordingError: as `Scan` does.
+    """
+    for same_length in _runs(_lengths(messages)):
+        rows = _rows(messages[same_length])
+        done = 0
+        while done < len(rows):
+            first = messages[same_length.start + done]
+            places = ScanPlaces.of(first)
+            alike = _alike(rows[done:], places.shared)
+            block = rows[done : done + alike]
+            yield Block(
+                first=decode_scan(first),
+                stamp_ns=_stamps(block, places.order),
+                range_m=_numbers(block, places.ranges, f"{places.order}f4").astype(np.float32, copy=False),
+                intensity=_numbers(block, places.intensities, f"{places.order}f4").astype(np.float32, copy=False),
+            )
+            done += alike
+
+
+def joints_in(messages: Sequence[bytes]) -> tuple[Times, Floats]:
+    """Times [ns] and positions [rad] of the spin joint in JointState messages in CDR, shape (n,) each.
+
+    NaN where a message does not name the joint, or tells no position of it.
+
+    Raises:
+        ValueError: a message is no JointState; so of `struct`, where it is cut off.
+    """
+    lengths = _lengths(messages)
+    time_ns, position_rad = np.empty(lengths.size, np.int64), np.empty(lengths.size)
+    for length in set(lengths.tolist()):
+        which = np.flatnonzero(lengths == length).tolist()
+        rows, places = _rows([messages[i] for i in which]), JointPlaces.of(messages[which[0]])
+        if places is not None and _alike(rows, places.shared) == len(rows):
+            time_ns[which] = _stamps(rows, places.order)
+            position_rad[which] = _numbers(rows, places.position, f"{places.order}f8")[:, 0]
+        else:  # several publishers, whose messages happen to be of one length
+            for i in which:
+                time_ns[i], position_rad[i] = decode_joint(messages[i])
+    return time_ns, position_rad
+
+
+def _rows(messages: Sequence[bytes]) -> Bytes:
+    return np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), -1)
+
+
+def _lengths(messages: Sequence[bytes]) -> Ints:
+    return np.array([len(message) for message in messages], np.int64)
+
+
+def _runs(values: Ints) -> Iterator[slice]:
+    """Where equal ones stand behind each other."""
+    ends = [*(np.flatnonzero(np.diff(values)) + 1).tolist(), values.size]
+    yield from (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
+
+
+def _alike(rows: Bytes, shared: Sequence[slice]) -> int:
+    """How many rows from the first one on have its bytes in some places."""
+    differs = np.zeros(len(rows), bool)
+    for place in shared:
+        differs |= (rows[:, place] != rows[0, place]).any(axis=1)
+    return int(np.argmax(differs)) or len(rows)
+
+
+def _numbers(rows: Bytes, place: slice, kind: str) -> np.ndarray:
+    return np.ascontiguousarray(rows[:, place]).view(kind)
+
+
+def _stamps(rows: Bytes, order: str) -> Times:
+    seconds = _numbers(rows, slice(_STAMP, _STAMP + 4), f"{order}i4")[:, 0].astype(np.int64)
+    return seconds * 1_000_000_000 + _numbers(rows, slice(_STAMP + 4, _STAMP + 8), f"{order}u4")[:, 0]
