@@ -4,8 +4,7 @@ The order of a run: open and check both devices; the laser on, until the sensor'
 servo turns, until it turns steadily; then, and only then, the recording begins, and lasts for the turns that were asked
 for. Two threads: one asks the servo for its angle a hundred times a second, the other reads the scans as they come.
 
-A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. When the sensor is back (ten
-seconds are granted) it turns on, and the full scan in which the lidar was lost is taken again, whole.
+Where the lidar was away (`firmware_io/scan/lidar_scans.py`) the full scan in which it was lost is taken again, whole.
 """
 
 from __future__ import annotations
@@ -15,8 +14,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -25,67 +22,20 @@ from design.angles import AngleSet
 from design.errors import DeviceError
 from design.motion import Motion, Spin, StopAndGo
 from firmware_io.lidar.families import open_lidar
-from firmware_io.lidar.lidar import LidarDriver, TimedScan
+from firmware_io.lidar.lidar import LidarDriver
 from firmware_io.recording import ros_messages
 from firmware_io.samples import Scan
 from firmware_io.scan.axis_thread import AxisThread, turning_servo
+from firmware_io.scan.lidar_scans import LidarScans, Say, settle_clock
 from firmware_io.scan.live_feed import NOBODY, Watch
 from firmware_io.scan.plan import ScanPlan
 from firmware_io.scan.recorder import recorder_of
+from firmware_io.scan.scan_summary import ScanSummary
 from firmware_io.servo.progress import ServoState
 from firmware_io.servo.servo import open_servo
 
-Say = Callable[[str], None]
-
-CLOCK_GOOD_NS = 500_000
-
-_CLOCK_LEAST_S = 3.0
-_CLOCK_PATIENCE_S = 10.0
 _STEADY_PATIENCE_S = 15.0
-_AWAY_S = 10.0
 _MOST_SPEEDS = 3600  # an hour of them, from which the mean is told
-_UNHEARD = "the servo has not answered that it stands: look, and cut its power if it turns"
-
-
-@dataclass(frozen=True, slots=True)
-class ScanSummary:
-    """What was recorded, and what was not.
-
-    Attributes:
-        recording: the file.
-        scans: in it.
-        joint_samples: in it.
-        duration_s: from the first to the last scan.
-        speed_deg_s: mean speed of the servo while it was recorded, 0 for motions to and fro.
-        ripple_deg: root mean square of the deviation from even turning, over half a second.
-        clock_ns: standard uncertainty of the beams' times at the end.
-        reconnects: how often the lidar was away and came back.
-        left_out: what was not recorded, reason -> count.
-    """
-
-    recording: Path
-    scans: int
-    joint_samples: int
-    duration_s: float
-    speed_deg_s: float
-    ripple_deg: float
-    clock_ns: int
-    reconnects: int
-    left_out: dict[str, int]
-
-    def lines(self) -> list[str]:
-        """The same in words."""
-        lines = [f"left out {count:,}: {reason}" for reason, count in self.left_out.items()]
-        if self.reconnects:
-            lines.append(f"the lidar was away {self.reconnects} times")
-        if self.speed_deg_s:
-            lines.append(f"servo turned at {self.speed_deg_s:.2f} deg/s, ripple {self.ripple_deg:.3f} deg")
-        return [
-            *lines,
-            f"beams are timed to {self.clock_ns / 1e6:.2f} ms",
-            f"recorded {self.scans:,} scans and {self.joint_samples:,} angles, {self.duration_s:.1f} s, "
-            f"to {self.recording}",
-        ]
 
 
 def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
@@ -113,9 +63,9 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
             tell(f"warning: {servo.model}: {warning}")
-        scans = _Scans(lidar, tell)
+        scans = LidarScans(lidar, tell)
         lidar.start(intensity=plan.intensity, cluster=plan.cluster, skip=plan.every - 1)
-        _settle_clock(scans, tell)
+        settle_clock(scans, tell)
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
         tell("starting the servo")
         _wait_until_steady(scans, axis, plan.motion, tell)
@@ -144,53 +94,6 @@ def check_model(angles: AngleSet, lidar: LidarDriver) -> None:
         raise DeviceError(f"{lidar.address}: this is a {lidar.model}, but the angle set is for a {angles.sensor}")
 
 
-class _Scans:
-    """Scans with the host's times, as they come; goes on after the sensor was away for a while.
-
-    Attributes:
-        axis: what stands still while the sensor is away; None before it turns.
-        clock_ns: standard uncertainty of the last scan's time.
-        away: how often the sensor was.
-    """
-
-    def __init__(self, lidar: LidarDriver, say: Say) -> None:
-        self.lidar = lidar
-        self.axis: AxisThread | None = None
-        self.clock_ns = 0
-        self.away = 0
-        self._warned = ""
-        self._say = say
-
-    def next(self) -> Scan:
-        try:
-            timed = self.lidar.read()
-        except DeviceError as error:
-            stands = ""
-            if self.axis is not None:
-                held = self.axis.stop()
-                stands = "the servo has answered that it holds, " if held else f"{_UNHEARD}, "
-            self._say(f"{error}; {stands}waiting {_AWAY_S:g} s for the lidar to come back")
-            self.away += 1
-            timed = self._found_again()
-            if self.axis is not None:
-                self.axis.go()
-        self.clock_ns = timed.uncertainty_ns
-        if timed.warning and timed.warning != self._warned:
-            self._say(f"warning: {self.lidar.model}: {timed.warning}")
-            self._warned = timed.warning
-        return timed.scan
-
-    def _found_again(self) -> TimedScan:
-        deadline_s = time.monotonic() + _AWAY_S
-        while True:
-            self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
-            try:
-                return self.lidar.read()
-            except DeviceError:  # a sensor that just got its power answers before it measures
-                if time.monotonic() > deadline_s:
-                    raise
-
-
 def _progress(taken: float, plan: ScanPlan) -> str:
     """How much is done, or where nobody knows how much that will be, how many full scans."""
     if plan.endless:
@@ -198,19 +101,8 @@ def _progress(taken: float, plan: ScanPlan) -> str:
     return f"{min(taken / plan.turns, 1):4.0%}"
 
 
-def _settle_clock(scans: _Scans, say: Say) -> None:
-    """Read scans until the sensor's clock is known."""
-    say("learning the sensor's clock")
-    began_s = time.monotonic()
-    while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:
-        scans.next()
-        if waited_s > _CLOCK_PATIENCE_S:
-            say(f"warning: the sensor's clock is known to {scans.clock_ns / 1e6:.1f} ms only: is this computer busy?")
-            return
-
-
 def _wait_until_steady(
-    scans: _Scans, axis: AxisThread, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
+    scans: LidarScans, axis: AxisThread, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
 ) -> int:
     """Read scans until the servo is where the motion begins, and a spin turns evenly at its speed; how many it read.
 
@@ -250,7 +142,7 @@ def _wait_until_steady(
     return read
 
 
-def _record(plan: ScanPlan, scans: _Scans, axis: AxisThread, say: Say, watch: Watch) -> ScanSummary:
+def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch: Watch) -> ScanSummary:
     """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
     say("scanning until it is ended" if plan.endless else f"recording {plan.duration_s:g} s")
     wanted = math.inf if plan.endless else plan.turns

@@ -20,8 +20,9 @@ from design.angles import AngleSet, load_angles
 from design.errors import DeviceError
 from firmware_io.device_ports import emulated, lidar_ports, servo_ports
 from firmware_io.lidar.families import open_lidar
-from firmware_io.scan.acquire import CLOCK_GOOD_NS, check_model
+from firmware_io.scan.acquire import check_model
 from firmware_io.scan.axis_thread import SERVO_HZ
+from firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
 from firmware_io.serial_port import latency_timer
 from firmware_io.servo import settings
 from firmware_io.servo.examine import examine_servo

@@ -86,8 +86,3 @@ def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | 
     if not moved_rad >= _STALL_SHARE * due_rad:
         return Stall(moved_rad, due_rad)
     return replace(order, since_ns=state.time_ns, from_rad=here_rad)
-
-
-def nearest_turn(angle_rad: float, expected_rad: float) -> float:
-    """The angle, whole turns added so that it comes nearest to the expected one."""
-    return angle_rad + 2 * math.pi * round((expected_rad - angle_rad) / (2 * math.pi))

@@ -25,7 +25,8 @@ from firmware_io.servo.bus.unit import ServoUnit
 from firmware_io.servo.find import find_servo, open_bus
 from firmware_io.servo.fitness import prepare
 from firmware_io.servo.guard import SILENCE_S, Guard
-from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow, nearest_turn
+from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
+from firmware_io.servo.reading import state_of
 
 _GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
 
@@ -175,41 +176,11 @@ class ServoDriver:
         answer = self._unit.read(self._table.block)
         if answer.conditions:
             self._fault(self._told(answer))
-        state = self._state(answer)
+        spins = self._mode == self._table.wheel
+        state = state_of(self._table, answer, spins=spins, known=self._known, order=self._order)
         if not math.isnan(state.position_rad):
             self._known = state
         return state
-
-    def _state(self, answer: ServoAnswer) -> ServoState:
-        table, data = self._table, answer.data
-        count = round(table.pick(table.position, data) / table.position.unit)
-        angle_rad = (count - table.centre) * table.position.unit
-        velocity_rad_s = table.pick(table.velocity, data)
-        if not table.speed_loop and self._mode == table.wheel:
-            velocity_rad_s = math.nan  # there the register holds the torque
-        if not table.measures_turn and not 0 < count < table.last:
-            angle_rad = math.nan  # at one end, or in the dead sector between both: the potentiometer cannot tell
-        elif known := self._known:
-            angle_rad = nearest_turn(angle_rad, known.position_rad + self._due_rad(known, velocity_rad_s, answer))
-        else:
-            angle_rad = nearest_turn(angle_rad, 0.0)  # servos of protocol 2.0 count turns of their own
-        return ServoState(
-            time_ns=answer.sampled_ns,
-            time_bound_ns=answer.bound_ns,
-            position_rad=angle_rad,
-            velocity_rad_s=velocity_rad_s,
-            load=table.pick(table.load, data),
-            voltage_V=table.pick(table.voltage, data),
-            temperature_degC=table.pick(table.temperature, data),
-        )
-
-    def _due_rad(self, known: ServoState, velocity_rad_s: float, answer: ServoAnswer) -> float:
-        """How far it will have turned since it was known where it is; next to nothing without an order to turn."""
-        if not self._order:
-            return 0.0
-        measured = [rate for rate in (known.velocity_rad_s, velocity_rad_s) if not math.isnan(rate)]
-        rate_rad_s = sum(measured) / len(measured) if measured else self._order.rate_rad_s
-        return rate_rad_s * (answer.sampled_ns - known.time_ns) / 1e9
 
     def _follow(self, order: TurnOrder, state: ServoState) -> TurnOrder | None:
         """The order with the progress made; None when the goal is reached."""

@@ -1,25 +1,13 @@
 """How a servo's horn really turns: motor, gear with play, control loop, and an off-axis mass that gravity pulls.
 
-All quantities are seen at the horn. With motor angle m, horn angle h, duty u of the supply s:
-
-    J_m m'' = T_stall (s u - m' / w_0) - T_c tanh(m' / eps) - T_gear
-    J_h h'' = T_gear + T_g cos(h + phase) - T_b tanh(h' / eps)
-    T_gear  = k d max(0, 1 + mu d' sign d),   d = (m - h) outside of the play, 0 within
-
-The control loop sees the horn through a sensor lag (the encoder sits on the output shaft). In velocity mode it is a PI
-loop, in position mode a proportional one towards a goal that walks at the set rate (MX, XM), or the AX-12A's
-compliance: nothing within one count, then a least current ("punch") and a steep slope. That slope behind a slow sensor
-leaves little phase margin: an AX-12A overshoots and rings wherever a sweep begins and ends, an MX-64R does not.
-
-The gear's teeth are stiff (`stiffness_nm_rad` on a rotor of some 1e-3 kg m2: a millisecond) against turns of seconds,
-so a stiff solver integrates it, only as far as somebody asks. Motor data are the catalogue's; what no maker publishes
-is assumed, and marked so in `plant_of`.
+Its equations are those of `firmware_io/twins/servo_plant.py`. The gear's teeth are stiff (`stiffness_nm_rad` on a rotor
+of some 1e-3 kg m2: a millisecond) against turns of seconds, so a stiff solver integrates it, only as far as somebody
+asks.
 """
 
 from __future__ import annotations
 
 import bisect
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from threading import Lock
@@ -31,115 +19,9 @@ from numpy import ndarray
 from scipy.integrate import BDF, LSODA, Radau
 
 from design.arrays import Floats
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo.bus.registers import RPM
+from firmware_io.twins.servo_plant import Actuation, Load, Plant, effort, equations, walked_rad
 
-Mode = Literal["off", "share", "velocity", "position"]
-
-_PLASTIC_TEETH = ("AX-12A", "XL330-M288", "XL430-W250")
-_SLOW_RAD_S = 1e-4  # below it Coulomb friction fades, so that it has a slope a solver can follow
 _SOLVERS = {"LSODA": LSODA, "Radau": Radau, "BDF": BDF}
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """What hangs on the horn.
-
-    Attributes:
-        inertia_kg_m2: about the axis.
-        gravity_nm: largest torque of gravity on the axis; 0 where the axis is upright or the head balanced.
-        gravity_phase_rad: that torque is `gravity_nm cos(angle + gravity_phase_rad)`.
-        bearing_nm: Coulomb friction of bearing and slip ring.
-    """
-
-    inertia_kg_m2: float = 5e-4
-    gravity_nm: float = 0.0
-    gravity_phase_rad: float = 0.0
-    bearing_nm: float = 0.01
-
-
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """One servo with its control loop.
-
-    Attributes:
-        stall_torque_nm: at full supply.
-        no_load_rad_s: at full supply.
-        inertia_kg_m2: of rotor and gear.
-        friction_nm: Coulomb friction of motor and gear.
-        backlash_rad: full play of the gear.
-        stiffness_nm_rad: of the teeth.
-        impact_s_rad: how much of a hit the teeth swallow (mu above).
-        sensor_lag_s: between the horn's angle and what the loop knows of it.
-        velocity_p: duty per rad/s of speed error.
-        velocity_i: duty per rad of the error's integral.
-        position_p: duty per rad of position error.
-        margin_rad: position error that the loop ignores.
-        punch: least duty beyond the margin.
-    """
-
-    stall_torque_nm: float
-    no_load_rad_s: float
-    inertia_kg_m2: float
-    friction_nm: float
-    backlash_rad: float
-    stiffness_nm_rad: float
-    impact_s_rad: float
-    sensor_lag_s: float
-    velocity_p: float
-    velocity_i: float
-    position_p: float
-    margin_rad: float
-    punch: float
-
-
-def plant_of(model: str) -> Plant:
-    """The plant of a model: torque, speed and play from its maker, loop gains from its control table's defaults."""
-    ax = model == "AX-12A"
-    servo = load_catalogue().get(model, Servo)
-    no_load_rad_s, play_deg = servo.no_load_rpm * RPM, servo.backlash_deg
-    if play_deg is None:
-        play_deg = 0.5 if ax else 0.333  # assumed
-    # Assumed, mechanical time constants: rotors of 0.3 and 1 g cm2, geared 254:1 (AX-12A) and 200:1 (MX-64R).
-    time_constant_s = 0.0082 if ax else 0.0044
-    count_rad = math.radians(300 / 1024 if ax else 360 / 4096)
-    return Plant(
-        stall_torque_nm=servo.stall_torque_nm,
-        no_load_rad_s=no_load_rad_s,
-        inertia_kg_m2=time_constant_s * servo.stall_torque_nm / no_load_rad_s,
-        friction_nm=(0.015 if ax else 0.05) * servo.stall_torque_nm,  # assumed
-        backlash_rad=math.radians(play_deg),
-        stiffness_nm_rad=100.0 if model in _PLASTIC_TEETH else 300.0,  # assumed
-        impact_s_rad=20.0,  # assumed
-        sensor_lag_s=0.030 if ax else 0.004,  # assumed: potentiometer with filter, encoder
-        velocity_p=0.5 / no_load_rad_s,  # assumed, with the next one: some 20 rad/s of bandwidth
-        velocity_i=20.0 / no_load_rad_s,
-        position_p=1 / (32 * count_rad) if ax else 4 / (1023 * count_rad),  # slope 32; P gain 32, which is 4 per count
-        margin_rad=count_rad if ax else 0.0,
-        punch=32 / 1023 if ax else 0.0,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Actuation:
-    """What acts on the plant from one moment on.
-
-    Attributes:
-        mode: motor open, share of the supply, velocity or position loop.
-        goal: nothing, a duty in -1..1, rad/s or rad.
-        rate_rad_s: at which the goal position is walked to.
-        supply: voltage as a fraction of the rated one.
-        torque_limit: largest duty.
-        blocked: something holds the horn where it is.
-    """
-
-    mode: Mode = "off"
-    goal: float = 0.0
-    rate_rad_s: float = math.inf
-    supply: float = 1.0
-    torque_limit: float = 1.0
-    blocked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +75,7 @@ class HornMotion:
             state = self._states(np.array([t]))[:, 0]
             last_s, last, start, _ = self._drives[-1]
             walking = last.mode == drive.mode == "position"
-            setpoint = _walk(t - last_s, start, last.goal, last.rate_rad_s) if walking else float(state[2])
+            setpoint = walked_rad(t - last_s, start, last.goal, last.rate_rad_s) if walking else float(state[2])
             if drive.mode != "velocity" or last.mode != "velocity":
                 state[4] = drive.goal / self._plant.no_load_rad_s if drive.mode == "velocity" else 0.0
             kept = bisect.bisect_left(self._ends, t) + 1
@@ -229,7 +111,7 @@ class HornMotion:
             start_s, drive, start, _ = self._drives[
                 bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1
             ]
-        duty, torque = _effort(self._plant, drive, _walk(t - start_s, start, drive.goal, drive.rate_rad_s), *state)
+        duty, torque = effort(self._plant, drive, walked_rad(t - start_s, start, drive.goal, drive.rate_rad_s), *state)
         return Motion(float(state[2]), float(state[3]), duty, torque)
 
     def _index(self, t: float) -> int:
@@ -239,7 +121,7 @@ class HornMotion:
     def _begin(self, t: float, state: Floats, drive: Actuation, setpoint: float) -> None:
         held = self._drives[-1][3] if self._drives and self._drives[-1][1].blocked else float(state[2])
         self._drives.append((t, drive, setpoint, held))
-        rhs = _equations(self._plant, self._load, drive, t, setpoint, held)
+        rhs = equations(self._plant, self._load, drive, t, setpoint, held)
         rtol = self._solver.rtol
         # No upper end: steps are taken as they are asked for. First steps are short, as a drive begins with a jump.
         self._integrator = _SOLVERS[self._solver.method](
@@ -275,80 +157,3 @@ class HornMotion:
         if gone > 1000:  # in bulk, so that it costs nothing per step
             del self._ends[:gone], self._steps[:gone]
             del self._drives[: self._index(self._first_s())]
-
-
-def _walk(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -> float:
-    """Where the goal position has walked to."""
-    way = rate_rad_s * elapsed_s if elapsed_s > 0 else 0.0
-    return start + max(-way, min(way, goal - start))
-
-
-def _effort(
-    plant: Plant,
-    drive: Actuation,
-    setpoint: float,
-    m: float,
-    m_rate: float,
-    h: float,
-    h_rate: float,
-    i: float,
-    seen: float,
-) -> tuple[float, float]:
-    """Duty of the loop, and torque of the motor as a fraction of the stall torque."""
-    del m, h_rate
-    if drive.mode == "off":
-        return 0.0, 0.0
-    asked = _asked(plant, drive, setpoint, h, i, seen)
-    duty = max(-drive.torque_limit, min(drive.torque_limit, asked))
-    return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
-
-
-def _asked(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
-    """Duty that the loop asks for, whatever the limit."""
-    if drive.mode == "share":
-        return drive.goal
-    if drive.mode == "velocity":
-        return plant.velocity_p * (drive.goal - (h - seen) / plant.sensor_lag_s) + i
-    error = setpoint - seen
-    beyond = abs(error) - plant.margin_rad
-    return math.copysign(plant.punch + plant.position_p * beyond, error) if beyond > 0 else 0.0
-
-
-def _equations(
-    plant: Plant, load: Load, drive: Actuation, start_s: float, setpoint: float, held: float
-) -> Callable[[float, Floats], list[float]]:
-    """Right-hand side for one drive; states: motor angle and rate, horn angle and rate, integral, angle seen."""
-    half = plant.backlash_rad / 2
-
-    def rhs(t: float, y: Floats) -> list[float]:
-        m, m_rate, h, h_rate, i, seen = y.tolist()
-        duty, torque = _effort(
-            plant, drive, _walk(t - start_s, setpoint, drive.goal, drive.rate_rad_s), m, m_rate, h, h_rate, i, seen
-        )
-        twist = m - h
-        bite = twist - half if twist > half else twist + half if twist < -half else 0.0
-        damped = 1 + plant.impact_s_rad * math.copysign(m_rate - h_rate, (m_rate - h_rate) * bite)
-        gear = plant.stiffness_nm_rad * bite * max(0.0, damped)
-        friction = plant.friction_nm * math.tanh(m_rate / _SLOW_RAD_S)
-        on_horn = load.gravity_nm * math.cos(h + load.gravity_phase_rad) - load.bearing_nm * math.tanh(
-            h_rate / _SLOW_RAD_S
-        )
-        if drive.blocked:
-            on_horn -= 50 * plant.stall_torque_nm * (h - held) + 0.5 * plant.stall_torque_nm * h_rate
-        seen_rate = (h - seen) / plant.sensor_lag_s
-        integral_rate = 0.0
-        if drive.mode == "velocity":
-            # What the limit cuts off flows back. An integral that just stops there would switch at every step, and the
-            # solver would crawl along the switch for ever.
-            cut = duty - _asked(plant, drive, setpoint, h, i, seen)
-            integral_rate = plant.velocity_i * (drive.goal - seen_rate + cut / plant.velocity_p)
-        return [
-            m_rate,
-            (plant.stall_torque_nm * torque - friction - gear) / plant.inertia_kg_m2,
-            h_rate,
-            (gear + on_horn) / load.inertia_kg_m2,
-            integral_rate,
-            seen_rate,
-        ]
-
-    return rhs

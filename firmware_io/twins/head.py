@@ -12,7 +12,7 @@ from design import frames
 from design.angles import AngleSet
 from design.arrays import Rotation, Vector
 from design.errors import DeviceError
-from firmware_io.twins.dynamics import Load
+from firmware_io.twins.servo_plant import Load
 
 _GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 

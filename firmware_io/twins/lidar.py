@@ -6,7 +6,7 @@ import time
 
 from design.catalogue.products import Lidar
 from design.errors import DeviceError, suggest
-from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip import measurement
 from firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
 from firmware_io.twins.lidar_line import LidarLine, Sight
 from firmware_io.twins.lidar_machine import LidarMachine, Look
@@ -60,7 +60,7 @@ class LidarTwin(LidarLine):
         super().__init__(model, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
         self.smallest_delay_ns = machine.arc_ns
         if scanning:
-            machine.answer(protocol.continuous(machine.identity.parameters.window), time.monotonic_ns())
+            machine.answer(measurement.continuous(machine.identity.parameters.window), time.monotonic_ns())
 
 
 def scip_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LidarTwin:

@@ -11,7 +11,7 @@ import numpy as np
 
 from design.arrays import Floats, Times
 from firmware_io.lidar.lidar import StampAt
-from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip import measurement, protocol
 from firmware_io.twins.hokuyo_models import Identity, Quartz
 
 Look = Callable[[Times], tuple[Floats, Floats]]
@@ -25,7 +25,7 @@ _NEVER_NS = 1 << 62
 class Scanning:
     """Scans that somebody asked for: the echo without its last two digits and text, and what is left to do."""
 
-    window: protocol.Window
+    window: measurement.Window
     echo: bytes
     text: bytes
     skip: int
@@ -196,7 +196,7 @@ class LidarMachine:
             return protocol.reply(request, "05")
         if kind == b"G" and not self.laser:
             return protocol.reply(request, "10")
-        window = protocol.Window(
+        window = measurement.Window(
             first_step=int(first),
             last_step=int(last),
             cluster=max(int(cluster), 1),
@@ -214,7 +214,7 @@ class LidarMachine:
         )
         return protocol.reply(request, "00")
 
-    def _lines(self, window: protocol.Window, turn: int) -> list[bytes]:
+    def _lines(self, window: measurement.Window, turn: int) -> list[bytes]:
         """Measure a turn and write it down."""
         parameters = self.identity.parameters
         steps = np.arange(parameters.first_step, parameters.last_step + 1)

@@ -19,9 +19,9 @@ from design.errors import SceneError
 from design.scene.ray_caster import Scene, build_scene, cast, load_scene
 from firmware_io.device_ports import Ports
 from firmware_io.lidar.families import family_of
-from firmware_io.twins.dynamics import Load
 from firmware_io.twins.lidar_line import LidarLine
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.servo_plant import Load
 from firmware_io.twins.world import furnished_room, looking, range_model, rays
 
 

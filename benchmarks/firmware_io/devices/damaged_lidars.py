@@ -11,7 +11,7 @@ import numpy as np
 from design.errors import ProtocolError
 from firmware_io.lidar.ldrobot import protocol as ldrobot
 from firmware_io.lidar.lms2xx import protocol as lms
-from firmware_io.lidar.scip import parameters, protocol
+from firmware_io.lidar.scip import measurement, parameters, protocol
 from firmware_io.lidar.sick import cola, scan_data
 from firmware_io.lidar.slamtec import protocol as slamtec
 from firmware_io.lidar.slamtec.point_count import PointCount
@@ -34,10 +34,10 @@ def scip_dialogue(rng: random.Random) -> bytes:
     said += protocol.reply(b"PP", "00", protocol.text_lines(pp))
     said += protocol.reply(b"TM1", "00", [protocol.summed(protocol.encode([rng.randrange(1 << 24)], 4))])
     for intensity in (False, True, False):
-        window = protocol.Window(first_step=3, last_step=3 + rng.randrange(40), intensity=intensity)
+        window = measurement.Window(first_step=3, last_step=3 + rng.randrange(40), intensity=intensity)
         values = [rng.randrange(1 << 18) for _ in range(window.size * (1 + intensity))]
         lines = protocol.data_lines(rng.randrange(1 << 24), protocol.encode(values, 3))
-        said += protocol.reply(protocol.continuous(window, count=1), "99", lines)
+        said += protocol.reply(measurement.continuous(window, count=1), "99", lines)
     return said
 
 
@@ -50,12 +50,12 @@ def scip_survive(stream: bytes) -> tuple[int, int]:
             for byte in line:
                 total += byte
             assert line + bytes([total % 64 + 48]) in stream or line + b";" in stream, "accepted with a wrong sum"
-        for read in (protocol.information, protocol.measurement, protocol.stamp):
+        for read in (protocol.information, measurement.measurement, measurement.stamp):
             try:
                 taken = read(told)
                 if isinstance(taken, dict):
                     parameters.parameters(taken)
-                elif isinstance(taken, protocol.Measurement):
+                elif isinstance(taken, measurement.Measurement):
                     accepted += 1
                     assert taken.value.size == taken.window.size, "a scan of another size than its echo says"
             except ProtocolError:

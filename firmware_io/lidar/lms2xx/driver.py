@@ -26,11 +26,13 @@ from firmware_io.samples import Scan
 FAMILY = "lms2xx"
 
 _ANSWER_S = 0.5
+_STREAM_S = 0.1
 _MODE_S = 3.0  # it stops its stream, or answers at its new speed, after some turns
 _SCAN_S = 1.0
 _TRIES = 2
 _FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
-_BAUDS = (9600, _FAST_BAUD, _USUAL_BAUD, 19_200)  # 9600 after power-up
+_POWER_UP_BAUD = 9600
+_BAUDS = (_POWER_UP_BAUD, _FAST_BAUD, _USUAL_BAUD, 19_200)
 _TURN_S = 1 / 75  # of its mirror
 _PATIENCE = 8  # telegrams: a fifth of a second
 
@@ -60,7 +62,7 @@ class LmsLidar:
         self._waiting: deque[TimedScan] = deque()
         self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
-        self._recognise(model)
+        self._recognise(model, _BAUDS)
 
     def __enter__(self) -> Self:
         return self
@@ -152,11 +154,13 @@ class LmsLidar:
         Raises:
             DeviceError: it did not turn up in time.
         """
-        scanning = self._scanning
+        scanning, before = self._scanning, self._baud
 
         def connect() -> None:
             self._line.reopen()
-            self._recognise(self.model)
+            # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
+            streams = self._is_heard_at(before)
+            self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
             if scanning:
                 with self._line.closed_on_error():
                     self.start(skip=self._skip)
@@ -166,12 +170,19 @@ class LmsLidar:
         finally:
             self._scanning = scanning
 
-    def _recognise(self, model: str | None) -> None:
-        """Stop its stream, at whatever speed, and hear who it is; the line is closed where no one answers."""
+    def _is_heard_at(self, baud: int) -> bool:
+        """Whether anything comes at this speed, within some turns."""
+        if self._line.serial is not None:
+            self._line.serial.baud = baud
+        with self._line.closed_on_error(), self._line.told_when_gone():
+            return bool(self._line.stream.read(_STREAM_S))
+
+    def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
+        """Stop its stream, at one of these speeds, and hear who it is; the line is closed where no one answers."""
         self._bad_before += self._splitter.bad
         self._splitter = protocol.LmsSplitter()
         with self._line.closed_on_error():
-            for baud in _BAUDS if self._line.serial is not None else (_FAST_BAUD,):
+            for baud in bauds if self._line.serial is not None else (_FAST_BAUD,):
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
                 self._baud = baud
@@ -181,7 +192,7 @@ class LmsLidar:
                         self._mode(protocol.ON_REQUEST, _ANSWER_S)
                         told = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
                     except DeviceTimeoutError:
-                        if self._line.heard == before and baud != _BAUDS[0]:
+                        if self._line.heard == before and baud != _POWER_UP_BAUD:
                             break
                         continue
                     self._accept(told.values[:-1].decode("ascii", "replace"), model)

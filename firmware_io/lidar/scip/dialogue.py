@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.lidar.byte_stream import FIRST_BAUD
-from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip import measurement, protocol
 from firmware_io.lidar.sensor_line import SensorLine
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
@@ -62,7 +62,7 @@ class ScipDialogue:
         deadline_s = time.monotonic() + (_ANSWER_S if timeout_s is None else timeout_s)
         while True:
             told, arrival_ns = self.next(deadline_s)
-            if told.echo == request and not protocol.is_scan(told):
+            if told.echo == request and not measurement.is_scan(told):
                 return told, arrival_ns
 
     def insist(self, request: bytes, *statuses: str) -> None:

@@ -16,7 +16,7 @@ from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.device_ports import lidar_ports
 from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.scip import parameters, protocol
+from firmware_io.lidar.scip import measurement, parameters, protocol
 from firmware_io.lidar.scip.dialogue import ScipDialogue
 from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 from firmware_io.lidar.sensor_line import until_back
@@ -122,7 +122,7 @@ class ScipLidar:
         window = replace(self.parameters.window, cluster=cluster, intensity=intensity)
         bytes_s = window.bytes_per_scan / self.parameters.scan_period_s / (skip + 1)
         self._dialogue.speed_up(bytes_s, without_speed=self._search)
-        self._request = protocol.continuous(window, skip=skip)
+        self._request = measurement.continuous(window, skip=skip)
         self._skip = skip
         self._scan_on()
 
@@ -147,9 +147,9 @@ class ScipLidar:
                 continue
             if told.status.isdigit() and 50 <= int(told.status) <= 97:
                 raise DeviceError(f"{self._dialogue.line.name}: status {told.status}: {told.told()}")
-            if protocol.is_scan(told):
+            if measurement.is_scan(told):
                 try:
-                    return self._raw(protocol.measurement(told), arrival_ns)
+                    return self._raw(measurement.measurement(told), arrival_ns)
                 except ProtocolError:
                     self._bad_scans += 1
 
@@ -212,7 +212,7 @@ class ScipLidar:
             for _ in range(_EXCHANGES):
                 asked_ns = time.monotonic_ns()
                 told, answered_ns = self._dialogue.ask_timed(b"TM1")
-                stamp_ms = self._counter.unwrap(protocol.stamp(told), answered_ns)
+                stamp_ms = self._counter.unwrap(measurement.stamp(told), answered_ns)
                 exchanges.append(Exchange(asked_ns, stamp_ms, answered_ns))
         finally:
             self._dialogue.insist(b"TM2", "00", "03")
@@ -237,7 +237,7 @@ class ScipLidar:
             clock.synchronise(self.sync)
         return clock
 
-    def _raw(self, taken: protocol.Measurement, arrival_ns: int) -> RawScan:
+    def _raw(self, taken: measurement.Measurement, arrival_ns: int) -> RawScan:
         range_m, codes = parameters.ranges_m(taken.value, self.parameters)
         stamp_ms = self._counter.unwrap(taken.stamp_ms, arrival_ns)
         if 0 <= self._stamp_ms < stamp_ms:

@@ -11,7 +11,8 @@ import numpy as np
 from design.arrays import Float32s
 from design.errors import ProtocolError
 from firmware_io.lidar.lidar import StampAt
-from firmware_io.lidar.scip.protocol import Integers, Window
+from firmware_io.lidar.scip.measurement import Window
+from firmware_io.lidar.scip.protocol import Integers
 
 
 @dataclass(frozen=True, slots=True)

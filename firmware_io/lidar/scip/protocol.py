@@ -30,7 +30,6 @@ LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 21
 _REQUEST = rb"(?:VV|PP|II|BM|QT|R[STB]|TM\d|SS\d{6}|CR\d\d|HS\d|DB\d\d|SCIP2\.0|%S[LT]|[GH][DSE]\d{10}|[MN][DSE]\d{13})"
 _ECHO = re.compile(_REQUEST + rb"(?:;[\w .+@]{0,16})?")
 _ECHO_LINE = re.compile(rb"^(?:" + _ECHO.pattern + rb")$", re.MULTILINE)
-_SCAN_ECHO = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?(?:;.*)?")
 
 STATUS = {
     "0A": "the sensor has an internal fault",
@@ -77,73 +76,6 @@ class Reply:
         return STATUS.get(self.status, "refused")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Window:
-    """Which steps to measure and how to send them.
-
-    Attributes:
-        first_step: the first one.
-        last_step: the last one, included.
-        cluster: steps that share one value, the least range among them.
-        characters: 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm).
-        intensity: a second value after each range.
-    """
-
-    first_step: int
-    last_step: int
-    cluster: int = 1
-    characters: int = 3
-    intensity: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.first_step <= self.last_step <= 9999:
-            raise ProtocolError(f"steps {self.first_step}..{self.last_step}: not within 0..9999 in this order")
-        if not 1 <= self.cluster <= 99:
-            raise ProtocolError(f"cluster = {self.cluster}: not within 1..99")
-        if self.characters not in (2, 3) or (self.intensity and self.characters == 2):
-            raise ProtocolError(f"{self.characters} characters per value: 3, or 2 without intensity")
-
-    @property
-    def size(self) -> int:
-        """Number of ranges."""
-        return (self.last_step - self.first_step) // self.cluster + 1
-
-    @property
-    def whole_clusters(self) -> int:
-        """Number of ranges of a sensor that sends none for steps that fill no cluster: which do is not known."""
-        return (self.last_step - self.first_step + 1) // self.cluster
-
-    @property
-    def bytes_per_scan(self) -> int:
-        """Of a reply: echo, status, stamp, and lines of 64 characters with their sum and end."""
-        characters = self.size * self.characters * (2 if self.intensity else 1)
-        return 16 + 4 + 6 + 1 + characters + 2 * -(-characters // LINE_CHARACTERS)
-
-    @property
-    def letter(self) -> str:
-        """Second letter of the command."""
-        return "E" if self.intensity else "S" if self.characters == 2 else "D"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measurement:
-    """What a scan reply carries.
-
-    Attributes:
-        window: which steps.
-        remaining: scans still to come; 0 for the last one and where there is no end.
-        stamp_ms: the sensor's clock, 24 bit.
-        value: shape (n,), millimetres or error codes.
-        intensity: shape (n,) or (0,).
-    """
-
-    window: Window
-    remaining: int
-    stamp_ms: int
-    value: Integers
-    intensity: Integers
-
-
 def checksum(text: bytes) -> int:
     """The character that follows a text."""
     return (sum(text) & 0x3F) + 0x30
@@ -174,13 +106,6 @@ def decode(text: bytes, characters: int) -> Integers:
     return (sixes.reshape(-1, characters) << (6 * np.arange(characters - 1, -1, -1, dtype=np.int32))).sum(
         axis=1, dtype=np.int32
     )
-
-
-def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:
-    """The request (without LF) for scan after scan; `skip` are left out between two; count 0 has no end."""
-    if not (0 <= skip <= 9 and 0 <= count <= 99):
-        raise ProtocolError(f"skip = {skip}, count = {count}: not within 0..9 and 0..99")
-    return f"M{window.letter}{_steps(window)}{skip}{count:02d}".encode()
 
 
 def reply(echo: bytes, status: str, lines: Sequence[bytes] = ()) -> bytes:
@@ -266,54 +191,6 @@ def information(told: Reply) -> dict[str, str]:
     if not all(colon for _, colon, _ in pairs):
         raise ProtocolError(f"{told.echo.decode()}: a line without a key")
     return {key: text for key, _, text in pairs}
-
-
-def is_scan(told: Reply) -> bool:
-    """Whether a reply carries a scan, and is not the word that scans will come or will not."""
-    return (told.echo[:1] == b"M" and told.status == "99") or (told.echo[:1] == b"G" and told.status == "00")
-
-
-def measurement(told: Reply) -> Measurement:
-    """The numbers of a scan reply.
-
-    Raises:
-        ProtocolError: it is none, or lines or numbers are missing, or too many.
-    """
-    match = _SCAN_ECHO.fullmatch(told.echo)
-    if match is None or not is_scan(told):
-        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
-    _, letter, first, last, cluster, _, remaining = match.groups()
-    window = Window(
-        first_step=int(first),
-        last_step=int(last),
-        cluster=max(int(cluster), 1),
-        characters=2 if letter == b"S" else 3,
-        intensity=letter == b"E",
-    )
-    stamp, *data = told.lines or (b"",)
-    if len(stamp) != 4 or any(len(line) != LINE_CHARACTERS for line in data[:-1]):
-        raise ProtocolError(f"{told.echo.decode()}: a line was cut")
-    numbers = decode(b"".join(data), window.characters)
-    each = 2 if window.intensity else 1
-    if numbers.size not in (window.size * each, window.whole_clusters * each):
-        raise ProtocolError(f"{told.echo.decode()}: {numbers.size} numbers for {window.size} steps")
-    value, intensity = (numbers[::2], numbers[1::2]) if window.intensity else (numbers, numbers[:0])
-    return Measurement(window, int(remaining or 0), int(decode(stamp, 4)[0]), value, intensity)
-
-
-def stamp(told: Reply) -> int:
-    """The sensor's clock [ms, 24 bit] from a TM1 reply.
-
-    Raises:
-        ProtocolError: it is none.
-    """
-    if told.echo[:3] != b"TM1" or told.status != "00" or len(told.lines) != 1 or len(told.lines[0]) != 4:
-        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
-    return int(decode(told.lines[0], 4)[0])
-
-
-def _steps(window: Window) -> str:
-    return f"{window.first_step:04d}{window.last_step:04d}{window.cluster:02d}"
 
 
 def _unsummed(line: bytes, echo: bytes) -> bytes:

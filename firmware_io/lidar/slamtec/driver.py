@@ -7,41 +7,27 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
-from typing import TypeVar
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.sensor_line import SensorLine, until_back
+from firmware_io.lidar.sensor_line import until_back
 from firmware_io.lidar.slamtec import protocol
+from firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
 from firmware_io.lidar.slamtec.point_count import PointCount
 from firmware_io.lidar.slamtec.series import SERIES
 from firmware_io.lidar.turn import TurnQueue, timed_scan
 
-_ANSWER_S = 0.5
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
-_DRAIN_S, _SILENT_S = 0.2, 0.03
 _TRIES = 3
 _PAUSE_NS = 500_000_000
 _PWM = 660  # the SDK's default
 _RPM = 600
-
-Told = TypeVar("Told")
-
-
-@dataclass(frozen=True, slots=True)
-class _Mode:
-    """How it streams: its number, the type of its packets, and between two points [ns]."""
-
-    number: int
-    kind: int
-    point_ns: float
 
 
 class SlamtecLidar:
@@ -67,7 +53,8 @@ class SlamtecLidar:
         self._scanning = self._turning = self._intensity = False
         self._skip, self._warning = 0, ""
         self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
-        self._line = SensorLine(address, 2 * max(protocol.SIZES.values()))
+        self._dialogue = SlamtecDialogue(address)
+        self._line = self._dialogue.line
         self._recognise(model)
 
     def __enter__(self) -> SlamtecLidar:
@@ -113,19 +100,19 @@ class SlamtecLidar:
             raise DeviceError(
                 f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
             )
-        status, code = self._told(protocol.HEALTH, 6, protocol.health)
+        status, code = self._dialogue.told(protocol.HEALTH, 6, protocol.health)
         if status == 2:
             raise DeviceFaultError(
                 f"{self._line.name}: it reports fault {code:#06x}: take its power away, and give it again"
             )
         self._warning = f"it reports a warning of its own health, {code:#06x}: it still scans" if status else ""
         self._intensity, self._skip = intensity, skip
-        self._mode = self._typical_mode()
+        self._mode = typical_mode(self._dialogue)
         self._turn_motor(on=True)
         mode = struct.pack("<BHH", self._mode.number, 0, 0)
         command = protocol.SCAN if self._mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
-        self._request(command, mode)
-        told, follows = self._reply(time.monotonic() + _ANSWER_S)
+        self._dialogue.request(command, mode)
+        told, follows = self._dialogue.reply()
         if not told.stream or told.kind != self._mode.kind:
             raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
         self._scanning, self._turning = True, False
@@ -160,7 +147,7 @@ class SlamtecLidar:
             DeviceError: the sensor is gone.
         """
         self._scanning = False
-        self._request(protocol.STOP)
+        self._dialogue.request(protocol.STOP)
         self._turn_motor(on=False)
 
     def reconnect(self, timeout_s: float = 3.0) -> None:
@@ -192,9 +179,9 @@ class SlamtecLidar:
                 for _ in range(_TRIES):
                     before = self._line.heard
                     with suppress(DeviceTimeoutError):
-                        self._request(protocol.STOP)
-                        self._drain()
-                        told = self._told(protocol.INFO, 4, protocol.info)
+                        self._dialogue.request(protocol.STOP)
+                        self._dialogue.drain()
+                        told = self._dialogue.told(protocol.INFO, 4, protocol.info)
                         self._accept(told, model)
                         self._baud = baud
                         return
@@ -213,37 +200,13 @@ class SlamtecLidar:
         self._lidar = load_catalogue().get(found.model, Lidar)
         self.serial_number, self.firmware = told.serial_number, told.firmware
 
-    def _typical_mode(self) -> _Mode:
-        """The mode that it streams best in; firmware without modes has express scans."""
-        with suppress(DeviceTimeoutError):
-            number = self._configured(protocol.CONF_TYPICAL, b"", "<H")
-            of_mode = struct.pack("<H", number)
-            kind = self._configured(protocol.CONF_ANSWER, of_mode, "<B")
-            point_us = self._configured(protocol.CONF_SAMPLE_US, of_mode, "<I") / 256
-            if kind in protocol.SIZES and point_us > 0:
-                return _Mode(number, kind, point_us * 1e3)
-        standard_us, express_us = self._told(protocol.SAMPLE_TIMES, 0x15, protocol.sample_times)
-        if express_us:
-            return _Mode(0, protocol.CAPSULES, express_us * 1e3)
-        return _Mode(0, protocol.NODES, max(standard_us, 1) * 1e3)
-
-    def _configured(self, key: int, payload: bytes, layout: str) -> int:
-        """A number of its configuration."""
-
-        def value(data: bytes) -> int:
-            if len(data) < 4 + struct.calcsize(layout) or int.from_bytes(data[:4], "little") != key:
-                raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not the configuration {key:#x}")
-            return int(struct.unpack_from(layout, data, 4)[0])
-
-        return self._told(protocol.GET_CONF, 0x20, value, struct.pack("<I", key) + payload)
-
     def _turn_motor(self, *, on: bool) -> None:
         if self._motor == "dtr" and self._line.serial is not None:
             self._line.serial.set_dtr(not on)
         elif self._motor == "pwm":
-            self._request(protocol.MOTOR_PWM, struct.pack("<H", _PWM if on else 0))
+            self._dialogue.request(protocol.MOTOR_PWM, struct.pack("<H", _PWM if on else 0))
         elif self._motor == "rpm":
-            self._request(protocol.MOTOR_RPM, struct.pack("<H", _RPM if on else 0))
+            self._dialogue.request(protocol.MOTOR_RPM, struct.pack("<H", _RPM if on else 0))
 
     def _begin_anew(self) -> None:
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
@@ -259,38 +222,6 @@ class SlamtecLidar:
             self._turns.add(points, arrival_ns)
         if self._count.broken:
             self._begin_anew()
-
-    def _told(self, command: int, kind: int, read: Callable[[bytes], Told], payload: bytes = b"") -> Told:
-        """What it answers to a request.
-
-        Raises:
-            DeviceTimeoutError: nothing in time.
-            DeviceError: something else.
-        """
-        self._request(command, payload)
-        deadline_s = time.monotonic() + _ANSWER_S
-        while True:
-            told, data = self._reply(deadline_s)
-            if told.kind == kind:
-                return read(data)
-
-    def _request(self, command: int, payload: bytes = b"") -> None:
-        """Ask, and forget what was told before."""
-        self._replies = protocol.ReplySplitter()
-        self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
-        self._line.send(protocol.request(command, payload))
-
-    def _reply(self, deadline_s: float) -> tuple[protocol.Descriptor, bytes]:
-        if not self._waiting:
-            self._waiting, _ = self._line.hear(self._replies.feed, deadline_s)
-        return self._waiting.pop(0)
-
-    def _drain(self) -> None:
-        """What it had sent before it stopped."""
-        end_s = time.monotonic() + _DRAIN_S
-        with self._line.told_when_gone():
-            while time.monotonic() < end_s and (drained := self._line.stream.read(_SILENT_S)):
-                self._line.heard += len(drained)
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:

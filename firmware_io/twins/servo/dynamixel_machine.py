@@ -12,11 +12,14 @@ from collections.abc import Sequence
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
+from firmware_io.twins.dynamics import HornMotion
+from firmware_io.twins.servo import dynamixel_groups as groups
+from firmware_io.twins.servo.dynamixel_control import count_of, show, wanted
 from firmware_io.twins.servo.dynamixel_memory import INDIRECT, ITEMS
-from firmware_io.twins.servo.dynamixel_packets import FAST_BULK_READ, FAST_SYNC_READ, fast_status, status, take
+from firmware_io.twins.servo.dynamixel_packets import fast_status, status, take
 from firmware_io.twins.servo.machine import BROADCAST, Request
 from firmware_io.twins.servo.memory import ACCESS, RANGE, Memory
+from firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
@@ -84,23 +87,12 @@ class DynamixelMachine:
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
         """The servos that answer one after the other: those of sync and bulk reads."""
-        if request.id != BROADCAST or not request.intact:
-            return None
-        if request.instruction in (0x82, FAST_SYNC_READ) and self._two:
-            return tuple(request.parameters[4:])
-        if request.instruction in (0x92, FAST_BULK_READ):
-            return tuple(request.parameters[::5] if self._two else request.parameters[2::3])
-        return None
+        return groups.ids_asked(request, two=self._two) if request.id == BROADCAST and request.intact else None
 
     def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
         """The bytes of what servos say: one status each, or one of all to a fast read."""
-        if self._two and request.id == BROADCAST and request.instruction in (FAST_SYNC_READ, FAST_BULK_READ):
-            parameters = request.parameters
-            if request.instruction == FAST_SYNC_READ:
-                size = len(parameters[4:]) * (self._span(parameters)[1] + 4)
-            else:
-                size = sum(self._span(parameters[k + 1 :])[1] + 4 for k in range(0, len(parameters), 5))
-            return [fast_status(size, said)]
+        if self._two and request.id == BROADCAST and request.instruction in groups.FAST:
+            return [fast_status(groups.fast_size(request), said)]
         return [status(self.table.protocol, *one) for one in said]
 
     def overheat(self) -> None:
@@ -138,7 +130,7 @@ class DynamixelMachine:
         if watched and now_ns - self._spoken_ns > memory[98] * 20_000_000:
             memory[98] = 255
             memory[104] = 0
-            memory[116] = self._count(self.axis.motion(now_ns).angle_rad)
+            memory[116] = count_of(self.table, memory, self._turns, self.axis.motion(now_ns).angle_rad)
             self._act(now_ns)
 
     def _carry_out(self, request: Request, now_ns: int) -> tuple[int | None, bytes]:
@@ -150,11 +142,11 @@ class DynamixelMachine:
         if request.instruction == 1:
             return 0, bytes(self.memory.data[0:2]) + bytes([self.memory[6]]) if self._two else b""
         if request.instruction == 2 and not to_all:
-            error, data = self._read(*self._span(parameters), now_ns)
+            error, data = self._read(*groups.span(parameters, two=self._two), now_ns)
             return (None if level < 1 else error), data
-        fast = self._two and request.instruction in (FAST_SYNC_READ, FAST_BULK_READ)
-        if to_all and (fast or request.instruction in (0x82, 0x92)):
-            return self._read_among_others(request, now_ns)
+        if to_all and (request.instruction in groups.READS or (self._two and request.instruction in groups.FAST)):
+            mine = groups.span_for(request, self.id, two=self._two, bulk=self._two or self.table.measures_turn)
+            return (None, b"") if mine is None else self._read(*mine, now_ns)
         error = self._change(request, now_ns)
         return (None if to_all or level < 2 else error), b""
 
@@ -174,20 +166,11 @@ class DynamixelMachine:
             (address, data), self._registered = self._registered, None
             self.memory[69 if self._two else 44] = 0
             return self._write(address, data, now_ns)
-        if request.instruction == 0x83 and len(parameters) > 2 * wide:
-            address, size = self._span(parameters)
-            rest = parameters[2 * wide :]
-            for start in range(0, len(rest) - size, size + 1):
-                if rest[start] == self.id:
-                    return self._write(address, rest[start + 1 : start + 1 + size], now_ns)
-            return 0
-        if request.instruction == 0x93 and self._two:
-            while len(parameters) >= 5:
-                (address, size), end = self._span(parameters[1:]), 5 + int.from_bytes(parameters[3:5], "little")
-                if parameters[0] == self.id:
-                    return self._write(address, parameters[5 : 5 + size], now_ns)
-                parameters = parameters[end:]
-            return 0
+        if (request.instruction == groups.SYNC_WRITE and len(parameters) > 2 * wide) or (
+            request.instruction == groups.BULK_WRITE and self._two
+        ):
+            mine = groups.write_for(request, self.id, two=self._two)
+            return 0 if mine is None else self._write(*mine, now_ns)
         if request.instruction == 6:
             self.memory.reset(7 if self._two else 3)
         elif request.instruction == 8 and self._two:
@@ -197,26 +180,6 @@ class DynamixelMachine:
         else:
             return unknown
         return 0
-
-    def _span(self, parameters: bytes) -> tuple[int, int]:
-        """Address and length at the head of the parameters."""
-        wide = 2 if self._two else 1
-        return int.from_bytes(parameters[:wide], "little"), int.from_bytes(parameters[wide : 2 * wide], "little")
-
-    def _read_among_others(self, request: Request, now_ns: int) -> tuple[int | None, bytes]:
-        """Sync read and bulk read; in protocol 1.0 the MX know the second, and the AX neither."""
-        parameters = request.parameters
-        if request.instruction in (0x82, FAST_SYNC_READ) and self._two and self.id in parameters[4:]:
-            return self._read(*self._span(parameters), now_ns)
-        if request.instruction in (0x92, FAST_BULK_READ) and self._two:
-            blocks = (parameters[start : start + 5] for start in range(0, len(parameters), 5))
-            mine = next((block[1:] for block in blocks if block[0] == self.id), None)
-        elif request.instruction == 0x92 and self.table.measures_turn:
-            blocks = (parameters[start : start + 3] for start in range(1, len(parameters), 3))
-            mine = next((bytes([block[2], block[0]]) for block in blocks if block[1:2] == bytes([self.id])), None)
-        else:
-            mine = None
-        return (None, b"") if mine is None else self._read(*self._span(mine), now_ns)
 
     @property
     def _two(self) -> bool:
@@ -283,68 +246,20 @@ class DynamixelMachine:
     def _count_one_turn(self, now_ns: int) -> None:
         self._turns = math.floor((self.axis.motion(now_ns).angle_rad + math.pi) / (2 * math.pi))
 
-    def _count(self, angle_rad: float) -> int:
-        table = self.table
-        count = round(angle_rad / table.position.unit) + table.centre
-        if self._two:
-            return count - 4096 * self._turns + self.memory[20]
-        if table.measures_turn:
-            return count % (table.last + 1)
-        within_rad = math.remainder(angle_rad, 2 * math.pi)
-        return max(0, min(table.last, round(within_rad / table.position.unit) + table.centre))
-
     def _measure(self, now_ns: int) -> None:
         """Bring the present values up to date."""
-        table, memory, motion = self.table, self.memory, self.axis.motion(now_ns)
-        rate = round(motion.rate_rad_s / table.velocity.unit)
-        milliseconds = now_ns // 1_000_000 % 32768
-        memory[table.position.address] = self._count(motion.angle_rad)
-        memory[table.voltage.address] = round(self._supply * self._rated_v * 10)
-        memory[table.temperature.address] = self._hot_degC
-        if self._two:
-            memory[table.velocity.address] = rate
-            memory[table.load.address] = round(motion.torque / table.load.unit)
-            memory[120], memory[122] = milliseconds, int(abs(rate) > memory[24])
-            return
-        wheel = memory[6] == memory[8] == 0
-        shown = round(motion.duty * 1023) if wheel and not table.speed_loop else rate
-        memory[table.velocity.address] = _bit10(shown)
-        memory[table.load.address] = _bit10(round(motion.duty * 1000))
-        memory[46] = int(abs(rate) > 2)
-        if 50 in memory:
-            memory[50] = milliseconds
+        show(self.table, self.memory, self._turns, self.axis.motion(now_ns), now_ns)
+        self.memory[self.table.voltage.address] = round(self._supply * self._rated_v * 10)
+        self.memory[self.table.temperature.address] = self._hot_degC
 
     def _act(self, now_ns: int) -> None:
         """Make the motor do what the control table says."""
-        drive = self._wanted()
+        drive = wanted(self.table, self.memory, self._turns)
         now = self.axis.drive_at(now_ns)
         if drive != Actuation(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
             self.axis.change(
                 now_ns, mode=drive.mode, goal=drive.goal, rate_rad_s=drive.rate_rad_s, torque_limit=drive.torque_limit
             )
-
-    def _wanted(self) -> Actuation:
-        table, memory = self.table, self.memory
-        if not memory[table.torque.address]:
-            return Actuation()
-        speed, goal = memory[table.wheel_speed.address], memory[table.goal.address]
-        goal_rad = (goal - table.centre) * table.goal.unit + 2 * math.pi * self._turns
-        if not self._two:
-            limit = memory[34] / 1023
-            if memory[6] == memory[8] == 0:
-                signed = (speed & 1023) * (-1 if speed & 1024 else 1)
-                if not table.speed_loop:
-                    return Actuation("share", signed / 1023, torque_limit=limit)
-                return Actuation("velocity", signed * table.wheel_speed.unit, torque_limit=limit)
-            rate = (speed & 1023) * table.joint_speed.unit or math.inf
-            return Actuation("position", goal_rad, rate, torque_limit=limit)
-        limit, mode = memory[36] / 885, memory[11]
-        if mode == 1:
-            return Actuation("velocity", speed * table.wheel_speed.unit, torque_limit=limit)
-        if mode in (3, 4):
-            goal_rad -= memory[20] * table.goal.unit
-            return Actuation("position", goal_rad, memory[112] * table.joint_speed.unit or math.inf, torque_limit=limit)
-        return Actuation("share", memory[100] / 885, torque_limit=limit) if mode == 16 else Actuation()
 
     def _conditions(self) -> int:
         """The fault bits that go with each answer."""
@@ -376,7 +291,3 @@ class DynamixelMachine:
             if not self._two:
                 memory[34] = 0
             self._act(now_ns)
-
-
-def _bit10(count: int) -> int:
-    return min(abs(count), 1023) | (1024 if count < 0 else 0)

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 
 from firmware_io.twins.servo.machine import BROADCAST, Request
 
-FAST_SYNC_READ, FAST_BULK_READ = 0x8A, 0x9A
-
 
 def packet_checksum(body: bytes) -> int:
     """Protocol 1.0: of everything between header and checksum."""

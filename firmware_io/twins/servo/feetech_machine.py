@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.twins.dynamics import Actuation, HornMotion, Load, plant_of
+from firmware_io.twins.dynamics import HornMotion
 from firmware_io.twins.servo import feetech_packets
 from firmware_io.twins.servo.machine import BROADCAST, Request
 from firmware_io.twins.servo.memory import Memory, TableItem, ro, rw
+from firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32

@@ -25,9 +25,9 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
-from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo.machine import ServoMachine, answers
 from firmware_io.twins.servo.models import machine_of
+from firmware_io.twins.servo_plant import Load
 
 _TICK_S = 0.02  # between two looks of the servo at itself
 _FORGET_NS = 100_000_000  # a request that stays incomplete is dropped

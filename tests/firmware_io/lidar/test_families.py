@@ -13,6 +13,7 @@ from firmware_io.lidar.ldrobot import driver as ldrobot
 from firmware_io.lidar.lms2xx import driver as lms2xx
 from firmware_io.lidar.scip import dialogue as scip_dialogue
 from firmware_io.lidar.sick import dialogue as sick_dialogue
+from firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
 from firmware_io.lidar.slamtec import driver as slamtec
 
 
@@ -60,7 +61,7 @@ class SilentPort:
 def test_a_silent_port_is_asked_at_every_speed_in_nine_seconds(monkeypatch):
     """`doctor` without a model waits for each family in turn: what answers nothing at a speed is not asked again."""
     port = SilentPort()
-    for module in (sensor_line, ldrobot, lms2xx, scip_dialogue, sick_dialogue, slamtec):
+    for module in (sensor_line, ldrobot, lms2xx, scip_dialogue, sick_dialogue, slamtec_dialogue, slamtec):
         monkeypatch.setattr(module, "time", port)
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: port)
     monkeypatch.setattr(sensor_line.SensorLine, "serial", property(lambda _: port))

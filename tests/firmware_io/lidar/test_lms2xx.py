@@ -12,7 +12,7 @@ from design.errors import DeviceError, DeviceFaultError, ProtocolError
 from firmware_io.lidar import byte_stream, sensor_line
 from firmware_io.lidar.families import open_lidar
 from firmware_io.lidar.lms2xx import driver, protocol
-from firmware_io.scan.acquire import CLOCK_GOOD_NS
+from firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
 from firmware_io.twins.sick.lms_twin import LmsTwin, lms_twin, write_telegram
 
 # As users of the telegram listing write them, with their sums.
@@ -207,6 +207,76 @@ def test_what_it_cannot_is_said(opened):
     assert {lidar.read().scan.range_m.size for _ in range(4)} == {180}
     with pytest.raises(DeviceError, match=r"calls itself 'LMS200;30106;V02\.30': not a LMS 291"):
         open_lidar("virtual", "LMS 291")
+
+
+class VirtualPort(byte_stream.SerialStream):
+    """A virtual line on which both ends must have one speed: else the sensor hears nothing, and we hear noise."""
+
+    def __init__(self, line):
+        self.line, self.speed, self.answers_at = line, byte_stream.FIRST_BAUD, 0
+
+    @property
+    def baud(self):
+        return self.speed
+
+    @baud.setter
+    def baud(self, baud):
+        self.speed = baud
+
+    def can(self, _baud):
+        return True
+
+    def write(self, data):
+        if self.speed == self.line.machine.baud:
+            self.answers_at = self.speed  # also where it changes to another one
+            self.line.write(data)
+
+    def read(self, timeout_s):
+        data = self.line.read(timeout_s)
+        baud = self.answers_at or self.line.machine.baud
+        if data:
+            self.answers_at = 0
+        return data if self.speed == baud else b"\xf8" * len(data)
+
+    def close(self):
+        self.line.close()
+
+
+@pytest.mark.parametrize("fault", ["brown-out", "unplugged", "unplugged while it changes its speed"])
+def test_after_an_interruption_it_is_found_at_the_speed_that_it_has_by_then(monkeypatch, fault):
+    line = VirtualLine("LMS 200", Wall())
+    for module in (sensor_line, driver):
+        monkeypatch.setattr(module, "time", line)
+    monkeypatch.setattr(sensor_line, "open_stream", lambda address: VirtualPort(line.open(address)))
+    with open_lidar("virtual", "LMS 200") as lidar:
+        lidar.start()
+        assert lidar.read().scan.range_m.size == 181 and line.machine.baud == 500_000
+        if fault == "brown-out":
+            line.machine.power_cycle(line.now_ns)
+        else:
+            line.unplug()
+        if fault == "unplugged while it changes its speed":
+            line.machine.power_cycle(line.now_ns - 10**9)
+            hear = line.machine.hear
+
+            def speed_answered_into_the_void(received, now_ns):
+                told, rest = hear(received, now_ns)
+                if line.machine.baud == 500_000:
+                    line.machine.hear = hear
+                    return b"", rest
+                return told, rest
+
+            line.machine.hear = speed_answered_into_the_void
+        began_ns = line.now_ns
+        with pytest.raises(DeviceError):
+            for _ in range(4):
+                lidar.read()
+        line.plugged = True
+        lidar.reconnect(10.0)
+        assert np.isfinite(lidar.read().scan.range_m).any()
+        assert line.machine.baud == 500_000
+        most_s = {"brown-out": 1.3, "unplugged": 0.1}.get(fault, driver._MODE_S + 1.3)
+        assert (line.now_ns - began_ns) / 1e9 < most_s
 
 
 class SlowPort(byte_stream.SerialStream):

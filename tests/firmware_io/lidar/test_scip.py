@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.errors import ProtocolError, ScanwrightError
-from firmware_io.lidar.scip import parameters, protocol
+from firmware_io.lidar.scip import measurement, parameters, protocol
 
 CAPTURES = {
     "urg_04lx.rx": (10, 6968830, 682, 0, [392, 392, 391, 385, 381], 4166),
@@ -33,7 +33,7 @@ def test_captures_decode_to_the_last_byte(data, name):
     count, stamp_ms, ranges, intensities, first, largest = CAPTURES[name]
     found, bad = replies_of(stream)
     assert (len(found), bad) == (count, 0)
-    taken = protocol.measurement(found[-1])
+    taken = measurement.measurement(found[-1])
     assert (taken.stamp_ms, taken.value.size, taken.intensity.size) == (stamp_ms, ranges, intensities)
     assert taken.value[:5].tolist() == first
     assert taken.value.max() == largest
@@ -44,8 +44,8 @@ def test_captures_are_written_again_byte_for_byte(data, name):
     stream = (data / "scip" / name).read_bytes()
     again = b""
     for told in replies_of(stream)[0]:
-        if protocol.is_scan(told):
-            taken = protocol.measurement(told)
+        if measurement.is_scan(told):
+            taken = measurement.measurement(told)
             numbers = np.stack([taken.value, taken.intensity], axis=1) if taken.intensity.size else taken.value
             lines = protocol.data_lines(
                 taken.stamp_ms, protocol.encode(numbers.ravel().tolist(), taken.window.characters)
@@ -61,7 +61,7 @@ def test_captures_are_written_again_byte_for_byte(data, name):
 @pytest.mark.parametrize("name", CAPTURES)
 def test_another_projects_decoder_reads_the_same(data, name):
     stream = (data / "scip" / name).read_bytes()
-    taken = protocol.measurement(replies_of(stream)[0][-1])
+    taken = measurement.measurement(replies_of(stream)[0][-1])
     block = stream[:-2].split(b"\n\n")[-1].decode().split("\n")
     theirs = HokuyoLX._process_scan_data(HokuyoLX, block[3:], taken.window.intensity)
     ours = np.stack([taken.value, taken.intensity], axis=1) if taken.window.intensity else taken.value
@@ -87,7 +87,7 @@ def test_what_was_written_is_read(draw):
     first = draw.draw(st.integers(0, 1000))
     characters, intensity = draw.draw(st.sampled_from([(2, False), (3, False), (3, True)]))
     cluster, last = draw.draw(st.integers(1, 99)), first + draw.draw(st.integers(0, 300))
-    window = protocol.Window(
+    window = measurement.Window(
         first_step=first, last_step=last, cluster=cluster, characters=characters, intensity=intensity
     )
     size = len(range(first, last + 1, cluster))
@@ -96,16 +96,16 @@ def test_what_was_written_is_read(draw):
     stamp_ms, count = draw.draw(st.integers(0, 2**24 - 1)), draw.draw(st.integers(0, 99))
     skip = draw.draw(st.integers(0, 9))
     lines = protocol.data_lines(stamp_ms, protocol.encode(numbers, characters))
-    stream = protocol.reply(protocol.continuous(window, skip=skip, count=count), "99", lines)
-    stream += protocol.reply(b"G" + protocol.continuous(window)[1:-3], "00", lines)
+    stream = protocol.reply(measurement.continuous(window, skip=skip, count=count), "99", lines)
+    stream += protocol.reply(b"G" + measurement.continuous(window)[1:-3], "00", lines)
     assert all(len(line) <= 65 for line in stream.split(b"\n"))
     (scan, one), bad = replies_of(stream)
-    taken = protocol.measurement(scan)
+    taken = measurement.measurement(scan)
     assert (bad, taken.stamp_ms, taken.remaining, taken.window) == (0, stamp_ms, count, window)
     assert (taken.value.tolist(), taken.intensity.tolist()) == (
         (numbers[::2], numbers[1::2]) if intensity else (numbers, [])
     )
-    assert protocol.measurement(one).value.tolist() == taken.value.tolist()
+    assert measurement.measurement(one).value.tolist() == taken.value.tolist()
 
 
 def test_firmware_that_sums_otherwise_is_understood():
@@ -121,7 +121,7 @@ def test_scip_1_and_refusals_are_words():
     assert (old.status, step.status, refused.status, bad) == ("E", "0", "04", 0)
     assert "time" in adjusting.told()
     with pytest.raises(ProtocolError, match="status 04"):
-        protocol.measurement(refused)
+        measurement.measurement(refused)
     with pytest.raises(ProtocolError, match="VV: status 0E"):
         protocol.information(adjusting)
 
@@ -138,13 +138,13 @@ def test_scip_1_and_refusals_are_words():
 )
 def test_requests_that_cannot_be_written_are_refused(window):
     with pytest.raises(ScanwrightError):
-        protocol.Window(**window)
+        measurement.Window(**window)
 
 
 def a_scan(count=0, steps=40, first=0):
-    window = protocol.Window(first_step=first, last_step=first + steps - 1)
+    window = measurement.Window(first_step=first, last_step=first + steps - 1)
     lines = protocol.data_lines(1000 + count, protocol.encode(range(20, 20 + steps), 3))
-    return protocol.reply(protocol.continuous(window, count=count), "99", lines)
+    return protocol.reply(measurement.continuous(window, count=count), "99", lines)
 
 
 @pytest.mark.parametrize(
@@ -161,24 +161,24 @@ def a_scan(count=0, steps=40, first=0):
 )
 def test_the_next_whole_scan_is_found_again(damaged, survivors):
     found, bad = replies_of(damaged + a_scan(9), range(0, 100, 7))
-    assert [protocol.measurement(told).remaining for told in found] == [*survivors, 9]
+    assert [measurement.measurement(told).remaining for told in found] == [*survivors, 9]
     assert bad == 1
 
 
 def test_empty_lines_between_replies_are_no_damage():
     found, bad = replies_of(b"\n\n\n" + a_scan(1) + b"\n" + a_scan(2))
-    assert [protocol.measurement(told).remaining for told in found] == [1, 2]
+    assert [measurement.measurement(told).remaining for told in found] == [1, 2]
     assert bad == 0
 
 
 def test_lines_of_another_length_are_refused_though_their_sums_are_right():
-    window = protocol.Window(first_step=0, last_step=39)
+    window = measurement.Window(first_step=0, last_step=39)
     payload = protocol.encode(range(20, 60), 3)
     lines = [protocol.summed(protocol.encode([5], 4)), protocol.summed(payload[:60]), protocol.summed(payload[60:])]
-    (told,), bad = replies_of(protocol.reply(protocol.continuous(window), "99", lines))
+    (told,), bad = replies_of(protocol.reply(measurement.continuous(window), "99", lines))
     assert bad == 0
     with pytest.raises(ProtocolError, match="a line was cut"):
-        protocol.measurement(told)
+        measurement.measurement(told)
 
 
 def test_garbage_without_end_does_not_fill_the_memory():
@@ -199,7 +199,7 @@ def test_no_single_flipped_bit_of_a_scan_is_accepted():
             flipped = stream[:at] + bytes([stream[at] ^ (1 << bit)]) + stream[at + 1 :]
             for told in replies_of(flipped)[0]:
                 with pytest.raises(ProtocolError):
-                    protocol.measurement(told)
+                    measurement.measurement(told)
 
 
 def mutated(rng, stream):
@@ -231,7 +231,7 @@ def survive(stream):
         for line in told.lines:
             total = bytes([sum(line) % 64 + 0x30])
             assert line + total in stream or line + b";" in stream
-        for read in (protocol.information, protocol.measurement, protocol.stamp):
+        for read in (protocol.information, measurement.measurement, measurement.stamp):
             try:
                 taken = read(told)
             except ProtocolError:
@@ -241,7 +241,7 @@ def survive(stream):
                     parameters.parameters(taken)
                 except ProtocolError:
                     continue
-            if read is protocol.measurement:
+            if read is measurement.measurement:
                 accepted += 1
                 assert taken.value.size == taken.window.size
                 assert taken.intensity.size == (taken.window.size if taken.window.intensity else 0)
@@ -253,7 +253,7 @@ def survive(stream):
 
 
 def dialogue():
-    both = protocol.Window(first_step=3, last_step=12, intensity=True)
+    both = measurement.Window(first_step=3, last_step=12, intensity=True)
     known = [("MODL", "URG-04LX(H)"), ("DMIN", "20"), ("DMAX", "5600"), ("ARES", "1024"), ("AMIN", "44")]
     return (
         protocol.reply(b"VV", "00", protocol.text_lines([("VEND", "Hokuyo"), ("SERI", "H07")]))
@@ -261,7 +261,7 @@ def dialogue():
         + protocol.reply(b"TM1", "00", [protocol.summed(protocol.encode([123456], 4))])
         + a_scan(2)
         + protocol.reply(
-            protocol.continuous(both, count=1), "99", protocol.data_lines(77, protocol.encode(range(20), 3))
+            measurement.continuous(both, count=1), "99", protocol.data_lines(77, protocol.encode(range(20), 3))
         )
     )
 
@@ -323,23 +323,23 @@ def test_parameters_that_cannot_be_are_refused(wrong):
 
 def test_a_rest_that_fills_no_cluster_may_be_sent_or_not():
     """Which sensors do is not known; one more or one less than that is a damaged scan."""
-    window = protocol.Window(first_step=0, last_step=11, cluster=5)
+    window = measurement.Window(first_step=0, last_step=11, cluster=5)
     assert (window.size, window.whole_clusters) == (3, 2)
-    echo = protocol.continuous(window)
+    echo = measurement.continuous(window)
     for count in range(5):
         told = protocol.Reply(echo, "99", (protocol.encode([7], 4), protocol.encode(range(100, 100 + count), 3)))
         if count in (2, 3):
-            np.testing.assert_array_equal(protocol.measurement(told).value, 100 + np.arange(count))
+            np.testing.assert_array_equal(measurement.measurement(told).value, 100 + np.arange(count))
         else:
             with pytest.raises(ProtocolError, match=f"{count} numbers for 3 steps"):
-                protocol.measurement(told)
+                measurement.measurement(told)
 
 
 @pytest.mark.parametrize("intensity", [False, True])
 def test_how_many_bytes_a_scan_has(intensity):
-    window = protocol.Window(first_step=44, last_step=725, intensity=intensity)
+    window = measurement.Window(first_step=44, last_step=725, intensity=intensity)
     payload = protocol.encode(range(window.size * (2 if intensity else 1)), 3)
-    told = protocol.reply(protocol.continuous(window), "99", protocol.data_lines(0, payload))
+    told = protocol.reply(measurement.continuous(window), "99", protocol.data_lines(0, payload))
     assert window.bytes_per_scan == len(told)
 
 

@@ -16,7 +16,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.errors import DeviceError, ProtocolError
 from firmware_io.lidar import sensor_line
 from firmware_io.lidar.families import open_lidar
-from firmware_io.lidar.slamtec import driver, protocol
+from firmware_io.lidar.slamtec import dialogue, driver, protocol
 from firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
 
 # What the maker's protocol manual and SDK write.
@@ -43,7 +43,7 @@ DESCRIPTORS = [
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Twins share a computer with the tests: ten times as long; what old firmware leaves unanswered is waited for."""
-    monkeypatch.setattr(driver, "_ANSWER_S", 2.0)
+    monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
 
@@ -261,7 +261,7 @@ def off_ms(scan):
 def test_times_are_right_after_a_stall_of_the_host(monkeypatch, model, stalled_s, buffer_ns):
     line = VirtualLine(model, at_its_time)
     monkeypatch.setattr(virtual_line, "_BUFFER_NS", buffer_ns)
-    for module in (sensor_line, driver):
+    for module in (sensor_line, dialogue, driver):
         monkeypatch.setattr(module, "time", line)
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     with open_lidar("virtual", model) as ours:

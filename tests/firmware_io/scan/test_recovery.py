@@ -16,8 +16,9 @@ from firmware_io.lidar.scip import driver as scip
 from firmware_io.lidar.sick import dialogue as cola
 from firmware_io.lidar.sick import driver as sick
 from firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
+from firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
 from firmware_io.lidar.slamtec import driver as slamtec
-from firmware_io.scan import acquire, doctor
+from firmware_io.scan import doctor, lidar_scans
 
 MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS 200")
 MOST_LOST_S = 1.0
@@ -37,7 +38,7 @@ class Scanner:
 
     def __init__(self, line, lidar):
         self.line, self.lidar, self.said, self.axis = line, lidar, [], []
-        self.scans = acquire._Scans(lidar, self.said.append)
+        self.scans = lidar_scans.LidarScans(lidar, self.said.append)
         self.scans.axis = SimpleNamespace(stop=lambda: not self.axis.append("stop"), go=lambda: self.axis.append("go"))
 
     def next(self):
@@ -53,7 +54,18 @@ class Scanner:
 def line(request, monkeypatch):
     line = VirtualLine(request.param, wall)
     line.machine.baud = 500_000  # of those that have a speed: no such line here
-    for module in (sensor_line, ldrobot, lms2xx, scip_dialogue, scip, cola, sick, slamtec, acquire):
+    for module in (
+        sensor_line,
+        ldrobot,
+        lms2xx,
+        scip_dialogue,
+        scip,
+        cola,
+        sick,
+        slamtec_dialogue,
+        slamtec,
+        lidar_scans,
+    ):
         monkeypatch.setattr(module, "time", line)
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     monkeypatch.setattr(scip, "lidar_ports", list)
@@ -127,7 +139,7 @@ def test_one_that_stays_away_is_a_typed_error_of_one_line(scanner):
 def test_noise_without_end_is_a_timeout(scanner, monkeypatch):
     with monkeypatch.context() as noise:
         noise.setattr(scanner.line, "read", lambda _: scanner.line.sleep(0.01) or b"\x00\xff\x54\xa5\x02" * 8)
-        noise.setattr(acquire, "_AWAY_S", 1.0)
+        noise.setattr(lidar_scans, "_AWAY_S", 1.0)
         with pytest.raises(DeviceError, match=r"did not come back in 1\.0 s"):
             scanner.next()
 
@@ -160,10 +172,24 @@ def test_what_a_sensor_warns_of_is_told_once_by_a_scan_and_is_no_good_finding_of
     [("RPLIDAR A2", "health", 2), ("TiM561", "status", FAULT), ("LMS 200", "status", 0x13)],
     indirect=["line"],
 )
-def test_a_sensor_that_reports_a_fault_is_a_typed_error_before_a_servo_turns(line, state, value):
+def test_a_sensor_that_reports_a_fault_is_a_typed_error_before_a_servo_turns_and_at_once(line, state, value):
     setattr(line.machine, state, value)
-    said = []
-    with open_lidar("virtual", line.model) as lidar, pytest.raises(DeviceError, match="fault") as told:
+    said, began_ns = [], line.now_ns
+    with open_lidar("virtual", line.model) as lidar, pytest.raises(DeviceFaultError, match="fault"):
         lidar.start()
-        acquire._settle_clock(acquire._Scans(lidar, said.append), said.append)
-    assert isinstance(told.value, DeviceFaultError) or isinstance(told.value.__cause__, DeviceFaultError)
+        lidar_scans.settle_clock(lidar_scans.LidarScans(lidar, said.append), said.append)
+    assert line.now_ns - began_ns < MOST_LOST_S * 1e9
+    assert said in ([], ["learning the sensor's clock"])
+
+
+@pytest.mark.parametrize(
+    ("line", "state", "value"), [("TiM561", "status", FAULT), ("LMS 200", "status", 0x13)], indirect=["line"]
+)
+def test_a_fault_in_the_midst_of_a_scan_is_told_within_the_turns_that_were_under_way(scanner, state, value):
+    setattr(scanner.line.machine, state, value)
+    began_ns = scanner.line.now_ns
+    with pytest.raises(DeviceFaultError, match="fault"):
+        for _ in range(5):
+            scanner.next()
+    assert scanner.line.now_ns - began_ns < 5e9 / scanner.lidar.scan_rate_hz
+    assert scanner.axis == []  # what ends the scan ends the motion, too

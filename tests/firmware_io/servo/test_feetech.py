@@ -15,10 +15,10 @@ from firmware_io.servo.bus.bus import ServoBus
 from firmware_io.servo.bus.registers import Register
 from firmware_io.servo.feetech.packets import STS, begun, request
 from firmware_io.servo.feetech.tables import TABLES
-from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo import feetech_packets
 from firmware_io.twins.servo.machine import answers
 from firmware_io.twins.servo.models import machine_of
+from firmware_io.twins.servo_plant import Load
 
 (STS3215,) = TABLES
 

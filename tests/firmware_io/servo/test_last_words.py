@@ -10,7 +10,7 @@ import pytest
 from design.angles import AngleSet
 from design.errors import DeviceError, DeviceTimeoutError
 from design.motion import Spin
-from firmware_io.scan import acquire, axis_thread
+from firmware_io.scan import acquire, axis_thread, lidar_scans
 from firmware_io.scan.axis_thread import turning_servo
 from firmware_io.servo import guard
 from firmware_io.servo.progress import ServoState
@@ -101,7 +101,7 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
 
     servo = Holding(hears)
     with turning_servo(servo, Spin(period_s=2.0)) as axis, pytest.raises(DeviceError, match="did not come back"):
-        scans = object.__new__(acquire._Scans)
+        scans = object.__new__(lidar_scans.LidarScans)
         scans.lidar, scans.axis, scans.away, scans._say = Away(), axis, 0, said.append
         scans.next()
     assert servo.held >= 1

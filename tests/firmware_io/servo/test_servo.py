@@ -25,7 +25,7 @@ from firmware_io.servo.bus.registers import RPM, Register
 from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from firmware_io.servo.dynamixel.tables import TABLES
 from firmware_io.servo.find import find_servo
-from firmware_io.servo.progress import nearest_turn
+from firmware_io.servo.reading import nearest_turn
 from firmware_io.servo.servo import open_servo
 from firmware_io.twins.servo.dynamixel_packets import packet_2, status
 

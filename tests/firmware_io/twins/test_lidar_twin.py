@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar as Lidar
 from design.errors import DeviceError
-from firmware_io.lidar.scip import protocol
+from firmware_io.lidar.scip import measurement, protocol
 from firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
 from firmware_io.twins.lidar import LidarTwin
 from firmware_io.twins.lidar_machine import LidarMachine, clustered
@@ -36,14 +36,14 @@ def asked(sensor, request, now_ns=0):
 
 def scanned(sensor):
     (told,) = protocol.Splitter().feed(sensor.next_scan())
-    return protocol.measurement(told)
+    return measurement.measurement(told)
 
 
 @pytest.mark.parametrize("name", ["urg_04lx", "utm_30lx", "uxm_30lx_e"])
 def test_captured_requests_get_the_captured_bytes(data, name):
     captured = (data / "scip" / f"{name}.rx").read_bytes()
     requests = (data / "scip" / f"{name}.tx").read_bytes().split()
-    scan = protocol.measurement(protocol.Splitter().feed(captured)[-1])
+    scan = measurement.measurement(protocol.Splitter().feed(captured)[-1])
     model = next(model for model in IDENTITIES if model.lower().replace("-", "_") == name)
     # The numbers of the capture as ranges: those below the least range are the codes that the twin does not choose.
     range_m = np.where(scan.value == IDENTITIES[model].no_return, np.inf, scan.value / 1000)
@@ -66,7 +66,7 @@ def test_captured_requests_get_the_captured_bytes(data, name):
             assert [len(line) for line in told.split(b"\n")] == [len(line) for line in real.split(b"\n")]
             (mine,) = protocol.Splitter().feed(told + b"\n\n")
             valid = scan.value >= IDENTITIES[model].parameters.range_min_mm
-            np.testing.assert_array_equal(protocol.measurement(mine).value[valid], scan.value[valid])
+            np.testing.assert_array_equal(measurement.measurement(mine).value[valid], scan.value[valid])
             assert mine.echo + b"\n00P" == real[: len(mine.echo) + 4]
 
 
@@ -115,7 +115,7 @@ def test_laser_time_and_reset_are_states():
     assert [asked(sensor, b"BM").status, asked(sensor, b"BM").status] == ["00", "02"]
     assert asked(sensor, b"TM0").status == "00"
     assert not sensor.laser
-    assert [protocol.stamp(asked(sensor, b"TM1", now * MS)) for now in (0, 4, 5, 6)] == [
+    assert [measurement.stamp(asked(sensor, b"TM1", now * MS)) for now in (0, 4, 5, 6)] == [
         (1 << 24) - 5,
         (1 << 24) - 1,
         0,
@@ -144,7 +144,7 @@ def test_scans_count_down_carry_the_text_and_put_the_laser_out():
     while sensor.next_ns() < 1 << 60:
         for told in protocol.Splitter().feed(sensor.next_scan()):
             echoes.append(told.echo)
-            stamps.append(protocol.measurement(told).stamp_ms)
+            stamps.append(measurement.measurement(told).stamp_ms)
     assert echoes == [b"MD00000009021%02d;hello" % left for left in (2, 1, 0)]
     assert np.diff(stamps).tolist() == [50, 50]  # one of two is left out
     assert not sensor.laser
@@ -240,8 +240,10 @@ def test_scans_arrive_late_and_in_order_but_never_early():
             client.sendall(b"MD0000000401000\n")
             splitter, arrivals = protocol.Splitter(), []
             while len(arrivals) < 25:
-                arrivals += [time.monotonic_ns() for told in splitter.feed(client.recv(4096)) if protocol.is_scan(told)]
-    late_ms = (np.array(arrivals) - np.array(begun[:25]) - twin.smallest_delay_ns) / MS
+                arrivals += [
+                    time.monotonic_ns() for told in splitter.feed(client.recv(4096)) if measurement.is_scan(told)
+                ]
+    late_ms = (np.array(arrivals[:25]) - np.array(begun[:25]) - twin.smallest_delay_ns) / MS
     assert late_ms.min() >= 0
     assert 3 < np.median(late_ms)  # evenly spread to 20 ms, and more where the machine is busy
     assert twin.smallest_delay_ns == pytest.approx(1081 / 1440 * 25.05 * MS, abs=1)

@@ -23,11 +23,11 @@ from firmware_io import serial_port
 from firmware_io.servo.bus.registers import Register
 from firmware_io.servo.dynamixel.tables import TABLES
 from firmware_io.servo.servo import open_servo
-from firmware_io.twins.dynamics import Load
 from firmware_io.twins.servo.dynamixel_packets import crc16, packet_2, status, take
 from firmware_io.twins.servo.machine import answers
 from firmware_io.twins.servo.models import machine_of
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.servo_plant import Load
 
 MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
 MODELS += [("STS3215", "STS")]

@@ -13,8 +13,8 @@ from design.errors import DeviceError
 from design.scene.ray_caster import Hits, build_scene, cast
 from firmware_io.assembly.deskew import place
 from firmware_io.samples import JointLog, Scan
-from firmware_io.twins.dynamics import Load
 from firmware_io.twins.head import read_load
+from firmware_io.twins.servo_plant import Load
 from firmware_io.twins.world import RangeModel, furnished_room, measure_ranges, range_model, rays, see
 
 BEARINGS_RAD = load_catalogue().get("UTM-30LX", Lidar).bearings_rad()

@@ -1,0 +1,126 @@
+"""Questions to an RPLIDAR, what it answers, and which of its modes it streams best in."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+from design.errors import DeviceTimeoutError, ProtocolError
+from firmware_io.lidar.sensor_line import SensorLine
+from firmware_io.lidar.slamtec import protocol
+
+_ANSWER_S = 0.5
+_DRAIN_S, _SILENT_S = 0.2, 0.03
+
+Told = TypeVar("Told")
+
+
+class SlamtecDialogue:
+    """The talk with one sensor.
+
+    Attributes:
+        line: that it goes over.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Open the line.
+
+        Raises:
+            DeviceError: no such port or host, or it is in use.
+        """
+        self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))
+        self._replies = protocol.ReplySplitter()
+        self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
+
+    def told(self, command: int, kind: int, read: Callable[[bytes], Told], payload: bytes = b"") -> Told:
+        """What it answers to a request.
+
+        Args:
+            command: the request.
+            kind: type of the answer.
+            read: what the answer's bytes mean.
+            payload: of the request.
+
+        Raises:
+            DeviceTimeoutError: nothing in time.
+            DeviceError: something else.
+        """
+        self.request(command, payload)
+        deadline_s = time.monotonic() + _ANSWER_S
+        while True:
+            told, data = self._reply(deadline_s)
+            if told.kind == kind:
+                return read(data)
+
+    def request(self, command: int, payload: bytes = b"") -> None:
+        """Ask, and forget what was told before.
+
+        Raises:
+            DeviceError: the connection broke.
+        """
+        self._replies = protocol.ReplySplitter()
+        self._waiting = []
+        self.line.send(protocol.request(command, payload))
+
+    def reply(self) -> tuple[protocol.Descriptor, bytes]:
+        """The next answer, and what follows it; raises as `SensorLine.hear` does."""
+        return self._reply(time.monotonic() + _ANSWER_S)
+
+    def drain(self) -> None:
+        """Pass over what it had sent before it stopped.
+
+        Raises:
+            DeviceError: the connection broke.
+        """
+        end_s = time.monotonic() + _DRAIN_S
+        with self.line.told_when_gone():
+            while time.monotonic() < end_s and (drained := self.line.stream.read(_SILENT_S)):
+                self.line.heard += len(drained)
+
+    def _reply(self, deadline_s: float) -> tuple[protocol.Descriptor, bytes]:
+        if not self._waiting:
+            self._waiting, _ = self.line.hear(self._replies.feed, deadline_s)
+        return self._waiting.pop(0)
+
+
+@dataclass(frozen=True, slots=True)
+class StreamMode:
+    """How it streams: its number, the type of its packets, and between two points [ns]."""
+
+    number: int
+    kind: int
+    point_ns: float
+
+
+def typical_mode(dialogue: SlamtecDialogue) -> StreamMode:
+    """The mode that it streams best in; firmware without modes has express scans.
+
+    Raises:
+        DeviceError: it does not answer, answers something else, or is gone.
+    """
+    with suppress(DeviceTimeoutError):
+        number = _configured(dialogue, protocol.CONF_TYPICAL, b"", "<H")
+        of_mode = struct.pack("<H", number)
+        kind = _configured(dialogue, protocol.CONF_ANSWER, of_mode, "<B")
+        point_us = _configured(dialogue, protocol.CONF_SAMPLE_US, of_mode, "<I") / 256
+        if kind in protocol.SIZES and point_us > 0:
+            return StreamMode(number, kind, point_us * 1e3)
+    standard_us, express_us = dialogue.told(protocol.SAMPLE_TIMES, 0x15, protocol.sample_times)
+    if express_us:
+        return StreamMode(0, protocol.CAPSULES, express_us * 1e3)
+    return StreamMode(0, protocol.NODES, max(standard_us, 1) * 1e3)
+
+
+def _configured(dialogue: SlamtecDialogue, key: int, payload: bytes, layout: str) -> int:
+    """A number of its configuration."""
+
+    def value(data: bytes) -> int:
+        if len(data) < 4 + struct.calcsize(layout) or int.from_bytes(data[:4], "little") != key:
+            raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not the configuration {key:#x}")
+        return int(struct.unpack_from(layout, data, 4)[0])
+
+    return dialogue.told(protocol.GET_CONF, 0x20, value, struct.pack("<I", key) + payload)

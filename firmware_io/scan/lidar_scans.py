@@ -1,0 +1,92 @@
+"""Scans of a lidar as they come, also after it was away for a while, and its clock on the host's.
+
+A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. When the sensor is back (ten
+seconds are granted) it turns on. One that says of itself that it has a fault is not waited for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from design.errors import DeviceError, DeviceFaultError
+from firmware_io.lidar.lidar import LidarDriver, TimedScan
+from firmware_io.samples import Scan
+from firmware_io.scan.axis_thread import AxisThread
+
+Say = Callable[[str], None]
+CLOCK_GOOD_NS = 500_000
+_CLOCK_LEAST_S = 3.0
+_CLOCK_PATIENCE_S = 10.0
+_AWAY_S = 10.0
+_UNHEARD = "the servo has not answered that it stands: look, and cut its power if it turns"
+
+
+class LidarScans:
+    """Scans with the host's times, as they come; goes on after the sensor was away for a while.
+
+    Attributes:
+        axis: what stands still while the sensor is away; None before it turns.
+        clock_ns: standard uncertainty of the last scan's time.
+        away: how often the sensor was.
+    """
+
+    def __init__(self, lidar: LidarDriver, say: Say) -> None:
+        self.lidar = lidar
+        self.axis: AxisThread | None = None
+        self.clock_ns = 0
+        self.away = 0
+        self._warned = ""
+        self._say = say
+
+    def next(self) -> Scan:
+        """The next one, however long the sensor was away before it.
+
+        Raises:
+            DeviceFaultError: the sensor reports a fault of its own.
+            DeviceError: it stayed away, or the servo failed meanwhile.
+        """
+        try:
+            timed = self.lidar.read()
+        except DeviceFaultError:
+            raise
+        except DeviceError as error:
+            stands = ""
+            if self.axis is not None:
+                held = self.axis.stop()
+                stands = "the servo has answered that it holds, " if held else f"{_UNHEARD}, "
+            self._say(f"{error}; {stands}waiting {_AWAY_S:g} s for the lidar to come back")
+            self.away += 1
+            timed = self._found_again()
+            if self.axis is not None:
+                self.axis.go()
+        self.clock_ns = timed.uncertainty_ns
+        if timed.warning and timed.warning != self._warned:
+            self._say(f"warning: {self.lidar.model}: {timed.warning}")
+            self._warned = timed.warning
+        return timed.scan
+
+    def _found_again(self) -> TimedScan:
+        deadline_s = time.monotonic() + _AWAY_S
+        while True:
+            self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
+            try:
+                return self.lidar.read()
+            except DeviceError:  # a sensor that just got its power answers before it measures
+                if time.monotonic() > deadline_s:
+                    raise
+
+
+def settle_clock(scans: LidarScans, say: Say) -> None:
+    """Read scans until the sensor's clock is known, or for so long that it will not be.
+
+    Raises:
+        DeviceError: as `LidarScans.next`.
+    """
+    say("learning the sensor's clock")
+    began_s = time.monotonic()
+    while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:
+        scans.next()
+        if waited_s > _CLOCK_PATIENCE_S:
+            say(f"warning: the sensor's clock is known to {scans.clock_ns / 1e6:.1f} ms only: is this computer busy?")
+            return

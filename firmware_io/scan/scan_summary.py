@@ -1,0 +1,47 @@
+"""What a scan recorded, and what it left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSummary:
+    """What was recorded, and what was not.
+
+    Attributes:
+        recording: the file.
+        scans: in it.
+        joint_samples: in it.
+        duration_s: from the first to the last scan.
+        speed_deg_s: mean speed of the servo while it was recorded, 0 for motions to and fro.
+        ripple_deg: root mean square of the deviation from even turning, over half a second.
+        clock_ns: standard uncertainty of the beams' times at the end.
+        reconnects: how often the lidar was away and came back.
+        left_out: what was not recorded, reason -> count.
+    """
+
+    recording: Path
+    scans: int
+    joint_samples: int
+    duration_s: float
+    speed_deg_s: float
+    ripple_deg: float
+    clock_ns: int
+    reconnects: int
+    left_out: dict[str, int]
+
+    def lines(self) -> list[str]:
+        """The same in words."""
+        lines = [f"left out {count:,}: {reason}" for reason, count in self.left_out.items()]
+        if self.reconnects:
+            lines.append(f"the lidar was away {self.reconnects} times")
+        if self.speed_deg_s:
+            lines.append(f"servo turned at {self.speed_deg_s:.2f} deg/s, ripple {self.ripple_deg:.3f} deg")
+        return [
+            *lines,
+            f"beams are timed to {self.clock_ns / 1e6:.2f} ms",
+            f"recorded {self.scans:,} scans and {self.joint_samples:,} angles, {self.duration_s:.1f} s, "
+            f"to {self.recording}",
+        ]
