@@ -3,8 +3,7 @@
 Over a turn the lidar's rotation by its own weight has a part that stays the same to the lidar (an error of its
 mount), a part that stays the same in the room (an error of the axis), and a rest that changes with the servo's
 position. `calibrate` finds the first, the pose of the platform holds the second, the rest stays in the cloud. Servo,
-mount and deck are taken for rigid: a mount gives way by 0.07 to 0.39 deg, in all positions alike to 0.0001 deg
-(`benchmarks.cad.elements`), which is for the pose of the platform to hold, too.
+mount and deck are taken for rigid here: what a mount gives way is in `mount`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,8 @@ from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import TriMesh
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from cad.layout.loads import ALUMINIUM_PA, FAR_MM, noise_deg
+from cad.layout.direct.loads import shaft_modulus_pa
+from cad.layout.loads import FAR_MM, noise_deg
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.statics.sag import Sag, linkage_sag, with_shaft
 from cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
@@ -89,8 +89,7 @@ def bend_of(assembly: Assembly) -> ShaftBend:
     if isinstance(stack, BeltStack):
         return belt_shaft_bend(stack)
     cage = cage_of(scanner, stack)
-    modulus = ALUMINIUM_PA if assembly.parts[layout.drive.shaft].metal else 1e9 * scanner.printer.modulus_gpa
-    return shaft_bend(stack, modulus, 0.0 if cage is None else stiffness_n_per_m(cage))
+    return shaft_bend(stack, shaft_modulus_pa(scanner, stack), 0.0 if cage is None else stiffness_n_per_m(cage))
 
 
 def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[BeamError, BeamError]:

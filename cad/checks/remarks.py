@@ -16,7 +16,7 @@ from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from cad.layout.modules.ring_cover import cover_of
 from cad.layout.modules.unasked import unasked
-from cad.layout.names import BASE_MOUNT, SERVO_SHAFT, TRIPOD_FOOT
+from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
 from cad.screws import passing_hole
 from design.catalogue.products import Printer, Product
 from design.left_out import LeftOut
@@ -106,10 +106,10 @@ def _tilt_moment(scanner: Scanner, stack: DirectStack, bodies: dict[str, Inertia
     if stack.bearing is None:
         help_ = "support the shaft with a bearing near the hub; none of the catalogue fits it"
     message = (
-        f"{SERVO_SHAFT}: the tilted axis puts {moment:.2f} N m on the horn of {servo.name}, allowed {rated:.2f} N m "
+        f"{stack.shaft}: the tilted axis puts {moment:.2f} N m on the horn of {servo.name}, allowed {rated:.2f} N m "
         f"(rated {servo.radial_load_n:g} N at {RATED_AT_MM:g} mm): {help_}"
     )
-    return [PartFinding("tilt_moment", "warning", SERVO_SHAFT, message)]
+    return [PartFinding("tilt_moment", "warning", stack.shaft, message)]
 
 
 def _held_by_screws(scanner: Scanner, mounted: Mounted) -> PartFinding:

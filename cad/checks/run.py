@@ -16,6 +16,7 @@ from cad.checks.check import Check, checks_text
 from cad.checks.clearance import clearance_checks
 from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
+from cad.checks.mount import mount_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
@@ -73,6 +74,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *electric_checks(scanner),
         *lead_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
+        *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *doubts,
     ]

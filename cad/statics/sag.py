@@ -18,6 +18,7 @@ from cad.geometry.mesh import TriMesh
 from cad.layout.hub import Hub
 from cad.layout.loads import STANDARD_GRAVITY
 from cad.statics import elastic
+from cad.statics.rigid import rigid, shared
 from cad.statics.shaft import ShaftBend
 from cad.statics.voxels import Grid, filled
 from design.arrays import Array
@@ -104,9 +105,9 @@ def _on_grid(
     down = STANDARD_GRAVITY * R.T  # columns: gravity along each axis of the rotation frame, laser frame
     loads = elastic.weight(model, density * 1e-6 * down)
     lever = lidar.centre_m * 1000
-    loads += elastic.pull(model, at, _shared(points[on_seat], lidar.mass_kg * down, lever))
+    loads += elastic.pull(model, at, shared(points[on_seat], lidar.mass_kg * down, lever))
     moved = elastic.solve(model, modulus, POISSON, held, spigot_mm2, loads)
-    shift, rotation = _rigid(points[on_seat], elastic.moved(model, at, moved))
+    shift, rotation = rigid(points[on_seat], elastic.moved(model, at, moved))
     return R @ rotation, R @ shift / 1000
 
 
@@ -136,26 +137,3 @@ def _seat(grid: Grid, body: Array, seat: Array) -> tuple[Array, Array]:
     lies = (body[:, :, level - 1] > 0.5) & (np.abs(x) < seat[0]) & (np.abs(y) < seat[1])
     points = np.stack([x, y, np.full_like(x, seat[2])], axis=2)
     return points.reshape(-1, 3), lies.reshape(-1)
-
-
-def _shared(points: Array, force: Array, at: Array) -> Array:
-    """Forces on points that add up to forces (3, cases) at a place, as a rigid seat would share them: (p, 3, cases)."""
-    middle = points.mean(axis=0)
-    arms = points - middle
-    moment = np.cross(at - middle, force, axisb=0, axisc=0)
-    turn = np.linalg.solve(_second_moments(arms), moment)
-    return force / len(points) + np.cross(turn.T[None], arms[:, None], axis=2).transpose(0, 2, 1)
-
-
-def _rigid(points: Array, moved: Array) -> tuple[Array, Array]:
-    """Displacement of the origin and rotation (3, cases) that fit the moved points best."""
-    middle = points.mean(axis=0)
-    arms = points - middle
-    turned = np.cross(arms[:, None], moved.transpose(0, 2, 1), axis=2).sum(axis=0).T
-    rotation = np.linalg.solve(_second_moments(arms), turned)
-    return moved.mean(axis=0) + np.cross(rotation, -middle, axisa=0, axisc=0), rotation
-
-
-def _second_moments(arms: Array) -> Array:
-    """Of unit masses, shape (3, 3)."""
-    return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)

@@ -1,8 +1,8 @@
 """How far the shaft bends and twists at the hub. SI units.
 
-On the servo's axis it is a beam of round sections (Timoshenko), clamped in the horn; where a bearing holds it, a
-spring holds the bearing's sleeve sideways. Beside the servo it is a tube on two supports that are taken for stiff, its
-hub beyond the upper one, and the belt is two springs.
+On the servo's axis it is a beam of round sections or tubes (Timoshenko), clamped in the horn; where a bearing holds it,
+a spring holds the bearing's sleeve sideways. Beside the servo it is a tube on two supports that are taken for stiff,
+its hub beyond the upper one, and the belt is two springs.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
     length = (stack.hub_bottom - stack.horn) / 1000
     above_horn, thick = stack.slices(1000 * length, stack.waist_diameter)
     z, dz = above_horn / 1000, thick / 1000
-    radius = stack.radius_at(above_horn, stack.waist_diameter) / 1000
-    area, second_moment = math.pi * radius**2, math.pi / 4 * radius**4
+    outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
+    area, second_moment = math.pi * (outer**2 - inner**2), math.pi / 4 * (outer**4 - inner**4)
     shear_pa = modulus_pa / (2 + 2 * POISSON)
     lever = length - z
     bend = dz / (modulus_pa * second_moment)

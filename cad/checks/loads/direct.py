@@ -21,7 +21,7 @@ from design.scanner import Scanner
 def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Check]:
     """What horn and bearing carry of the weight of all that turns."""
     shared = share_weight(scanner, stack, weight)
-    return [*_forces(scanner, stack, weight, shared), *_yields(scanner, stack), _slope(scanner, shared)]
+    return [*_forces(scanner, stack, weight, shared), *_yields(scanner, stack), _slope(scanner, stack, shared)]
 
 
 def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Check]:
@@ -74,8 +74,8 @@ def _yields(scanner: Scanner, stack: DirectStack) -> list[Check]:
     ]
 
 
-def _slope(scanner: Scanner, shared: Supported) -> Check:
+def _slope(scanner: Scanner, stack: DirectStack, shared: Supported) -> Check:
     """Gravity tilts the turning axis by this much, the same way in every position: a constant error of the mount."""
     at_10_m = math.tan(shared.slope_rad) * FAR_MM
     what = f"bend of the shaft at the hub ({at_10_m:.1f} mm at 10 m)"
-    return at_most("shaft_slope", math.degrees(shared.slope_rad), noise_deg(scanner), "deg", SERVO_SHAFT, what)
+    return at_most("shaft_slope", math.degrees(shared.slope_rad), noise_deg(scanner), "deg", stack.shaft, what)

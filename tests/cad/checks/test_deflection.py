@@ -9,13 +9,18 @@ import pytest
 from cad.checks.deflection import sag_of, split
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import mesh_of
-from cad.layout.direct.loads import hanging
+from cad.layout.direct.loads import hanging, shaft_modulus_pa
+from cad.layout.layout import layout_of
 from cad.layout.loads import ALUMINIUM_PA, weight_of
+from cad.parts.horn_cup import horn_cup
 from cad.solids import box, upright
 from cad.statics import elastic
 from cad.statics.sag import linkage_sag
 from cad.statics.shaft import shaft_bend
 from cad.statics.voxels import Grid, filled
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import scanner_of
 
 
 def rot(axis, angle):
@@ -31,13 +36,18 @@ def grid_around(triangles, edge, parts=6):
 
 def bent(mesh, R, edge, root, root_mm2, pulled, force, modulus, poisson):
     """Mean displacement of points of a body that lies askew in its grid, in the body's frame."""
+    return moved_points(mesh, R, edge, root, root_mm2, pulled, force, modulus, poisson).mean(axis=0)
+
+
+def moved_points(mesh, R, edge, root, root_mm2, pulled, force, modulus, poisson):
+    """Displacement of each of them, shape (n, 3)."""
     triangles = (mesh.vertices @ R.T)[mesh.faces]
     grid = grid_around(triangles, edge)
     model = elastic.model_of(grid, filled(triangles, grid))
     at = elastic.places(model, pulled @ R.T)
     loads = elastic.pull(model, at, np.tile(R @ force / len(at.cell), (len(at.cell), 1))[:, :, None])
     moved = elastic.solve(model, modulus, poisson, elastic.places(model, root @ R.T), root_mm2, loads)
-    return R.T @ elastic.moved(model, at, moved)[:, :, 0].mean(axis=0)
+    return elastic.moved(model, at, moved)[:, :, 0] @ R
 
 
 def test_the_cubes_of_a_body_make_up_its_volume_wherever_it_lies():
@@ -84,13 +94,43 @@ def test_the_shaft_as_a_beam_bends_and_twists_as_the_same_shaft_in_finite_elemen
     assert bend.rotation_of(np.zeros(3), np.array([0, 0, 1.0]))[2] == pytest.approx(closed * 1.33, rel=1e-6)
 
 
+def test_a_printed_cup_turns_on_its_horn_as_the_same_cup_in_finite_elements():
+    angles = AngleSet(
+        task="cup",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=50),
+        sensor="STL27L",
+        servo="XL430-W250",
+        slip_ring=None,
+    )
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    layout, servo = layout_of(scanner), scanner.servo
+    stack, modulus = layout.stack, shaft_modulus_pa(scanner, layout.stack)
+    mesh = mesh_of(horn_cup(layout.linkage, stack, servo, scanner.printer))
+
+    def ring(low, high, z):
+        r, a = np.meshgrid(np.linspace(low, high, 6), np.arange(48) * math.pi / 24)
+        return np.stack([r * np.cos(a), r * np.sin(a), np.full_like(r, z)], axis=2).reshape(-1, 3)
+
+    root = ring(servo.horn_boss_diameter_mm / 2 + 0.5, servo.horn_diameter_mm / 2, stack.horn)
+    rim = ring(stack.cup_bore / 2 + 1.0, stack.shaft_diameter / 2 - 1.5, stack.spigot_top)
+    for azimuth in layout.linkage.cross_azimuths:  # the nuts' slots
+        aside = rim @ [-math.sin(azimuth), math.cos(azimuth), 0.0]
+        rim = rim[(np.abs(aside) > 4.0) | (rim @ [math.cos(azimuth), math.sin(azimuth), 0.0] < 0)]
+    force, held_mm2 = np.array([3.0, 0, 0]), math.pi * servo.horn_diameter_mm**2 / 4
+    moved = moved_points(mesh, np.eye(3), 2.5, root, held_mm2, rim, force, modulus / 1e6, 0.35)
+    turned_rad = -np.polyfit(rim[:, 0], moved[:, 2], 1)[0]
+    lever_m = (stack.spigot_top - stack.hub_bottom) / 1000
+    beam = shaft_bend(stack, modulus).rotation_of(force, np.cross([0, 0, lever_m], force))
+    assert 0.8 < turned_rad / beam[1] < 1.4
+
+
 def test_shaft_bend_is_that_of_the_load_check_where_both_apply(made):
     scanner = made.scanner
     stack = replace(made.result.assembly.layout.stack, bearing=None, flange_radius=6.0, collar_radius=6.0)
     weight = weight_of(scanner, 0.6, 0.14, 0.0)
     arm = weight.lever_m - (stack.hub_bottom - stack.horn) / 1000
     turned = shaft_bend(stack).rotation_of(np.array([weight.across_n, 0, 0]), np.array([0, weight.across_n * arm, 0]))
-    assert turned[1] == pytest.approx(hanging(weight, stack).slope_rad, rel=1e-6)
+    assert turned[1] == pytest.approx(hanging(weight, stack, ALUMINIUM_PA).slope_rad, rel=1e-6)
 
 
 def test_a_waist_bends_more_and_a_stiff_cage_holds(made):

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scanners import scanner_at
 
-from cad.assembly.make import make_parts
 from cad.assembly.shadow import shadow_of, triangles_of
 from cad.assembly.steps import steps_of
 from cad.assembly.tube import lead_solid
@@ -13,25 +13,11 @@ from cad.checks.clearance import clearance_checks
 from cad.checks.rotor_leads import lead_checks
 from cad.layout.cables.leads import JOINT, JOINT_WALL
 from cad.layout.cables.path import Path
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
-
-
-def scanner_for(alpha, beta):
-    angles = AngleSet(
-        task="test",
-        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=alpha, beta_laser=beta),
-        sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring="UH1256-02-0610-06S",
-    )
-    return scanner_of(angles, "fdm-0.4", load_catalogue())
 
 
 @pytest.fixture(scope="module")
-def lying():
-    return make_parts(scanner_for(90, 0))
+def lying(parts_of):
+    return parts_of(scanner_at((0, 0, 90, 0)))
 
 
 def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):

@@ -5,33 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scanners import CAPSULE, GROUND_AHEAD, ROLLING, scanner_at
 
 import cad.checks.retention as room
 from cad import solids
-from cad.assembly.make import make_parts
 from cad.checks.retention import hanging_on, retention_checks, worst_shares
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import ScrewAxis
 from cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
 from cad.screws import SCREWS, thread_in_part
-from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
 
-RINGS = {"direct": "UH1256-02-0610-06S", "belt": "SRC022A-6"}
+SCANNERS = {"direct": scanner_at(GROUND_AHEAD), "belt": scanner_at(ROLLING, slip_ring=CAPSULE)}
 
 
-@pytest.fixture(scope="module", params=RINGS)
-def scanner_and_assembly(request):
-    angles = AngleSet(
-        task="hanging",
-        angles_deg=Angles(alpha_rot=0, beta_rot=-55, alpha_laser=-80, beta_laser=75),
-        sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring=RINGS[request.param],
-    )
-    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
-    return scanner, make_parts(scanner)
+@pytest.fixture(scope="module", params=SCANNERS)
+def scanner_and_assembly(request, parts_of):
+    scanner = SCANNERS[request.param]
+    return scanner, parts_of(scanner)
 
 
 def joint_of(assembly, part, onto):

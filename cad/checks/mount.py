@@ -1,0 +1,83 @@
+"""How far the mount gives way under all that it carries: a lean of the whole scanner that no cloud shows by itself.
+
+It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`), so clouds keep their shape,
+and the pose of the scanner on the robot is off by it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from cad.assembly.assembly import Assembly
+from cad.assembly.masses import rotor_of
+from cad.checks.check import Check, Severity, tidy
+from cad.geometry.inertia import Inertial, of_solid
+from cad.geometry.mesh import TriMesh
+from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from cad.parts.base_mount import FOOT_RADIUS
+from cad.screws import passing_hole
+from cad.statics.mount_sag import Carried, mount_sag
+from design.scanner import Scanner
+
+WASHER_MM = 4.0  # of a deck screw's washer beyond its hole
+LEAST_ERROR = 0.25  # of the lean: what CalculiX finds is off by less (`benchmarks.cad.elements`)
+LEANS_DEG = 1.0  # a mount that gives way further is no mount
+
+
+def mount_checks(
+    scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]
+) -> list[Check]:
+    """The lean of a scanner on its mount; nothing where it has none. Arguments as for `deflection_checks`."""
+    if BASE_MOUNT not in assembly.made:
+        return []
+    printer, layout = scanner.printer, assembly.layout
+    try:
+        found, more = mount_sag(
+            meshes[BASE_MOUNT],
+            layout.deck,
+            layout.drive.mounted,
+            carried(scanner, assembly, bodies),
+            1000 * printer.modulus_gpa,
+            printer.density_g_cm3,
+        )
+    except RuntimeError as error:
+        message = f"{BASE_MOUNT}: nothing carries what it holds: no equilibrium by finite elements ({error})"
+        return [Check("mount_lean", "error", None, LEANS_DEG, "deg", BASE_MOUNT, message)]
+    lean = np.degrees(scanner.angles.T_world_rot(0.0)[:3, :3] @ (found + more))
+    value = round(float(np.linalg.norm(lean)), 6)
+    doubt = max(math.degrees(float(np.linalg.norm(more))), LEAST_ERROR * value)
+    severity: Severity = "note" if value + doubt <= LEANS_DEG else "warning"
+    x, y, z = (f"{round(float(part), 3) + 0.0:g}" for part in lean)
+    message = (
+        f"{BASE_MOUNT}: leans under what it carries by {value:.2g} +- {doubt:.1g} deg, held under its screws alone, "
+        "less where the deck supports its foot beside them: in every position it turns the scanner by "
+        f"({x}, {y}, {z}) deg about the world's x, y and z, which belongs into its pose on the robot"
+    )
+    return [Check("mount_lean", severity, tidy(value), LEANS_DEG, "deg", BASE_MOUNT, message)]
+
+
+def carried(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:
+    """All above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
+    rotor, standing = rotor_of(scanner, bodies), bodies["servo"]
+    below = [
+        of_solid(assembly.made[name], assembly.parts[name].density_g_cm3(scanner.printer))
+        for name in (BASE_MOUNT, TRIPOD_FOOT)
+        if name in assembly.made
+    ]
+    shares = [
+        (standing.mass_kg, standing.centre_m),
+        (rotor.mass_kg, rotor.centre_m * [0.0, 0.0, 1.0]),
+        *((-body.mass_kg, body.centre_m) for body in below),
+    ]
+    mass = sum(share for share, _ in shares)
+    centre = sum((share * at for share, at in shares), np.zeros(3)) / mass
+    return Carried(
+        mass_kg=mass,
+        centre_m=centre,
+        down=-scanner.angles.T_world_rot(0.0)[2, :3],
+        seat_mm=FOOT_RADIUS,
+        washer_mm=passing_hole(assembly.layout.deck.screw, scanner.printer) / 2 + WASHER_MM,
+    )

@@ -1,0 +1,106 @@
+"""How far a mount gives way under all that it carries: finite elements on two grids, as `sag` has them.
+
+The deck is taken for rigid, and holds the foot under the washers of its screws alone: that it lies on the deck beside
+them makes it stiffer, and nobody knows by how much. Grids lie along the deck, whose face is a face of theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.geometry.mesh import TriMesh
+from cad.layout.deck import Deck
+from cad.layout.drive import Mounted
+from cad.layout.loads import STANDARD_GRAVITY
+from cad.statics import elastic
+from cad.statics.rigid import rigid, shared
+from cad.statics.sag import POISSON
+from cad.statics.voxels import Grid, filled
+from design.arrays import Array
+
+EDGES = (12.0, 8.0)  # mm, of the cells of the two grids
+PARTS = 6  # cubes along the edge of a cell
+STEP = 1.0  # mm, between points of a washer or a seat
+INSIDE = 0.05  # mm below a face: points on it are in cells of the part
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a mount carries, and where.
+
+    Attributes:
+        mass_kg: of all of it.
+        centre_m: of all of it, rotation frame.
+        down: unit vector of gravity, rotation frame.
+        seat_mm: radius of the faces around the holes that it lies on.
+        washer_mm: radius of the washers under the heads of the deck's screws.
+    """
+
+    mass_kg: float
+    centre_m: Array
+    down: Array
+    seat_mm: float
+    washer_mm: float
+
+
+def mount_sag(
+    mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus_mpa: float, density_g_cm3: float
+) -> tuple[Array, Array]:
+    """Rotation of what it holds [rad] on the finer grid, and what finer ones would add: rotation frame, shapes (3,).
+
+    Args:
+        mesh: of the mount, rotation frame [mm].
+        deck: where it lies.
+        mounted: what it holds.
+        carried: the load.
+        modulus_mpa: of the material.
+        density_g_cm3: of the material.
+
+    Raises:
+        RuntimeError: nothing holds the mount.
+    """
+    coarse, fine = (_on_grid(edge, mesh, deck, mounted, carried, modulus_mpa, density_g_cm3) for edge in EDGES)
+    return fine, (fine - coarse) / (EDGES[0] / EDGES[1] - 1)
+
+
+def _on_grid(
+    edge: float, mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus: float, density: float
+) -> Array:
+    R, centre = deck.rotation(), np.array(deck.centre)
+    triangles = ((mesh.vertices - centre) @ R)[mesh.faces]
+    grid = _grid(triangles, edge)
+    model = elastic.model_of(grid, filled(triangles, grid))
+    washers = _discs(np.array(deck.deck_holes), INSIDE, carried.washer_mm, deck.screw.nominal / 2)
+    held = elastic.places(model, washers)
+    seats = _discs(np.array(mounted.holes), mounted.ears - INSIDE, carried.seat_mm, mounted.screw.nominal / 2)
+    seats = (seats - centre) @ R
+    at = elastic.places(model, seats)
+    down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY
+    lever = R.T @ (carried.centre_m * 1000 - centre)
+    loads = elastic.weight(model, density * 1e-6 * down)
+    loads += elastic.pull(model, at, shared(seats, carried.mass_kg * down, lever))
+    washer_mm2 = len(washers) * STEP**2
+    moved = elastic.solve(model, modulus, POISSON, held, washer_mm2, loads)
+    return R @ rigid(seats, elastic.moved(model, at, moved))[1][:, 0]
+
+
+def _grid(triangles: Array, edge: float) -> Grid:
+    """Around all triangles, with a face at the deck's height."""
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    middle = (low + high) / 2
+    cells = np.maximum(np.ceil((high - low) / edge), 1).astype(int)
+    start = middle - edge * cells / 2
+    start[2] = 0.0
+    return Grid(start, edge, (int(cells[0]), int(cells[1]), int(np.ceil(high[2] / edge))), PARTS)
+
+
+def _discs(holes: Array, height: float, radius: float, hole: float) -> Array:
+    """Points of rings around some holes, shape (n, 3)."""
+    along = np.arange(-radius + STEP / 2, radius, STEP)
+    x, y = (each.ravel() for each in np.meshgrid(along, along, indexing="ij"))
+    ring = (np.hypot(x, y) < radius) & (np.hypot(x, y) > hole)
+    disc = np.column_stack([x[ring], y[ring]])
+    flat = (holes[:, None, :] + disc).reshape(-1, 2)
+    return np.column_stack([flat, np.full(len(flat), height)])

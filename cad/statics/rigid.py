@@ -1,0 +1,30 @@
+"""Forces on many points as one, and one rotation of many points: a rigid body lies on them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from design.arrays import Array
+
+
+def shared(points: Array, force: Array, at: Array) -> Array:
+    """Forces on points that add up to forces (3, cases) at a place, as a rigid seat would share them: (p, 3, cases)."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    moment = np.cross(at - middle, force, axisb=0, axisc=0)
+    turn = np.linalg.solve(_second_moments(arms), moment)
+    return force / len(points) + np.cross(turn.T[None], arms[:, None], axis=2).transpose(0, 2, 1)
+
+
+def rigid(points: Array, moved: Array) -> tuple[Array, Array]:
+    """Displacement of the origin and rotation (3, cases) that fit the moved points best."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    turned = np.cross(arms[:, None], moved.transpose(0, 2, 1), axis=2).sum(axis=0).T
+    rotation = np.linalg.solve(_second_moments(arms), turned)
+    return moved.mean(axis=0) + np.cross(rotation, -middle, axisa=0, axisc=0), rotation
+
+
+def _second_moments(arms: Array) -> Array:
+    """Of unit masses, shape (3, 3)."""
+    return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)
