@@ -46,7 +46,7 @@ LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
 CAPSULE_STEP = Step(
     "Capsule into the tower",
-    "RotorLead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
+    "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
     f"below until the soft tube sits in the shaft. {screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
     "turned by hand, the shaft takes the rotor along without slipping",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from cad.assembly.assembly import Assembly
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
@@ -45,8 +46,7 @@ def drawing_of(
     """The sheet of one part."""
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    own = [joint for joint in joints_of(assembly.layout) if joint.part == name]
-    part = part_of(assembly.made[name], lidar_axis, spec.sheet, own)
+    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, joints_of(assembly.layout))
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),
@@ -104,7 +104,11 @@ def _notes(scanner: Scanner, part: Part, said: OnSheet, how: str, making: list[s
     inclined = [p for p in part.patterns if len(p.holes) >= 3 and abs(p.direction[2]) < 1 - 1e-6]
     for pattern in inclined[:1]:
         x, y, z = (number(float(c)) for c in pattern.centre - [0.0, 0.0, part.datum])
-        notes.append(f"Middle of {pattern.words()}, lower ends: X {x}, Y {y}, Z {z}.")
+        bare = replace(pattern, heads=0.0, holds="")
+        notes.append(f"Middle of {bare.words()}, lower ends: X {x}, Y {y}, Z {z}.")
+        faces = planes_across(part.solid, pattern.direction)
+        if len(faces) >= 2:
+            notes.append(f"The two largest faces across them are {number(abs(faces[0] - faces[1]))} apart.")
     if part.lidar_axis is not None:
         normal = part.lidar_axis
         tilt = math.degrees(math.acos(min(1.0, float(normal[2]))))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
 
-from cad.drawings.patterns import Pattern, on_axis, patterns_of
+from cad.drawings.patterns import Pattern, on_axis, patterns_of, with_threads
 from cad.geometry.holes import Round, rounds_of
 from cad.layout.fits import OnSheet, ToleratedDiameter
 from cad.layout.joints import Joint
@@ -50,8 +50,8 @@ class Part:
         return "" if fit is None else f"  {fit.tolerance}"
 
 
-def part_of(solid: cq.Solid, lidar_axis: Array | None, said: OnSheet, joints: Iterable[Joint]) -> Part:
-    """Read a solid; its slots are those of its joints, its fits those that one of its cylinders has."""
+def part_of(name: str, solid: cq.Solid, lidar_axis: Array | None, said: OnSheet, joints: Sequence[Joint]) -> Part:
+    """Read a solid; slots and threads are those of its joints, its fits those that one of its cylinders has."""
     away = (-said.axis[0], -said.axis[1], 0.0)
     if any(away):
         solid = solid.translate(cq.Vector(*away))
@@ -59,8 +59,13 @@ def part_of(solid: cq.Solid, lidar_axis: Array | None, said: OnSheet, joints: It
     axial = [item for item in rounds if on_axis(item)]
     fits = tuple(fit for fit in said.fits if any(is_of(fit, item) for item in axial))
     datum = float(solid.BoundingBox().zmin)
-    slots = [(joint.slot_mm, [np.array(axis.start) + away for axis in joint.axes]) for joint in joints if joint.slot_mm]
-    return Part(solid, patterns_of(rounds), slots, axial, datum, lidar_axis, fits)
+    slots = [
+        (joint.slot_mm, [np.array(axis.start) + away for axis in joint.axes])
+        for joint in joints
+        if joint.part == name and joint.slot_mm
+    ]
+    patterns = with_threads(patterns_of(rounds), [joint for joint in joints if joint.holder == name], away)
+    return Part(solid, patterns, slots, axial, datum, lidar_axis, fits)
 
 
 def is_of(fit: ToleratedDiameter, item: Round) -> bool:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cad.geometry.holes import Round
+from cad.layout.joints import Joint
 from design.arrays import Array
+
+IN_LINE = 0.01  # mm between the axes of two holes, or of a hole and its screw
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,11 +23,13 @@ class Pattern:
         holes: all of one diameter, direction and height along it.
         circle: diameter of the circle that they share at equal steps; 0 if none.
         heads: diameter of the recesses of their screws' heads; 0 if none.
+        holds: the thread in them, in words; empty if none.
     """
 
     holes: tuple[Round, ...]
     circle: float
     heads: float = 0.0
+    holds: str = ""
 
     @property
     def direction(self) -> Array:
@@ -41,7 +47,8 @@ class Pattern:
         depth = "THRU" if hole.through else f"x {number(hole.length)} DEEP"
         circle = f" ON Ø{number(self.circle)}" if self.circle else ""
         heads = f", Ø{number(self.heads)} FOR HEADS" if self.heads else ""
-        return f"{counted(len(self.holes))}Ø{number(hole.diameter)} {depth}{circle}{heads}"
+        holds = f", {self.holds}" if self.holds else ""
+        return f"{counted(len(self.holes))}Ø{number(hole.diameter)} {depth}{circle}{heads}{holds}"
 
 
 def number(value: float) -> str:
@@ -58,20 +65,64 @@ def counted(count: int) -> str:
 def patterns_of(rounds: list[Round]) -> list[Pattern]:
     """Holes grouped by diameter, direction and height; those about the rotation axis left out."""
     groups: dict[tuple[float, ...], list[Round]] = {}
-    for hole in rounds:
-        if hole.hole and not on_axis(hole):
-            direction = np.array(hole.direction)
-            height = round(float(np.array(hole.low) @ direction), 1) + 0.0
-            key = (hole.diameter, *np.round(direction, 3).tolist(), height, hole.through)
-            groups.setdefault(key, []).append(hole)
+    for hole in _drilled([item for item in rounds if item.hole and not on_axis(item)]):
+        direction = np.array(hole.direction)
+        height = round(float(np.array(hole.low) @ direction), 1) + 0.0
+        key = (hole.diameter, *np.round(direction, 3).tolist(), height, hole.through)
+        groups.setdefault(key, []).append(hole)
     return _with_heads([Pattern(tuple(holes), _circle(holes)) for _, holes in sorted(groups.items())])
+
+
+def _drilled(holes: list[Round]) -> list[Round]:
+    """Those of one diameter in line, one of them open at both ends, as what one drill makes: a slot may part them."""
+    out: list[Round] = []
+    for hole in holes:
+        for i, other in enumerate(out):
+            if hole.diameter == other.diameter and hole.through | other.through and _in_line(hole, other):
+                ends = sorted(
+                    (hole.low, hole.high, other.low, other.high), key=lambda end: float(np.dot(end, hole.direction))
+                )
+                out[i] = replace(other, low=ends[0], high=ends[-1], through=hole.through and other.through)
+                break
+        else:
+            out.append(hole)
+    return out
+
+
+def with_threads(patterns: list[Pattern], joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
+    """The same patterns, those that hold the screws of some joints with their thread, insert or nut.
+
+    Args:
+        patterns: of a part.
+        joints: whose threads it holds, rotation frame.
+        moved: what the part was moved by.
+    """
+    held: list[Pattern] = []
+    for pattern in patterns:
+        joint = next((joint for joint in joints if all(_of(hole, joint, moved) for hole in pattern.holes)), None)
+        held.append(pattern if joint is None else replace(pattern, holds=_thread(joint)))
+    return held
+
+
+def _of(hole: Round, joint: Joint, moved: tuple[float, float, float]) -> bool:
+    """Whether one of a joint's screws sits in a hole of a part that was moved."""
+    return any(_on_line(hole, np.array(axis.start) + moved, np.array(axis.along)) for axis in joint.axes)
+
+
+def _thread(joint: Joint) -> str:
+    name, thread = joint.screw.name, joint.thread
+    if thread is not None and thread.trap is not None:
+        return f"{number(thread.trap.across)} ACROSS FLATS FOR NUT {name}"
+    if joint.inserts:
+        return f"INSERT {name}"
+    return f"TAPPED {name}" if thread is None else f"THREAD {name}"
 
 
 def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
     """Patterns of screw holes take in the wider holes in line with them."""
     out: list[Pattern] = []
     for pattern in patterns:  # by diameter, smallest first
-        carrier = next((other for other in out if all(_in_line(hole, other) for hole in pattern.holes)), None)
+        carrier = next((one for one in out if all(_on_one(hole, one) for hole in pattern.holes)), None)
         hole = pattern.holes[0]
         if carrier is None:
             out.append(pattern)
@@ -83,12 +134,18 @@ def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
     return sorted(out, key=lambda pattern: -len(pattern.holes))
 
 
-def _in_line(hole: Round, pattern: Pattern) -> bool:
-    direction = pattern.direction
-    if float(direction @ hole.direction) < 1 - 1e-5:
-        return False
-    aside = [np.array(hole.low) - other.low for other in pattern.holes]
-    return min(float(np.linalg.norm(a - (a @ direction) * direction)) for a in aside) < 0.01
+def _on_one(hole: Round, pattern: Pattern) -> bool:
+    return any(_in_line(hole, other) for other in pattern.holes)
+
+
+def _in_line(hole: Round, other: Round) -> bool:
+    return _on_line(hole, np.array(other.low), np.array(other.direction))
+
+
+def _on_line(hole: Round, point: Array, along: Array) -> bool:
+    """Whether a hole lies about the line through a point along a unit vector."""
+    aside = np.array(hole.low) - point
+    return bool(abs(along @ hole.direction) > 1 - 1e-5 and np.linalg.norm(aside - (aside @ along) * along) < IN_LINE)
 
 
 def on_axis(item: Round) -> bool:

@@ -1,10 +1,10 @@
 """Fit coupon: a plate to print first, in half an hour, which tells the clearances of one printer.
 
-Frame: its own, mm, lying on the bed. A row of bores for the shaft's spigot, one of holes for each screw that the
-scanner's catalogue parts take, one of pockets where the profile traps nuts. The words above a row say what it is for
-and the clearance on the diameter of its first hole, and each hole has a tenth of a millimetre more than the one to its
-left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play, and
-the hole that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
+Frame: its own, mm, lying on the bed. A row of bores for the spigot of a turned shaft, one of holes for each screw that
+the scanner's catalogue parts take, one of pockets where the profile traps nuts. The words above a row say what it is
+for and the clearance on the diameter of its first hole, and each hole has a tenth of a millimetre more than the one to
+its left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play,
+and the hole that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
 """
 
 from __future__ import annotations
@@ -119,10 +119,11 @@ def _laid_out(rows: list[_Row]) -> tuple[float, float, list[tuple[float, float, 
 
 
 def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
-    """The last one, of pockets, where the profile traps nuts."""
+    """The first one, of spigots, where the shaft is turned; the last one, of pockets, where the profile traps nuts."""
     printer = scanner.printer
     fits, screws = _around(printer.fit_clearance_mm), _around(printer.screw_clearance_mm)
-    rows = [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
+    # a cup is printed, too, and the screws take up its play: bores as wide as that would cost an hour
+    rows = [] if stack.cup_bore > 0 else [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
     for name in sorted({scanner.lidar.mount_screw, scanner.servo.case_screw}):
         rows.append(_Row(name, SCREWS[name].nominal, screws))
     return rows if trap_of(NUT, printer) is None else [*rows, _Row(POCKETS, NUT.nut_across, fits)]

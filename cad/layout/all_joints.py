@@ -49,17 +49,18 @@ def joints_of(layout: Layout) -> list[Joint]:
 
 
 def _crossed(layout: Layout) -> Joint:
-    """The hub on the shaft: cap screws through its wall into threads of the shaft, which no play lets out."""
+    """The hub on the shaft: cap screws through its wall into threads or nuts of the shaft, which no play lets out."""
     p, stack = layout.linkage, layout.stack
     heads = cross_seat_mm(stack)
     return Joint(
         names.ALIGNMENT_LINKAGE,
         layout.drive.shaft,
-        "thread",
+        "thread" if p.cross_thread is None else held_in(p.cross_thread),
         CROSS_SCREW,
         inward_axes(p.cross_azimuths, heads, stack.cross),
         grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
-        thread_mm=cross_thread_mm(stack),
+        thread_mm=cross_thread_mm(p),
+        thread=p.cross_thread,
     )
 
 

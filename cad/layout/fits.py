@@ -50,8 +50,8 @@ def no_wider(diameter: float, fit: float, why: str) -> ToleratedDiameter:
     return ToleratedDiameter(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)
 
 
-def turned_spigot(diameter: float, fit: float) -> ToleratedDiameter:
-    """Of a turned shaft in the printed hub."""
+def spigot_in_hub(diameter: float, fit: float) -> ToleratedDiameter:
+    """Of a shaft's upper end in the printed hub."""
     return ToleratedDiameter(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
 
 

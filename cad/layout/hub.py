@@ -16,6 +16,8 @@ from design.catalogue.products import Bearing
 
 HUB_HEIGHT = 14.0
 HUB_WALL = 11.0  # around the spigot: between the heads of the cross screws and the shaft
+CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
+NECK_ON_RIM = 1.5  # how far the neck stays inside a cup's rim
 HUB_GAP = 10.0  # the rotor's wires leave here
 SPIGOT = 11.0  # length of the shaft inside the hub
 CROSS_ABOVE_BOTTOM = 5.0  # of the cross screws, from the hub's lower face
@@ -40,11 +42,17 @@ class Hub:
     shaft_diameter: float
     bearing: Bearing | None  # on a sleeve of the shaft, below the hub
     sub_plate: Axis | None  # of the laser frame, along which its ears stick out
+    cup_bore: float = 0.0  # diameter inside a printed shaft (`cad/layout/direct/cup.py`); 0 of a turned one
 
     @property
     def hub_radius(self) -> float:
         """Of the linkage's hub."""
-        return self.shaft_diameter / 2 + HUB_WALL
+        return self.shaft_diameter / 2 + (CUP_HUB_WALL if self.cup_bore > 0 else HUB_WALL)
+
+    @property
+    def neck_radius(self) -> float:
+        """Of the linkage's neck where it leaves the hub: over a cup no wider than its rim bears."""
+        return self.shaft_diameter / 2 - NECK_ON_RIM if self.cup_bore > 0 else self.hub_radius - 1.0
 
     @property
     def shoulder(self) -> float:

@@ -19,6 +19,7 @@ from cad.layout.envelope import (
     ear_screws,
     envelope_of,
 )
+from cad.layout.joints import round_wall_mm
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from design.arrays import Array
@@ -29,6 +30,7 @@ CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
+BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
 
 
@@ -68,6 +70,7 @@ class AlignmentLinkage:
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
+    cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
     ear: Ear | None = None
 
 
@@ -112,6 +115,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         fit=printer.fit_clearance_mm,
         cross_hole=passing_hole(CROSS_SCREW, printer),
         cross_azimuths=_cross_azimuths(stack.R()[:, 2]),
+        cross_thread=thread_in_part(CROSS_SCREW, printer, carries=True) if stack.cup_bore > 0 else None,
     )
 
 
@@ -122,7 +126,7 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     """
     stack = p.stack
     turn = math.radians(0.7 + 1.9 * attempt)
-    ring = outlines.polygon(stack.hub_radius - 1.0 - 0.05 * attempt, 24, turn)
+    ring = outlines.polygon(stack.neck_radius - 0.05 * attempt, 24, turn)
     R = stack.R()
     under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
     top = min(max(-stack.h, under_body), 40.0 - stack.h)
@@ -192,6 +196,9 @@ def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
     return min(math.sqrt(bore**2 - half**2), on_flat)
 
 
-def cross_thread_mm(stack: Stack) -> float:
-    """Thread that a cross screw finds in the shaft before the other one crosses it."""
-    return stack.shaft_diameter / 2 - CROSS_SCREW.nominal / 2 - CROSSING
+def cross_thread_mm(p: AlignmentLinkage) -> float:
+    """Thread that a cross screw finds in the shaft before the other one crosses it, or in a cup before its nut."""
+    outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
+    if thread is None:
+        return outer - CROSS_SCREW.nominal / 2 - CROSSING
+    return BEFORE_NUT if thread.trap is not None else round_wall_mm(p.stack.cup_bore / 2, outer, thread.hole)

@@ -24,7 +24,7 @@ from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.linkage import AlignmentLinkage, neck_corners
-from cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT, SERVO_SHAFT
+from cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAFT
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.linkage_hub import hub, hub_cuts
 from cad.parts.part_spec import PartSpec, Step
@@ -47,6 +47,11 @@ OF_LIDAR = (
 RETRIES = 5
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
 SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
+SEATED_ON_CUP = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
+CUP_WORDS = (
+    "Lower the hub over the cup until it sits on its rim; the flat of the cup fits one way only, and the groove of the "
+    f"hub then stands above the groove of the cup. {screws(HORN_CUP)}"
+)
 BELT_WORDS = (
     "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
     f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
@@ -64,6 +69,8 @@ def linkage_spec(layout: Layout) -> PartSpec:
         f"only, and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
     )
     step = Step("Linkage on the shaft", words, SEATED)
+    if stack.cup_bore > 0:
+        step = Step("Linkage on the cup", CUP_WORDS, SEATED_ON_CUP)
     if isinstance(stack, BeltStack):
         step = Step("Linkage on the shaft, and the belt set", BELT_WORDS, SEATED)
     return PartSpec(

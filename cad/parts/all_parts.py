@@ -11,6 +11,7 @@ from cad.parts.bearing_tower import tower_spec
 from cad.parts.capsule_holder import holder_spec
 from cad.parts.counterweight import counterweight_spec
 from cad.parts.drive_plate import plate_spec
+from cad.parts.horn_cup import cup_spec
 from cad.parts.journal_sleeve import sleeve_spec
 from cad.parts.main_shaft import main_shaft_spec
 from cad.parts.part_spec import PartSpec
@@ -32,7 +33,16 @@ OF_BELT = (
     plate_spec,
     drive_pulley_spec,
 )
-OF_ALL = (linkage_spec, sub_plate_spec, mount_spec, counterweight_spec, sleeve_spec, ring_cover_spec, tripod_foot_spec)
+OF_ALL = (
+    cup_spec,
+    linkage_spec,
+    sub_plate_spec,
+    mount_spec,
+    counterweight_spec,
+    sleeve_spec,
+    ring_cover_spec,
+    tripod_foot_spec,
+)
 
 
 def parts_of(layout: Layout) -> list[PartSpec]:

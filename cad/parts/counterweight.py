@@ -11,7 +11,6 @@ import cadquery as cq
 
 from cad import solids
 from cad.layout.balance.counterweight import SCREW, Counterweight
-from cad.layout.fits import OnSheet
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
@@ -41,7 +40,6 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
         process="sawn",
         material=bar.stock,
         work=f"{len(bar.screws)} threads {SCREW.name}",
-        sheet=OnSheet(notes=(f"Holes of {SCREW.core:g}: thread {SCREW.name} all through.",)),
         shaped_by=("lidar.mass_g",),
         shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
         lifted="radius",

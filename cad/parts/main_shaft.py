@@ -14,7 +14,7 @@ import cadquery as cq
 
 from cad import solids
 from cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltStack
-from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
+from cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
 from cad.layout.names import MAIN_SHAFT
 from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
 from cad.parts.servo_shaft import cross_holes, cross_words
@@ -39,7 +39,7 @@ def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
         sheet=OnSheet(
-            (seat, turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
+            (seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
             (*cross_words(stack), _ring_words()),
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),

@@ -16,7 +16,7 @@ import cadquery as cq
 from cad import outlines, solids
 from cad.layout.direct.loads import ALUMINIUM, STEEL
 from cad.layout.direct.stack import GROOVES, DirectStack
-from cad.layout.fits import OnSheet, ToleratedDiameter, turned_spigot
+from cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
 from cad.layout.hub import Hub
 from cad.layout.joints import horn_centres, screws
 from cad.layout.linkage import CROSS_AT, CROSS_SCREW
@@ -28,9 +28,11 @@ from design.catalogue.products import Printer, Servo
 from design.scanner import Scanner
 
 
-def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec:
-    """The shaft of one scanner."""
-    fits = (turned_spigot(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
+def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
+    """The shaft of one scanner; None where a cup stands in its place."""
+    if stack.cup_bore > 0:
+        return None
+    fits = (spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
     if stack.bearing is not None:
         fits = (ToleratedDiameter(stack.shaft_diameter, False, "0/-0.011", "h6, the bearing's sleeve is bonded to it"),)
     words = (

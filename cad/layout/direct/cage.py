@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.direct.loads import Supported, hanging, supported
+from cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
 from cad.layout.direct.stack import DirectStack
 from cad.layout.loads import Weight
 from cad.layout.names import CAGE_BASE
@@ -159,4 +159,6 @@ def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius
 def share_weight(scanner: Scanner, stack: DirectStack, weight: Weight) -> Supported:
     """How horn and bearing share the weight of all that turns."""
     cage = cage_of(scanner, stack)
-    return hanging(weight, stack) if cage is None else supported(weight, stack, stiffness_n_per_m(cage))
+    if cage is None:
+        return hanging(weight, stack, shaft_modulus_pa(scanner, stack))
+    return supported(weight, stack, stiffness_n_per_m(cage))

@@ -21,6 +21,7 @@ BUILT = (
     names.TRIPOD_FOOT,
     names.DECK,
     names.SERVO_SHAFT,
+    names.HORN_CUP,
     names.SLIP_RING_ADAPTER,
     names.CAGE_BASE,
     names.RING,
@@ -37,6 +38,7 @@ STACKED = (
     names.BASE_MOUNT,
     names.SERVO,
     names.SERVO_SHAFT,
+    names.HORN_CUP,
     names.CAGE_BASE,
     names.SLIP_RING_ADAPTER,
     names.RING,
@@ -70,7 +72,7 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
         masses.append(Mass(names.BEARING, stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
     return DriveLayout(
         stack=stack,
-        shaft=names.SERVO_SHAFT,
+        shaft=stack.shaft,
         products=() if stack.bearing is None else (stack.bearing,),
         mounted=_mounted(scanner.servo, stack),
         masses=tuple(masses),
@@ -95,7 +97,7 @@ def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
 def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
     """The servo's case."""
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
-    around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), stack.ring_top
+    around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
     return Mounted(

@@ -20,7 +20,7 @@ def direct_joints(scanner: Scanner, stack: DirectStack) -> Iterator[Joint]:
         BuildError: the case has no holes beside the turning flange.
     """
     flange = stack.horn + stack.flange_thickness
-    yield horn_joint(scanner.servo, names.SERVO_SHAFT, names.SERVO_HORN, flange, stack.flange_thickness)
+    yield horn_joint(scanner.servo, stack.shaft, names.SERVO_HORN, flange, stack.flange_thickness)
     has_ring, cage = scanner.slip_ring is not None, cage_of(scanner, stack)
     base = names.SLIP_RING_ADAPTER if has_ring else names.CAGE_BASE
     on_case = adapter_of(scanner, stack) if has_ring and cage is None else cage

@@ -1,8 +1,8 @@
 """What the rotor's weight does to the horn, and the bearing that a tilted axis needs. No kernel: plain numpy.
 
-Without a bearing the horn carries the whole tilt moment. With one the shaft is a beam, clamped in the horn and held at
-the height of the bearing by the cage, a spring; its waist is the thinnest piece of that beam. SI units; lengths of
-the stack are millimetres.
+Without a bearing the horn carries the whole tilt moment, through a turned shaft or a printed cup. With one the shaft is
+a beam, clamped in the horn and held at the height of the bearing by the cage, a spring; its waist is the thinnest piece
+of that beam. SI units; lengths of the stack are millimetres.
 """
 
 from __future__ import annotations
@@ -123,13 +123,24 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
     return Supported(abs(foot - R * b), R, abs(slope), b / give)
 
 
-def hanging(weight: Weight, stack: DirectStack) -> Supported:
-    """The horn alone carries: a cantilever up to the hub, which is stiff."""
-    free = (stack.hub_bottom - stack.horn) / 1000
-    EI = ALUMINIUM_PA * _second_moment(stack.shaft_diameter)
-    across, moment = weight.across_n, weight.along_n * weight.off_axis_m
-    slope = (across * (weight.lever_m * free - free**2 / 2) + moment * free) / EI
+def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
+    """The horn alone carries: a cantilever up to the hub, which is stiff.
+
+    Args:
+        weight: of all that turns.
+        stack: without a bearing.
+        modulus_pa: of the shaft.
+    """
+    above_horn, thick = stack.slices(stack.hub_bottom - stack.horn, stack.waist_diameter)
+    outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
+    moment = weight.across_n * (weight.lever_m - above_horn / 1000) + weight.along_n * weight.off_axis_m
+    slope = float((moment * thick / 1000 / (modulus_pa * math.pi / 4 * (outer**4 - inner**4))).sum())
     return Supported(weight.moment_nm, 0.0, slope)
+
+
+def shaft_modulus_pa(scanner: Scanner, stack: DirectStack) -> float:
+    """Of elasticity of the shaft's material: a cup is printed, every other shaft is taken for aluminium."""
+    return 1e9 * scanner.printer.modulus_gpa if stack.cup_bore > 0 else ALUMINIUM_PA
 
 
 def _second_moment(diameter_mm: float) -> float:
@@ -142,12 +153,10 @@ def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
     lidar, ring = scanner.lidar, scanner.slip_ring
     normal = stack.R()[:, 2]
     middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
-    shaft_length = stack.spigot_top - stack.horn
-    shaft_g = math.pi * (stack.shaft_diameter / 20) ** 2 * (shaft_length / 10) * ALUMINIUM_G_CM3
     bodies = [  # mass [g], height, distance from the axis
         (lidar.mass_g, middle * float(normal[2]), abs(middle) * math.hypot(normal[0], normal[1])),
         (LINKAGE_CM3 * scanner.printer.density_g_cm3, -stack.h / 2, LINKAGE_OFF_AXIS_MM),
-        (shaft_g, (stack.spigot_top + stack.horn) / 2, 0.0),
+        (_shaft_g(scanner, stack), (stack.spigot_top + stack.horn) / 2, 0.0),
     ]
     if ring is not None:
         bodies.append((ring.mass_g / 2, (stack.ring_top + stack.ring_bottom) / 2, 0.0))
@@ -155,3 +164,11 @@ def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
     lever = sum(m * (z - stack.horn) for m, z, _ in bodies) / mass
     off_axis = sum(m * r for m, _, r in bodies) / mass
     return weight_of(scanner, mass / 1000, lever / 1000, off_axis / 1000)
+
+
+def _shaft_g(scanner: Scanner, stack: DirectStack) -> float:
+    """Mass of the plain shaft, or of a cup with its flange."""
+    density = scanner.printer.density_g_cm3 if stack.cup_bore > 0 else ALUMINIUM_G_CM3
+    section = stack.shaft_diameter**2 - stack.cup_bore**2
+    flange = (2 * stack.flange_radius) ** 2 * stack.flange_thickness if stack.cup_bore > 0 else 0.0
+    return density / 1000 * math.pi / 4 * (section * (stack.spigot_top - stack.horn) + flange)

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from cad.layout.direct.adapter import fork_holes
+from cad.layout.direct.cup import cup_stack
 from cad.layout.direct.loads import bearing_for, horn_bears
 from cad.layout.direct.misalignment import with_waist
 from cad.layout.direct.stack import DirectStack
@@ -13,6 +14,7 @@ from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar
 from cad.layout.hub import HUB_WALL
 from cad.layout.names import SERVO_SHAFT
 from cad.screws import SCREWS
+from design.arrays import Array
 from design.catalogue.products import Servo
 from design.errors import BuildError
 from design.scanner import Scanner
@@ -30,6 +32,19 @@ def direct_stack(scanner: Scanner) -> DirectStack:
         BuildError: the ring has no bore, a bore too small for a shaft, or the lidar would hang upside down.
     """
     R = lidar_pose(scanner)
+    stack = _without_sub_plate(scanner, R)
+    if covered_screws(scanner.lidar, stack):
+        axis = leaning_least(R)
+        h = hub_height(scanner.lidar, R, stack.hub_radius, stack.ring_radius, axis)
+        stack = replace(stack, h=h, sub_plate=axis)
+    return stack if stack.bearing is None else with_waist(scanner, stack)
+
+
+def _without_sub_plate(scanner: Scanner, R: Array) -> DirectStack:
+    """A cup where neither ring nor bearing asks for a turned shaft."""
+    cup = cup_stack(scanner) if scanner.slip_ring is None else None
+    if cup is not None and horn_bears(scanner, cup):
+        return cup
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
@@ -49,11 +64,7 @@ def direct_stack(scanner: Scanner) -> DirectStack:
         sub_plate=None,
     )
     bearing = bearing_for(scanner, alone) if _needs_bearing(scanner, alone) else None
-    stack = replace(alone, bearing=bearing)
-    if covered_screws(scanner.lidar, stack):
-        axis = leaning_least(R)
-        stack = replace(stack, h=hub_height(scanner.lidar, R, stack.hub_radius, radius, axis), sub_plate=axis)
-    return stack if bearing is None else with_waist(scanner, stack)
+    return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
 
 
 def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:

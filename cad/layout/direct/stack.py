@@ -14,7 +14,8 @@ ring's top, everything that stands still beside the shaft stays below it: cleara
     horn              the servo's horn face
 
 A tilted axis whose rotor is too heavy for the horn alone gets a bearing on a sleeve of the shaft
-(`cad/layout/direct/loads.py`).
+(`cad/layout/direct/loads.py`). Without ring and bearing nothing has to pass over the shaft: it is a printed cup
+(`cad/layout/direct/cup.py`), its flange CUP_GAP below the shoulder.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad.layout.hub import HUB_GAP, Hub
+from cad.layout.names import HORN_CUP, SERVO_SHAFT
 from design.arrays import Array
 
 RING_GAP = 3.0
+CUP_GAP = 0.5  # between hub and flange of a cup: the cup's rim carries the hub
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
 # DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
 GROOVES = {
@@ -71,6 +74,11 @@ class DirectStack(Hub):
     collar_height: float
     waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
+
+    @property
+    def shaft(self) -> str:
+        """Name of the part that stands on the horn."""
+        return SERVO_SHAFT if self.cup_bore == 0 else HORN_CUP
 
     @property
     def bearing_middle(self) -> float:
@@ -117,6 +125,8 @@ class DirectStack(Hub):
     @property
     def horn(self) -> float:
         """Height of the servo's horn face."""
+        if self.cup_bore > 0:
+            return self.shoulder - CUP_GAP - self.flange_thickness
         if self.bearing is None:
             return self.ring_bottom - RING_GAP - self.collar_height
         return self.ring_bottom - max(0.0, APART - self.ring_length) - self.waist_length - self.collar_height
@@ -129,17 +139,26 @@ class DirectStack(Hub):
     def radius_at(self, above_horn: Array, waist_diameter: float) -> Array:
         """Radius of the shaft at heights above the horn; the pocket of the horn's boss is left out.
 
+        The floor of a cup counts as wide as the circle of the screws that clamp it: finite elements of a cup that the
+        face of its horn holds turn 1.2 times as far.
+
         Args:
             above_horn: heights, any shape.
             waist_diameter: of its waist, in the metal at hand.
         """
         z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
+        if self.cup_bore > 0:
+            return np.where(z < self.flange_thickness, self.collar_radius, shaft)
         radius = np.full(z.shape, shaft)
         if self.bearing is not None:
             above = z - self.collar_height - self.waist_length
             radius = np.minimum(shaft, waist_diameter / 2 + np.maximum(above, 0.0))
         radius = np.where(z < self.collar_height, max(self.collar_radius, shaft), radius)
         return np.where(z < self.flange_thickness, np.maximum(self.flange_radius, radius), radius)
+
+    def bore_at(self, above_horn: Array) -> Array:
+        """Radius inside the shaft at heights above the horn: 0 where it is solid."""
+        return np.where(np.asarray(above_horn) < self.flange_thickness, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
         """Middles and thicknesses of slices of the shaft above the horn; none of them spans an edge of it.

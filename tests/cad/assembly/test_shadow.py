@@ -7,33 +7,21 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scanners import PITCHING, scanner_at
 
-from cad.assembly.make import make_parts
 from cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
 from design.search.with_parts import Refused, Workshop
 from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 
-PITCHING = (-90, 0, 90, 0)
 
-
-def scanner_for(alpha_rot, beta_rot, alpha, beta):
-    angles = AngleSet(
-        task="test",
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
-        sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring="UH1256-02-0610-06S",
-    )
-    return scanner_of(angles, "fdm-0.4", load_catalogue())
+def scanner_for(*setting_deg):
+    return scanner_at(setting_deg)
 
 
 @pytest.fixture(scope="module")
-def pitching():
+def pitching(parts_of):
     scanner = scanner_for(*PITCHING)
-    assembly = make_parts(scanner)
+    assembly = parts_of(scanner)
     return scanner, assembly, shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
 

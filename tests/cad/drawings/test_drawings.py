@@ -4,6 +4,7 @@ import io
 import itertools
 import re
 import xml.etree.ElementTree as ET
+from collections import Counter
 from types import SimpleNamespace
 
 import ezdxf
@@ -23,6 +24,7 @@ from cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from cad.drawings.sheet import A2, A3, Sheet
 from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import rounds_of
+from cad.layout.all_joints import joints_of
 from cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)
@@ -106,6 +108,29 @@ def test_shaft_circle_of_holes_and_diameters(sheets):
     outer = max(diameter for diameter, _ in circles_in(sheet.mesh, [0, 0, top - 25.0], Z))
     assert f"Ø{number(round(outer, 1))}  0/-0.011" in sheet.said  # h6 below the bearing's sleeve
     assert any(abs(value - (top - low)) < 0.01 for value in ordinates(sheet))
+
+
+def test_every_hole_that_holds_a_screw_says_by_what(sheets, made):
+    for name, sheet in sheets.items():
+        held = [joint for joint in joints_of(made.result.assembly.layout) if joint.holder == name]
+        told = Counter()
+        for text in sheet.said:
+            if found := re.match(r"(?:(\d+)x )?Ø.*(?:TAPPED|THREAD|INSERT|FOR NUT) ([\w./-]+(?: UNC)?)", text):
+                told[found[2].rstrip(",")] += int(found[1] or 1)
+        assert told == sum((Counter({joint.screw.name: joint.count}) for joint in held), Counter()), name
+    assert any("TAPPED M3" in text for text in sheets["servo_shaft"].said)
+
+
+def test_the_thickness_of_an_inclined_plate_is_told(sheets):
+    for name in ("base_mount", "alignment_linkage"):
+        mesh = sheets[name].mesh
+        normals, areas = mesh.facets_normal, mesh.facets_area
+        normal = normals[np.argmax(np.where(np.abs(normals @ Z) < 0.999, areas, 0))]
+        along = np.flatnonzero(np.abs(normals @ normal) > 1 - 1e-6)
+        first, second = along[np.argsort(areas[along])[::-1][:2]]
+        apart = abs((mesh.facets_origin[first] - mesh.facets_origin[second]) @ normal)
+        (said,) = [text for text in sheets[name].said if "faces across them are" in text]
+        assert float(re.search(r"are ([\d.]+) apart", said)[1]) == pytest.approx(apart, abs=0.02), name
 
 
 def test_linkage_angle_seat_and_holes(sheets, made):

@@ -9,22 +9,19 @@ are read from the half cylinders of their ends.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
+from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
 
-from cad.assembly.make import make_parts
 from cad.geometry.holes import Piercing, rounds_of
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
 from cad.screws import SCREWS, thread_hole, trap_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
 from design.deck_holes import Rectangle
-from design.scanner import Modules, scanner_of
+from design.scanner import Modules
 
 COAXIAL = 0.05
 LOOSE = 0.1  # the kernel bounds a face whose end is cut by bore and flat no better
@@ -159,54 +156,34 @@ def is_reachable(hole, head, piercing):
     return not piercing.between(start - 0.05 * direction, start + DRIVER * direction)
 
 
-def scanner_for(axis, mount, ring="UH1256-02-0610-06S", lidar="UTM-30LX", servo="MX-64R", printer="fdm-0.4"):
-    angles = AngleSet(
-        task="joints",
-        angles_deg=Angles(alpha_rot=axis[0], beta_rot=axis[1], alpha_laser=mount[0], beta_laser=mount[1]),
-        sensor=lidar,
-        servo=servo,
-        slip_ring=ring,
-    )
-    return scanner_of(angles, printer, load_catalogue())
-
-
-def with_foot(scanner, deck=None):
-    return replace(scanner, modules=Modules(tripod_foot=True), deck=deck)
-
-
-def with_cover(scanner):
-    return replace(scanner, modules=Modules(ring_cover=True))
-
-
+FOOT, COVER = Modules(tripod_foot=True), Modules(ring_cover=True)
 SETTINGS = {
-    "tilted, with a bearing": scanner_for((0, 55), (80, -75)),
-    "tilted, nuts": scanner_for((0, 35), (-20, -70), printer="fdm-0.4-nut"),
-    "hanging, inserts": scanner_for((180, 20), (30, -45), printer="fdm-0.4-insert"),
-    "upright on the deck": scanner_for((0, 0), (60, -30)),
-    "upright, a sub-plate": scanner_for((0, 0), (25.5, -21.4), lidar="URG-04LX"),
-    "a sub-plate in nuts": scanner_for((40, 0), (21, -21), printer="fdm-0.4-nut"),
-    "small, without a ring": scanner_for((0, 40), (-20, -70), ring=None, lidar="URG-04LX", servo="AX-12A"),
-    "a cover on a cage": with_cover(scanner_for((0, -55), (-80, 75))),
-    "a cover on a fork": with_cover(scanner_for((0, 0), (60, -30), printer="fdm-0.4-nut")),
-    "a tripod": with_foot(scanner_for((0, 40), (20, 60), ring=None)),
-    "a belt on a tripod, nuts M5": with_foot(
-        scanner_for((0, 90), (0, -90), ring="SRC022A-6", printer="fdm-0.4-nut"),
-        Rectangle(shape="rectangle", size_mm=(90, 90), screw="M5"),
+    "tilted, with a bearing": scanner_at(GROUND_AHEAD),
+    "tilted, nuts": scanner_at((0, 35, -20, -70), printer="fdm-0.4-nut"),
+    "hanging, inserts": scanner_at((180, 20, 30, -45), printer="fdm-0.4-insert"),
+    "upright on the deck": scanner_at(UPRIGHT),
+    "upright, a sub-plate": scanner_at((0, 0, 25.5, -21.4), sensor="URG-04LX"),
+    "a sub-plate in nuts": scanner_at((40, 0, 21, -21), printer="fdm-0.4-nut"),
+    "small, without a ring": scanner_at((0, 40, -20, -70), slip_ring=None, sensor="URG-04LX", servo="AX-12A"),
+    "printed throughout, inserts": scanner_at(
+        (0, 0, 0, 50), slip_ring=None, sensor="STL27L", servo="XL430-W250", printer="fdm-0.4-insert"
     ),
-    "a belt": scanner_for((0, 90), (0, -90), ring="SRC022A-6"),
-    "a belt, nuts": scanner_for((60, 20), (10, 60), ring="SRC022A-6", printer="fdm-0.4-nut"),
+    "a cover on a cage": scanner_at(GROUND_AHEAD, modules=COVER),
+    "a cover on a fork": scanner_at(UPRIGHT, modules=COVER),
+    "a tripod": scanner_at(GROUND_AHEAD, modules=FOOT),
+    "a belt on a tripod, nuts M5": replace(
+        scanner_at(ROLLING, slip_ring=CAPSULE, printer="fdm-0.4-nut", modules=FOOT),
+        deck=Rectangle(shape="rectangle", size_mm=(90, 90), screw="M5"),
+    ),
+    "a belt": scanner_at(ROLLING, slip_ring=CAPSULE),
+    "a belt, nuts": scanner_at((60, 20, 10, 60), slip_ring=CAPSULE, printer="fdm-0.4-nut"),
 }
 
 
-@functools.cache
-def parts_of(name):
-    """Scanner and assembly of a setting, made once."""
-    return SETTINGS[name], make_parts(SETTINGS[name])
-
-
 @pytest.mark.parametrize("name", SETTINGS)
-def test_the_declared_joints_are_those_that_the_solids_have(name):
-    scanner, assembly = parts_of(name)
+def test_the_declared_joints_are_those_that_the_solids_have(name, parts_of):
+    scanner = SETTINGS[name]
+    assembly = parts_of(scanner)
     read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
     assert {
         key for key, joint in declared.items() if joint.slot_mm is None and key[0] not in ("deck", "tripod")
@@ -244,8 +221,8 @@ def half_cylinders(solid, radius):
     return [np.array(axis.Location().Coord()[:2]) for axis in axes if abs(axis.Direction().Z()) > 1 - 1e-9]
 
 
-def test_screws_in_slots_stand_in_the_middle_of_them():
-    _, assembly = parts_of("a belt")
+def test_screws_in_slots_stand_in_the_middle_of_them(parts_of):
+    assembly = parts_of(SETTINGS["a belt"])
     slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slot_mm}
     assert slotted.keys() == {("drive_plate", "bearing_tower"), ("alignment_linkage", "counterweight")}
     for (part, onto), joint in slotted.items():
@@ -260,9 +237,10 @@ def test_screws_in_slots_stand_in_the_middle_of_them():
         assert joint.count == len([axis for axis in joint.axes for hole in threads if _is_on(axis, hole)])
 
 
-def test_a_screw_that_moves_is_noticed():
+def test_a_screw_that_moves_is_noticed(parts_of):
     """The reading sees a hole that is not where the joint says: the servo's shaft of another scanner."""
-    scanner, assembly = parts_of("upright on the deck")
+    scanner = SETTINGS["upright on the deck"]
+    assembly = parts_of(scanner)
     turned = scanner.servo.model_copy(update={"horn_first_hole_deg": 10.0})
     moved = replace(assembly.layout, scanner=replace(scanner, servo=turned))
     joint = next(joint for joint in joints_of(moved) if joint.onto == "servo_horn")

@@ -1,5 +1,9 @@
-"""Which servos and rings go together: small horns get a thinner shaft, and a refusal says whose number it rests on."""
+"""Which servos and rings go together, what stands on the horn, and a refusal says whose number it rests on."""
 
+from dataclasses import replace
+
+import cadquery as cq
+import numpy as np
 import pytest
 
 from cad.assembly.make import make_parts
@@ -7,6 +11,7 @@ from cad.checks.clearance import clearance_checks
 from cad.checks.retention import retention_checks
 from cad.layout.all_joints import joints_of
 from cad.layout.direct.sizing import direct_stack
+from cad.layout.joints import held_in
 from cad.layout.layout import layout_of
 from cad.screws import SCREWS
 from design.angles import Angles, AngleSet
@@ -45,19 +50,48 @@ def test_an_xm430_is_laid_out_with_every_ring_and_every_hokuyo(ring, lidar):
     ("servo", "lidar", "angles"),
     [("STS3215", "UST-10LX", (0, 0, 60, -30)), ("STS3215", "LD06", TILTED), ("XL330-M288", "LD06", TILTED)],
 )
-def test_a_small_horn_gets_a_shaft_between_the_heads_of_its_screws(servo, lidar, angles):
+def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_screws(servo, lidar, angles):
     scanner = scanner_for(servo, lidar, None, angles)
     stack, screw = direct_stack(scanner), SCREWS[scanner.servo.horn_screw]
-    assert 8.0 <= stack.shaft_diameter < 12.0
-    assert stack.collar_radius <= (scanner.servo.horn_circle_mm - screw.head_diameter) / 2  # the heads pass it
-    assert stack.collar_radius >= scanner.servo.horn_boss_diameter_mm / 2 + 1.4
+    assert stack.cup_bore >= scanner.servo.horn_circle_mm + screw.head_diameter  # the heads pass it
     assembly = make_parts(scanner)
+    assert {part.process for part in assembly.parts.values()} == {"printed"} and "horn_cup" in assembly.parts
     checks = [*retention_checks(scanner, assembly), *clearance_checks(assembly)]
     assert {check.severity for check in checks} == {"pass"}
 
 
-def test_a_horn_with_room_keeps_the_plain_shaft():
-    assert direct_stack(scanner_for("MX-64R", "UTM-30LX", None)).shaft_diameter == 12.0
+@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.4-insert", "cnc"])
+def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
+    """Read from the solids: the hole that the joint tells is there, and behind it the nut's room or the wall."""
+    scanner = scanner_for("XL430-W250", "STL27L", None, (0, 0, 0, 50))
+    scanner = replace(scanner, printer=CATALOGUE.products[printer])
+    stack, assembly = direct_stack(scanner), make_parts(scanner)
+    joint = next(joint for joint in joints_of(layout_of(scanner)) if joint.onto == "horn_cup")
+    assert [printer, held_in(joint.thread), joint.inserts] in (
+        ["fdm-0.4", "trap", False],
+        ["fdm-0.4-insert", "thread", True],
+        ["cnc", "thread", False],
+    )
+    cup = assembly.made["horn_cup"]
+
+    def solid(axis, depth_mm, beside_mm):
+        inwards, up = np.array(axis.along), np.array([0.0, 0.0, 1.0])
+        at = (depth_mm - stack.shaft_diameter / 2) * inwards + axis.start[2] * up
+        return cup.isInside(cq.Vector(*(at + beside_mm * np.cross(inwards, up))))
+
+    for axis in joint.axes:
+        for depth_mm in (0.5, 2.5, 6.5):
+            assert not solid(axis, depth_mm, 0.49 * joint.thread.hole)
+        assert solid(axis, 2.5, 0.51 * joint.thread.hole)
+        assert solid(axis, 4.0, 0.6 * joint.thread.hole) == (not joint.traps)
+        tip_mm = float(np.linalg.norm(axis.start[:2])) - joint.length_mm
+        assert tip_mm > stack.cup_bore / 2 - 1.0  # above the heads of the horn's screws nothing is in the way
+    assert {check.severity for check in retention_checks(scanner, assembly)} == {"pass"}
+
+
+def test_a_ring_still_asks_for_a_turned_shaft():
+    stack = direct_stack(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S"))
+    assert stack.cup_bore == 0 and stack.shaft_diameter == 12.0 and stack.shaft == "servo_shaft"
 
 
 def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():

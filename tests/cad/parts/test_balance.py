@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from scanners import GROUND_AHEAD, ROLLING, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.assembly.shadow import shadow_of, triangles_of
@@ -19,27 +20,16 @@ from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Count
 from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
 from cad.layout.layout import drive_of, layout_of
 from cad.layout.linkage import Ear, linkage_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
 from design.left_out import LeftOut
 from design.motion import Sweep
-from design.scanner import scanner_of
 from scanwright.studio.view.scanner_bodies import make_bodies
 
-SHIPPED = [(-180, 55, 80, -75), (0, 90, 0, -90)]  # ground_ahead, rolling
+SHIPPED = [GROUND_AHEAD, ROLLING]
 STEEL, PLASTIC, ALUMINIUM = 7.85e-3, 1.24e-3, 2.7e-3  # g/mm3
 
 
 def scanner_for(*angles, sensor="UTM-30LX", servo="MX-64R"):
-    names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
-    record = AngleSet(
-        task="balance",
-        angles_deg=Angles(**dict(zip(names, angles, strict=True))),
-        sensor=sensor,
-        servo=servo,
-        slip_ring="UH1256-02-0610-06S",
-    )
-    return scanner_of(record, "fdm-0.4", load_catalogue())
+    return scanner_at(angles, sensor=sensor, servo=servo)
 
 
 def found_for(scanner):
@@ -47,9 +37,9 @@ def found_for(scanner):
 
 
 @pytest.fixture(scope="module", params=SHIPPED, ids=["ground_ahead", "rolling"])
-def made(request):
+def made(request, parts_of):
     scanner = scanner_for(*request.param)
-    return scanner, make_parts(scanner)
+    return scanner, parts_of(scanner)
 
 
 def meshes(assembly, names):

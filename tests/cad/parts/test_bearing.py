@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scanners import GROUND_AHEAD, ROLLING, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.assembly.masses import link_bodies, rotor_weight
@@ -22,25 +23,14 @@ from cad.layout.layout import config_hash, layout_of
 from cad.layout.loads import Weight
 from cad.layout.names import ROTOR_LEAD
 from cad.parts.all_parts import parts_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Bearing, Servo
 from design.errors import BuildError
-from design.scanner import scanner_of
 
 degrees = st.floats(-90, 90)
-ROLLING, GROUND_AHEAD = (0, 90, 0, -90), (0, -55, -80, 75)
 
 
 def scanner_for(alpha_rot, beta_rot, alpha, beta, lidar="UTM-30LX", servo="MX-64R"):
-    angles = AngleSet(
-        task="test",
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
-        sensor=lidar,
-        servo=servo,
-        slip_ring="UH1256-02-0610-06S",
-    )
-    return scanner_of(angles, "fdm-0.4", load_catalogue())
+    return scanner_at((alpha_rot, beta_rot, alpha, beta), sensor=lidar, servo=servo)
 
 
 def rated(scanner, newton):
@@ -58,9 +48,9 @@ SCANNERS = {
 
 
 @pytest.fixture(scope="module", params=SCANNERS)
-def made(request):
+def made(request, parts_of):
     scanner = SCANNERS[request.param]
-    assembly = make_parts(scanner)
+    assembly = parts_of(scanner)
     meshes = {}
     for name, solid in (assembly.made | assembly.bought).items():
         mesh = checked_mesh(solid, name)

@@ -10,6 +10,7 @@ import pytest
 import shapely
 import trimesh
 from cadquery import Vector
+from scanners import CAPSULE, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.checks.remarks import without_traps
@@ -37,25 +38,13 @@ from cad.parts.bearing_tower import bearing_tower
 from cad.screws import SCREWS
 from cad.solids import prism, upright
 from cad.statics.shaft import belt_shaft_bend
-from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo, SlipRing
 from design.errors import BuildError
-from design.scanner import scanner_of
-
-CAPSULE = "SRC022A-6"
 
 
 def scanner_for(alpha_rot=0, beta_rot=90, alpha=0, beta=-90, ring=CAPSULE):
-    angles = AngleSet(
-        task="test",
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
-        sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring=ring,
-        motion={"mode": "spin", "period_s": 18.0},
-    )
-    return scanner_of(angles, "fdm-0.4", load_catalogue())
+    return scanner_at((alpha_rot, beta_rot, alpha, beta), slip_ring=ring)
 
 
 def with_ring(**changes):
@@ -64,9 +53,9 @@ def with_ring(**changes):
 
 
 @pytest.fixture(scope="module")
-def made():
+def made(parts_of):
     scanner = scanner_for()
-    assembly = make_parts(scanner)
+    assembly = parts_of(scanner)
     meshes = {n: trimesh.Trimesh(m.vertices, m.faces, process=False) for n, m in assembly.meshes().items()}
     checks, shadow = run_checks(scanner, assembly, lambda _: None)
     found = {(check.kind, check.where): check for check in checks}
@@ -351,7 +340,7 @@ def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     sheet = drawing_of("main_shaft", made.scanner, made.assembly, 80.0, "0" * 12)
     said = [item.text for item in drawn(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
-    threads = [text for text in said if text.startswith("Ø2.5 THRU, RADIAL")]
+    threads = [text for text in said if text.startswith("Ø2.5 THRU, TAPPED M3, RADIAL")]
     assert len(threads) == 4 and any("M3 through the spigot" in text for text in said)
     assert [text for text in said if text.startswith("Ø") and ":" not in text and text not in threads] == [
         "Ø24.96  +0.02/0",

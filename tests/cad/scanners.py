@@ -1,0 +1,25 @@
+"""Scanners that tests of several files take: of equal ones the fixture `parts_of` makes the parts once."""
+
+from design.angles import Angles, AngleSet
+from design.catalogue.catalogue import load_catalogue
+from design.scanner import NO_MODULES, scanner_of
+
+RING, CAPSULE = "UH1256-02-0610-06S", "SRC022A-6"
+GROUND_AHEAD, ROLLING, PITCHING, UPRIGHT = (0, -55, -80, 75), (0, 90, 0, -90), (-90, 0, 90, 0), (0, 0, 60, -30)
+"""alpha_rot, beta_rot, alpha_laser and beta_laser in degrees."""
+
+
+def scanner_at(
+    setting_deg, *, sensor="UTM-30LX", servo="MX-64R", slip_ring=RING, printer="fdm-0.4", modules=NO_MODULES
+):
+    """The scanner of products by their names at four angles."""
+    names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+    angles = AngleSet(
+        task="test",
+        angles_deg=Angles(**dict(zip(names, setting_deg, strict=True))),
+        sensor=sensor,
+        servo=servo,
+        slip_ring=slip_ring,
+        motion={"mode": "spin", "period_s": 18.0},
+    )
+    return scanner_of(angles, printer, load_catalogue(), modules=modules)
