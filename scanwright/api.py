@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from firmware_io.recording.importer import ImportSummary
     from firmware_io.recording.recording import Recording
     from firmware_io.registration.register_files import RegisteredFiles
-    from firmware_io.scan.acquire import ScanSummary
+    from firmware_io.scan.scan_summary import ScanSummary
     from firmware_io.servo.servo import ServoDriver
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]

@@ -5,7 +5,7 @@
     uv run python -m benchmarks.scanwright.studio rebuild --count 40
     uv run python -m benchmarks.scanwright.studio live
 
-Moves: a client of the page's own websocket moves a slider, waits for the facts and the colours of the sphere that
+Moves: a client of the page's own websocket moves a slider, waits for the facts and the colours of the room that
 answer it, and moves on a thirtieth of a second later, as a hand does. Times are from the message that leaves to the
 last one that arrives, unpacked: what a browser adds is its drawing.
 
@@ -111,7 +111,7 @@ def moves(task: Path, count: int) -> None:
                     told.get()
                 sent = time.perf_counter()
                 _slide(socket, slider, float(angles[k % 4]))
-                missing, when = {"facts", "sphere"}, sent
+                missing, when = {"facts", "colours"}, sent
                 while missing:
                     when, what = told.get(timeout=10)
                     missing.discard(what)
@@ -200,8 +200,8 @@ def _listen(socket: ClientConnection, facts: str, told: SimpleQueue[tuple[float,
         for message in inner["messages"]:
             if message.get("uuid") == facts and "content" in message.get("updates", {}):
                 told.put((now, "facts"))
-            if message.get("name") == "/sphere" and "batched_colors" in message.get("updates", {}):
-                told.put((now, "sphere"))
+            if message.get("name") in ("/room", "/sphere") and "batched_colors" in message.get("updates", {}):
+                told.put((now, "colours"))
             if message["type"] == "MeshMessage":
                 told.put((now, message["name"].split("/")[2]))
 

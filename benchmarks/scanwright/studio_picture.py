@@ -32,7 +32,7 @@ def main() -> None:
     if program is None:
         sys.exit("chromium is not installed")
     angles = load_angles(build / "angles.json").angles_deg
-    with guarded_server("a page") as (server, gate), sync_playwright() as driver:
+    with guarded_server("Scanwright studio") as (server, gate), sync_playwright() as driver:
         studio = Studio(server, load_task(build / "task.toml"), Path.cwd(), build.parent)
         studio.move(Setting((angles.alpha_rot, angles.beta_rot, angles.alpha_laser, angles.beta_laser)))
         studio.judging.settled(PATIENCE_S)

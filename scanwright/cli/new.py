@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
-from design.errors import TaskError, suggest
+from design.errors import ScanwrightError, TaskError, suggest
 from scanwright.cli.console import hint, show
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
+T = TypeVar("T")
+UNSAID: dict[str, Any] = {"name": "new", "height_m": 0.5, "see": ("all",), "scan_s": 10.0}
+"""What stands in for answers that are not given yet, while those before them are checked."""
 
 
 @app.command()
@@ -82,40 +86,74 @@ def _asked(
     see: list[str] | None,
     scan_s: float | None,
 ) -> tuple[str, str, float, str, list[str], float]:
-    """The five questions; those that flags have answered are not asked."""
-    from design.catalogue.table import chosen, table_lines
+    """The five questions, but for those that flags have answered; an answer that makes no sense is asked for again."""
+    from design.catalogue.table import DOUBT, chosen, table_lines
+    from scanwright.pipeline.new_task import Answers, check_answers
+
+    def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
+        of_kind = chosen(products, kind=kind)
+        show(table_lines(of_kind)[:-2])
+        print(f"{DOUBT}: a number that nobody has verified; -: unknown")
+        return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
+
+    def checked(**answers: Any) -> None:
+        known = {"lidar": lidar, "servo": servo, "height_m": height_m, "robot": robot, "see": see, "scan_s": scan_s}
+        given = {name: value for name, value in known.items() if value is not None} | answers
+        check_answers(Answers(**(UNSAID | given) | {"see": tuple(given.get("see") or UNSAID["see"])}), products)
 
     if lidar is None:
-        show(table_lines(chosen(products, kind="lidar"))[:-2])
-        lidar = _until_known("1. Which lidar?", "UST-10LX", [p.name for p in chosen(products, kind="lidar")])
+        lidar = product("lidar", "1. Which lidar?", "UST-10LX", lambda _: None)
     if servo is None:
-        show(table_lines(chosen(products, kind="servo"))[:-2])
-        servo = _until_known("2. Which servo?", "XM430-W350", [p.name for p in chosen(products, kind="servo")])
+        servo = product("servo", "2. Which servo turns it?", "XM430-W350", lambda name: checked(servo=name))
     if height_m is None:
-        height_m = typer.prompt("3. How high over the ground is the scanner, in metres?", type=float)
+        question = "3. How many metres over the ground is the scanner?"
+        height_m = _until(question, None, _number, lambda height: checked(height_m=height))
     if robot is None:
-        robot = typer.prompt(
-            "   What of the robot is below it: box:LENGTH:WIDTH:HEIGHT, a mesh file, or", default="none"
+        print(
+            "   What of the robot is in its way, below it? box:0.6:0.3:0.3 is its length, width and height in metres;"
         )
+        print("   or a file with its mesh (STL, OBJ, PLY), or none")
+        robot = _until("  ", "none", str, lambda what: checked(robot=what))
     if not see:
-        print("4. What must it see? One or more, with or without numbers (metres):")
+        print("4. What must it see? One or more, with spaces between. Numbers may be changed or left out:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4         3 m ahead, 4 m wide                around:30:30  all around, 30 deg up and down")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
-        see = typer.prompt("  ", default="ground ceiling").split()
+        see = _until("  ", "ground ceiling", str.split, lambda wishes: checked(see=wishes))
     if scan_s is None:
-        scan_s = typer.prompt("5. How many seconds may one full scan take?", default=10.0, type=float)
+        question = "5. How many seconds may one full scan take? Longer is denser"
+        scan_s = _until(question, "10", _number, lambda seconds: checked(scan_s=seconds))
     return lidar, servo, height_m, robot, see, scan_s
 
 
-def _until_known(question: str, usual: str, known: list[str]) -> str:
-    """Ask until a product of the catalogue is named, in whatever case."""
-    folded = {name.lower(): name for name in known}
+def _until(question: str, usual: str | None, read: Callable[[str], T], fits: Callable[[T], object]) -> T:
+    """Ask until an answer can be read and fits those before it; what was wrong is said without the name of its flag."""
     while True:
-        answer = str(typer.prompt(question, default=usual)).strip()
-        if answer.lower() in folded:
-            return folded[answer.lower()]
-        print(f"   '{answer}' is not in the catalogue{suggest(answer, known)}")
+        try:
+            answer = read(str(typer.prompt(question, default=usual, prompt_suffix=" > ")).strip())
+            fits(answer)
+        except ScanwrightError as error:
+            said = str(error)
+            print(f"   {said.partition(' ')[2] if said.startswith('--') else said}")
+        else:
+            return answer
+
+
+def _named(answer: str, known: list[str]) -> str:
+    """The product that is meant, in whatever case; the beginning of a name is enough where it is one product's only."""
+    found = [name for name in known if name.lower() == answer.lower()]
+    found = found or [name for name in known if name.lower().startswith(answer.lower())]
+    if len(found) != 1:
+        more = f": {', '.join(found)}" if found else suggest(answer, known)
+        raise TaskError(f"'{answer}' is {'more than one' if found else 'not in the catalogue'}{more}")
+    return found[0]
+
+
+def _number(answer: str) -> float:
+    try:
+        return float(answer)
+    except ValueError as error:
+        raise TaskError(f"'{answer}' is no number") from error
 
 
 def _command(answers: Any, path: Path) -> str:

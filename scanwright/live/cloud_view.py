@@ -46,6 +46,7 @@ class CloudView:
         self.points, self.forgotten = 0, 0
         server.initial_camera.position = (-4.0, -3.0, 3.0)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        server.scene.configure_environment_map(None)  # the browser shows a pale picture until it has one
         server.scene.add_frame("/scanner", axes_length=0.3, axes_radius=0.01)
         self.facts = server.gui.add_html("")
         self._line = server.gui.add_html(note_html("waiting for the first scan"))

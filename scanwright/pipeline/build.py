@@ -198,7 +198,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         checked = begin(check_files, scanner, assembly, say)
         parts = build_parts(scanner, work, _at(say, "parts"), lambda _: assembly)
         drawn = begin_drawings(scanner, parts, begin)
-        _at(say, "pictures")("drawing density.png")
+        _at(say, "pictures")("drawing the density")
         standard = standard_settings()
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}

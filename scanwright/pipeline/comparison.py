@@ -28,12 +28,12 @@ class Comparison:
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines()),
             *notes(self.optimum.loaded),
-            f"wrote compare.csv and compare.png to {self.folder}",
+            f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
         ]
 
 
 def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None]) -> Comparison:
-    """Compare, and write `compare.csv` and `compare.png`.
+    """Compare, and write `compare.csv`, `compare.png` and `compare.svg`.
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -304,6 +305,15 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
         f"to_m = {length / 2 - ahead:g}",
         f"width_m = {width:g}",
     ]
+
+
+def check_answers(answers: Answers, products: Catalogue) -> None:
+    """Refuse answers that make no task, before there is a file; a mesh is looked for from the working folder.
+
+    Raises:
+        TaskError: as `task_text` and `design.task.task.load_task`.
+    """
+    load_task(tomllib.loads(task_text(answers, products, "", Path(f"{answers.name}.toml"))))
 
 
 def write_task_file(path: Path, text: str) -> list[str]:

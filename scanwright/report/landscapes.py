@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from design.angles import AngleSet, standard_settings
 from design.arrays import Array
 from design.evaluation.landscape_picture import LandscapePanel, draw_landscape
+from design.evaluation.picture_files import svg_bytes
 from scanwright.report.data_uri import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")
 AXIS = ("alpha_rot", "beta_rot")
 SIZE = 5.4, 5.2  # inches: its letters can still be read on a phone
+DPI = 150  # of the mesh in it
 
 
 def landscape(rows: Array, names: tuple[str, str], angles: AngleSet, label: str) -> str | None:
-    """J over a pair of angles with the built one marked, PNG as a data address; None where the task fixes both.
+    """J over a pair of angles with the built one marked, SVG as a data address; None where the task fixes both.
 
     Args:
         rows: both angles [deg] and the lowest J, shape (settings, 3); inf where none is allowed.
@@ -35,6 +35,4 @@ def landscape(rows: Array, names: tuple[str, str], angles: AngleSet, label: str)
     standard = {name: tuple(np.degrees(setting[first : first + 2])) for name, setting in standard_settings().items()}
     draw_landscape(axis, LandscapePanel(names, rows, built, standard, label))
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
-    return data_uri(stream.getvalue())
+    return data_uri(svg_bytes(figure, DPI), ".svg")

@@ -69,7 +69,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "hidden": None if own_body is None else hidden_by(own_body[0]),
         "total": None if bom is None else next((row for row in bom if row.get("kind") == "total"), None),
         "scene": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
-        "density": read(folder / "density.png", read_picture),
+        "density": read(folder / "density.svg", read_picture),
         "planes": planes,
         "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
         "axes": axes,

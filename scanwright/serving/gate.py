@@ -39,7 +39,14 @@ from design.errors import TaskError
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
 MOST_VISITORS = 8
 MOST_TEXT = 200
-SAID = "ViewerCameraMessage", "GuiUpdateMessage", "SceneNodeClickMessage", "SceneNodeDragMessage", "ScenePointerMessage"
+SAID = (
+    "ViewerCameraMessage",
+    "GuiUpdateMessage",
+    "CommandTriggerMessage",
+    "SceneNodeClickMessage",
+    "SceneNodeDragMessage",
+    "ScenePointerMessage",
+)
 KNOWN: dict[str, Any] = {kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in SAID}
 """What a page may say; everything else is dropped and counted."""
 
@@ -49,6 +56,9 @@ ICON = (
     "r='3' fill='%23fff'/%3E%3C/svg%3E"
 )
 """A fan of beams, for the tab of the browser."""
+
+MENDING = "mended_page.css", "mended_page.js", "brush_ring.js"
+"""A style and scripts that are put into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
 
@@ -165,8 +175,9 @@ class Gate:
 @cache
 def _mending() -> bytes:
     """Style and script that are put into the page."""
-    style, script = (files("scanwright.serving").joinpath(f"mended_page.{kind}").read_bytes() for kind in ("css", "js"))
-    return b"<style>" + style + b"</style><script>" + script + b"</script>"
+    folder = files("scanwright.serving")
+    style, *scripts = (folder.joinpath(name).read_bytes() for name in MENDING)
+    return b"<style>" + style + b"</style>" + b"".join(b"<script>" + script + b"</script>" for script in scripts)
 
 
 def _bound(port: int) -> socket.socket:

@@ -31,6 +31,6 @@ def ramp(level: Array) -> Colours:
 
 def note_html(text: str, *, bad: bool = False) -> str:
     """One line for a person, nothing where it is empty; red where something is refused."""
-    colour = ";color:#c92a2a" if bad else ""
-    line = f'<div style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere{colour}">{escape(text)}</div>'
+    kind = ' class="sw-bad"' if bad else ""
+    line = f'<div{kind} style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere">{escape(text)}</div>'
     return line if text else ""

@@ -8,73 +8,64 @@ run beside them. Everybody who has the page sees and moves the same setting.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Callable, Hashable
+from dataclasses import replace
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import numpy as np
 import viser
 
 from design.angles import STANDARD_DEG, standard_settings
-from design.concurrency.second_process import second_process
 from design.errors import ScanwrightError, TaskError
-from design.search.optimum import find_optimum
+from design.search.optimum import Optimum
 from design.task.task import LoadedTask, load_task, shipped_tasks
-from scanwright.pipeline.build import setting_built
 from scanwright.serving.style import note_html
+from scanwright.studio.brush import PaintBrush
+from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
-from scanwright.studio.panel.controls import (
-    BRUSHES,
-    NO_SCENE,
-    TASK_SCENE,
-    Controls,
-    name_of_copy,
-    put,
-    scan_scenes,
-)
+from scanwright.studio.panel.controls import NO_SCENE, TASK_SCENE, Controls, name_of_copy, put, scan_scenes
 from scanwright.studio.panel.facts import Facts, Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
 from scanwright.studio.panel.saving import Saving
-from scanwright.studio.state import Dab, Setting, painted
-from scanwright.studio.view.coloured_sphere import direction_hit, highest_density
+from scanwright.studio.searching import Searching
+from scanwright.studio.state import Canvas, Dab, Setting
+from scanwright.studio.view.coloured_sphere import highest_density
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.view_3d import SIDES, View3D
 from scanwright.studio.view.workers import Order, Workers
 
-SEARCH_STEPS = 9  # lines that a search says
-STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
-
-
-@dataclass(frozen=True, slots=True)
-class Canvas:
-    """What is being judged: a task, and the paint on it."""
-
-    base: LoadedTask
-    dabs: tuple[Dab, ...]
+FIRST_S = 30.0  # at most, for the first colours
 
 
 class Studio:
     """One page. `saved_to` is the only folder it writes task files to, `out` holds the builds."""
 
     def __init__(self, server: viser.ViserServer, loaded: LoadedTask, saved_to: Path, out: Path) -> None:
-        self._server, self._first = server, loaded
-        self._canvas = Canvas(loaded, ())
+        self._server = server
+        self._canvas = Canvas(loaded)
         self.judge = Judge.for_task(loaded)
         self.facts: Facts | None = None
         self.view = View3D(server)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
         self._tasks = [own, *(name for name in names if name != own)]
+        self._opened = {own: loaded}
         self.controls = Controls(server.gui, loaded, self._tasks, Setting(STANDARD_DEG["rolling"]))
+        self.brush = PaintBrush(self.view, self.controls, lambda: self._canvas.dabs, self._paint)
         self.kept = KeptSettings(self.controls, self.move, self.judge)
         self.saving = Saving(self.controls, saved_to, out)
         self.judging: LatestOnly[Setting] = LatestOnly("judge", self._follow, self._rest)
         self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, self._rejudge)
         self.workers = Workers(self.view, self._say_making)
+        self.history = History(self._state())
+        self.searching = Searching(
+            self.controls, self.say, lambda: (self._canvas, self.setting), self._found, self.move
+        )
         self._connect()
         self._taken()
+        self.judging.settled(FIRST_S)  # nobody is shown a picture without its colours
 
     def close(self) -> None:
         """End the threads, the processes and a build that runs."""
@@ -91,54 +82,96 @@ class Studio:
         """One line under the facts."""
         self.controls.note.content = note_html(text, bad=bad)
 
-    def move(self, setting: Setting) -> None:
-        """Move the sliders."""
+    def move(self, setting: Setting, of: Hashable = None) -> None:
+        """Move the sliders; `of` is what for, where that takes more than one move."""
         for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
             put(slider, angle)
         self.judging.wish(setting)
+        self._note(of, math.inf)
 
-    def dab(self, ray_origin: Any, ray_direction: Any) -> None:
-        """Touch the sphere with the brush where a ray from the camera meets it."""
-        c = self.controls
-        hit = direction_hit(ray_origin, ray_direction, inside=self.view.inside)
-        if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
-            return
-        radius_deg = float(np.clip(c.radius.value, 1, 60))
-        dabs = self._canvas.dabs
-        if dabs and np.dot(dabs[-1].direction, hit) > np.cos(np.radians(STROKE * radius_deg)):
-            return
-        x, y, z = (float(value) for value in hit)
-        value = float(np.clip(c.weight.value, 0.01, 1000.0))
-        self._repaint((*dabs, Dab((x, y, z), radius_deg, c.brush.value, value)))
+    def undo(self) -> None:
+        """Take the last step back."""
+        self._stand_as(self.history.undo())
 
-    def _painted(self) -> LoadedTask:
-        return painted(self._canvas.base, self._canvas.dabs)
+    def redo(self) -> None:
+        """Take the step again that was taken back."""
+        self._stand_as(self.history.redo())
+
+    # What can be undone
+
+    def _state(self) -> PageState:
+        fields = tuple((name, control.value) for name, control in self.controls.fields.items())
+        return PageState(self._canvas, self.setting, self.kept.settings, fields)
+
+    def _note(self, of: Hashable = None, joined_s: float = JOINED_S) -> None:
+        self.history.note(self._state(), of, joined_s)
+        self.controls.show_steps(self.history.undoes, self.history.redoes)
+
+    def _stand_as(self, moment: PageState | None) -> None:
+        if moment is None:
+            return
+        before, self._canvas = self._canvas, moment.canvas
+        for name, value in moment.fields:
+            put(self.controls.fields[name], value)
+        for slider, angle in zip(self.controls.angles, moment.setting.angles_deg, strict=True):
+            put(slider, angle)
+        if moment.canvas.base is not before.base:
+            self._offer_scenes()
+            put(self.controls.task, next(name for name, task in self._opened.items() if task is self._canvas.base))
+        if moment.kept != self.kept.settings:
+            self.kept.take(moment.kept)
+        if moment.canvas == before:
+            self.judging.wish(moment.setting)
+        else:
+            self.painting.wish(moment.canvas)
+        self.controls.show_steps(self.history.undoes, self.history.redoes)
 
     def _keep(self) -> None:
         self.say(f"kept as {self.kept.keep(self.setting)}: see Compare")
+        self._note()
+
+    def _remove(self) -> None:
+        self.kept.remove()
+        self._note()
 
     def _connect(self) -> None:
         c = self.controls
 
-        async def moved(_: Any) -> None:
+        async def moved(event: viser.GuiEvent[Any]) -> None:
             self.judging.wish(self.setting)
+            noted(event)
+
+        def noted(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:  # else it is the program that moves it
+                self._note(event.target.label)
+
+        def shown(_: viser.GuiEvent[Any]) -> None:
+            self.brush.show()
 
         for slider in c.angles:
             slider.on_update(moved)
+        for field in c.fields.values():
+            field.on_update(noted)
+        for field in (c.brush, c.radius):
+            field.on_update(shown)
         c.task.on_update(self._told(self._change_task))
         c.painting.on_update(self._told(self._arm))
+        c.undo_key.on_trigger(self._told(self.undo))
+        c.redo_key.on_trigger(self._told(self.redo))
+        c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
         c.look.on_update(self._told(self._look))
         c.scanner.on_update(self._told(self._show_scanner))
         c.scene.on_update(self._told(self._change_scene))
         for button, act in (
-            (c.optimise, self.optimise),
+            (c.optimise, self.searching.begin),
             (c.keep, self._keep),
-            (c.undo, lambda: self._repaint(self._canvas.dabs[:-1])),
-            (c.clear, lambda: self._repaint(())),
+            (c.undo, self.undo),
+            (c.redo, self.redo),
+            (c.clear, lambda: self._paint(())),
             (c.restore, self.kept.restore),
-            (c.remove, self.kept.remove),
-            (c.save, lambda: self.saving.save(self._painted(), self.setting)),
-            (c.build, lambda: self.saving.build(self._painted(), self.setting)),
+            (c.remove, self._remove),
+            (c.save, lambda: self.saving.save(self._canvas.painted(), self.setting)),
+            (c.build, lambda: self.saving.build(self._canvas.painted(), self.setting)),
         ):
             button.on_click(self._told(act))
 
@@ -160,6 +193,7 @@ class Studio:
         judge = self.judge
         self._tell(judge.quick(setting))
         self.view.colour(judge.problem, setting, self._highest)
+        self._server.flush()  # else they wait for the next of its times
 
     def _rest(self, setting: Setting) -> None:
         self._order()
@@ -178,22 +212,35 @@ class Studio:
         name = self.controls.task.value
         if name not in self._tasks:  # a page could ask for any file of this computer
             raise TaskError(f"task '{name}': none of those that can be chosen")
-        loaded = self._first if name in (str(self._first.source), self._first.task.name) else load_task(Path(name))
-        self._canvas = Canvas(loaded, ())
-        self.kept.clear()
-        self.controls.scene.options = scan_scenes(loaded)
-        put(self.controls.name, name_of_copy(loaded))
+        if name not in self._opened:
+            self._opened[name] = load_task(Path(name))
+        if self._opened[name] is self._canvas.base:
+            return
+        self._canvas = Canvas(self._opened[name])
+        self.kept.take(())  # another task asks for other angles
+        self._offer_scenes()
+        put(self.controls.name, name_of_copy(self._canvas.base))
         self.painting.wish(self._canvas)
+        self._note()
 
-    def _repaint(self, dabs: tuple[Dab, ...]) -> None:
-        painted(self._canvas.base, dabs)  # refuses what no task could hold
-        self._canvas = replace(self._canvas, dabs=dabs)
-        self.painting.wish(self._canvas)
+    def _found(self, optimum: Optimum) -> None:
+        """Judge by the task whose period was found."""
+        self.judge = replace(self.judge, loaded=optimum.loaded, problem=optimum.problem)
+        self.kept.rejudge(self.judge)
+
+    def _offer_scenes(self) -> None:
+        self.controls.scene.options = scan_scenes(self._canvas.base)
+
+    def _paint(self, dabs: tuple[Dab, ...], stroke: int | None = None) -> None:
+        canvas = Canvas(self._canvas.base, dabs)
+        canvas.painted()  # refuses what no task could hold
+        self._canvas = canvas
+        self.painting.wish(canvas)
+        self._note(("stroke", stroke) if stroke is not None else None, math.inf)
 
     def _take(self, canvas: Canvas) -> None:
         try:
-            loaded = painted(canvas.base, canvas.dabs)
-            judge = Judge.for_task(loaded)
+            judge = Judge.for_task(canvas.painted())
         except ScanwrightError as error:
             self.say(str(error), bad=True)
             return
@@ -217,30 +264,18 @@ class Studio:
 
     def _arm(self) -> None:
         """Take the brush in hand, or put it away so that dragging turns the view again."""
-        sphere = self.view.sphere
-        sphere.remove_click_callback()
-        sphere.remove_drag_callback()
-        if not self.controls.painting.value:
-            return
-        if not self.view.on_sphere:
+        self.brush.arm(self._told)
+        if self.controls.painting.value and not self.view.on_sphere:
             put(self.controls.look, "sphere from inside")  # which is what the brush paints on
             self._look()
-
-        @sphere.on_click
-        async def _(event: Any) -> None:
-            self._told(lambda: self.dab(event.ray_origin, event.ray_direction))(event)
-
-        @sphere.on_drag
-        async def _(event: Any) -> None:
-            eye = np.asarray(event.client.camera.position)
-            self._told(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
 
     def _look(self) -> None:
         if self.controls.look.value in SIDES:
             self.view.look(self.controls.look.value)
+            self.brush.show()
             self.judging.wish(self.setting)
 
-    # Other processes and long work
+    # Other processes
 
     def _order(self) -> None:
         scene = {NO_SCENE: "", TASK_SCENE: "task"}.get(self.controls.scene.value, "room")
@@ -258,43 +293,3 @@ class Studio:
         if self.controls.scene.value == NO_SCENE:
             self.view.show_points(np.empty((0, 3)))
         self._order()
-
-    def optimise(self) -> None:
-        """Search all angles of the task beside everything else, and move the sliders to what is found."""
-        c, canvas, judge = self.controls, self._canvas, self.judge
-        if c.optimise.disabled:
-            return
-        c.optimise.disabled = True
-        c.progress.visible, c.progress.animated = True, True
-        said = 0
-
-        def told(line: str) -> None:
-            nonlocal said
-            said += 1
-            put(c.progress, min(100.0 * said / SEARCH_STEPS, 95.0))
-            self.say(line)
-
-        def run() -> None:
-            try:
-                optimum = find_optimum(painted(canvas.base, canvas.dabs), told)
-                if canvas != self._canvas:
-                    return
-                self.judge = replace(judge, loaded=optimum.loaded, problem=optimum.problem)
-                self.kept.rejudge(self.judge)  # with the period that was found
-                bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
-                self.move(bare)
-                found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
-                blind = optimum.hole_lines()
-                holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
-                self.say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
-                with second_process() as begin:
-                    chosen = begin(setting_built, optimum)()
-                if canvas == self._canvas and self.setting == bare:
-                    self.move(Setting.within_bounds(chosen.family.angles_deg))
-                self.say("; ".join([found, *chosen.lines(), holes]))
-            except ScanwrightError as error:
-                self.say(str(error), bad=True)
-            finally:
-                c.optimise.disabled, c.progress.visible = False, False
-
-        Thread(target=run, name="optimise", daemon=True).start()

@@ -34,7 +34,7 @@ def run_studio(
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
             print(f"open {gate.address}", flush=True)
-            studio.optimise()
+            studio.searching.begin()
             print(f"Ctrl-C ends it; without a visitor it ends by itself after {alone_s / 60:g} minutes", flush=True)
             wait_until_alone(gate, alone_s)
         finally:

@@ -75,11 +75,39 @@ class Dab:
     brush: Brush
     value: float = 1.0
 
+    @property
+    def paints(self) -> tuple[float, Brush, float]:
+        """All of it but where."""
+        return self.radius_deg, self.brush, self.value
+
     def cone(self) -> ConeRegion:
         """The region of a task file that says the same."""
         axis = tuple(round(float(x), DECIMALS) + 0.0 for x in self.direction)
         value = {"matters": self.value, "does not matter": 0.0, "hidden": 1.0}[self.brush]
         return ConeRegion(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Canvas:
+    """What is being judged; equal to another where it is the same paint on the same loaded task.
+
+    Attributes:
+        base: the task.
+        dabs: the paint on it.
+    """
+
+    base: LoadedTask
+    dabs: tuple[Dab, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Canvas) and self.base is other.base and self.dabs == other.dabs  # its maps are arrays
+
+    def __hash__(self) -> int:
+        return hash((id(self.base), self.dabs))
+
+    def painted(self) -> LoadedTask:
+        """The task with the paint, as `painted`."""
+        return painted(self.base, self.dabs)
 
 
 def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:

@@ -18,13 +18,15 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
     """Draw the first column of the front against each other one, from `study.csv`; how many rows were left out.
 
     Args:
-        path: PNG to write.
+        path: PNG to write; an SVG comes beside it.
         table: CSV to read.
         title: above the picture.
         front: columns of the front.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+
+    from design.evaluation.picture_files import save_picture
 
     by_task: dict[str, list[dict[str, str]]] = {}
     shown = left = 0
@@ -46,7 +48,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
             _panel(ax, rows, front[0], other)
             ax.set_title(task, fontsize=10)
     figure.suptitle(title, fontsize=11)
-    figure.savefig(path, metadata={"Software": None})
+    save_picture(figure, path, DPI)
     return left
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from design.accuracy.trials import best_trials, trials_picture, write_trials
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
-from firmware_io.twins.dynamics import plant_of
+from firmware_io.twins.servo_plant import plant_of
 from scanwright.trials.axis import axis_trials
 from scanwright.trials.solver import solver_trials
 

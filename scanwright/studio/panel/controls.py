@@ -12,6 +12,7 @@ from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
 from scanwright.studio.view.view_3d import SIDES
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
+UNDO, REDO = "Undo", "Redo"
 QUIET: Literal["gray"] = "gray"  # every button but the one that a tab is for
 BRUSHES: tuple[Brush, ...] = get_args(Brush)
 
@@ -27,7 +28,13 @@ class Controls:
     """
 
     def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> None:
-        self.facts, self.note, self.making = gui.add_html(""), gui.add_html(""), gui.add_html("")
+        self.mode, self.facts = gui.add_html(""), gui.add_html("")
+        self.note, self.making = gui.add_html(""), gui.add_html("")
+        self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
+        self.redo = gui.add_button(REDO, icon=viser.Icon.ARROW_FORWARD_UP, color=QUIET, visible=False)
+        self.undo_key = gui.add_command(UNDO, hotkey="Z", modifier="cmd/ctrl", disabled=True)
+        self.redo_key = gui.add_command(REDO, hotkey="Z", modifier="cmd/ctrl+shift", disabled=True)
+        self.brush_key = gui.add_command("Brush", description="Take it in hand, or put it away", hotkey="B")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Angles"):
             self.task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
@@ -46,7 +53,7 @@ class Controls:
             self.brush = gui.add_dropdown("paints", BRUSHES, initial_value=BRUSHES[0])
             self.radius = gui.add_slider("radius [deg]", 1.0, 60.0, 0.5, 12.0)
             self.weight = gui.add_number("weight", 1.0, min=0.01, max=1000.0, step=0.1)
-            self.undo, self.clear = gui.add_button("Undo", color=QUIET), gui.add_button("Clear", color=QUIET)
+            self.clear = gui.add_button("Clear paint", color=QUIET)
             self.painted = gui.add_html("")
         with tabs.add_tab("Compare"):
             self.table = gui.add_html("")
@@ -66,6 +73,25 @@ class Controls:
             self.save, self.build = gui.add_button("Save task", color=QUIET), gui.add_button("Save and build")
             self.building = gui.add_progress_bar(0.0, visible=False)
             self.built = gui.add_html("")
+
+        self.fields: dict[str, viser.GuiInputHandle[Any]] = {
+            "paints": self.brush,
+            "radius": self.radius,
+            "weight": self.weight,
+            "name": self.name,
+            "fix these angles": self.fixed,
+            "overwrite": self.overwrite,
+        }
+
+    def show_steps(self, undoes: str, redoes: str) -> None:
+        """Say what undo would take back and redo do again; empty where there is nothing."""
+        for button, key, name, words in (
+            (self.undo, self.undo_key, UNDO, undoes),
+            (self.redo, self.redo_key, REDO, redoes),
+        ):
+            button.label = key.label = f"{name}: {words}" if words else name
+            button.disabled = key.disabled = not words
+        self.redo.visible = bool(redoes)
 
 
 def put(control: Any, value: object) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from design.angles import standard_settings
 from design.errors import TaskError
+from design.evaluation.metres import PlaneFigures, on_planes, planes_of
 from design.objective.problem import NODES, Problem, problem_of
 from design.objective.score import Score, score, score_on
 from design.search.limits import blind_cones_deg, line_gaps_deg
@@ -37,6 +38,7 @@ class Facts:
         period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
         density: beams per ball that the period is for.
         standard: J of rolling and pitching for the same task.
+        planes: each plane of the task in words, and what a full scan leaves on it in metres; None while not known.
     """
 
     setting: Setting
@@ -49,6 +51,7 @@ class Facts:
     period_s: float
     density: int
     standard: dict[str, float]
+    planes: tuple[tuple[str, PlaneFigures | None], ...]
 
     @property
     def gap_mm(self) -> float:
@@ -83,10 +86,10 @@ class Judge:
         return self._facts(setting, score(self.problem, setting.angles_rad), exact=True)
 
     def settled(self, facts: Facts) -> Facts:
-        """The same with the period looked for as closely as everywhere else."""
-        if math.isnan(facts.period_s):
-            return facts
-        return replace(facts, period_s=self._period_s(facts.setting, NODES))
+        """The same with the period looked for as closely as everywhere else, and what planes get, in metres."""
+        period_s = facts.period_s if math.isnan(facts.period_s) else self._period_s(facts.setting, NODES)
+        planes = on_planes(self.loaded, self.problem, facts.setting.angles_rad)
+        return replace(facts, period_s=period_s, planes=tuple((figures.region, figures) for figures in planes))
 
     def _facts(self, setting: Setting, found: Score, *, exact: bool) -> Facts:
         plane = setting.angles_rad[None, 2:]
@@ -103,6 +106,7 @@ class Judge:
             period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
             density=self._least,
             standard=self.standard,
+            planes=tuple((region.words(), None) for region in planes_of(self.loaded)),
         )
 
     @property

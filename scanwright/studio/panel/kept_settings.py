@@ -61,19 +61,26 @@ class KeptSettings:
             self._facts.pop(name, None)
             self._show()
 
-    def clear(self) -> None:
-        """Forget all: another task asks for other angles."""
+    @property
+    def settings(self) -> tuple[tuple[str, Setting], ...]:
+        """Those that were kept, by name, without the standard alignments."""
+        return tuple((name, facts.setting) for name, facts in self._facts.items() if name not in STANDARD_DEG)
+
+    def take(self, settings: tuple[tuple[str, Setting], ...]) -> None:
+        """Have these in place of those that were kept."""
         with self._table:
-            self._facts = {}
+            self._judge_all(dict(settings))
 
     def rejudge(self, judge: Judge) -> None:
         """Judge all again, and from now on, by a task that has changed."""
         with self._table:
             self._judge = judge
-            settings = {name: facts.setting for name, facts in self._facts.items()}
-            settings |= {name: Setting(angles_deg) for name, angles_deg in STANDARD_DEG.items()}
-            self._facts = {name: judge.exact(setting) for name, setting in settings.items()}
-            self._show()
+            self._judge_all(dict(self.settings))
+
+    def _judge_all(self, kept: dict[str, Setting]) -> None:
+        settings = {name: Setting(angles_deg) for name, angles_deg in STANDARD_DEG.items()} | kept
+        self._facts = {name: self._judge.exact(setting) for name, setting in settings.items()}
+        self._show()
 
     def _show(self) -> None:
         self._controls.table.content = panel_html.kept_html(self._facts)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from html import escape
 
+from design.evaluation.metres import PlaneFigures
 from design.objective.holes import percent
 from scanwright.serving.style import COLOUR_STOPS
 from scanwright.studio.panel.facts import WALL_M, Facts
@@ -31,7 +32,8 @@ def facts_html(facts: Facts, log: bool) -> str:
         f'<td style="padding:1px 0;opacity:.65">{note}</td></tr>'
         for name, value, note in rows
     )
-    return f'<table style="font-size:12px;line-height:1.35;border-spacing:0;margin:0 12px">{cells}</table>'
+    table = f'<table style="font-size:12px;line-height:1.35;border-spacing:0;margin:0 12px 6px">{cells}</table>'
+    return table + "".join(_on_plane(region, figures) for region, figures in facts.planes)
 
 
 def kept_html(kept: Mapping[str, Facts]) -> str:
@@ -70,6 +72,12 @@ def scale_html(highest: float) -> str:
         f"<span>mean beams per ball, logarithmic</span><span>{highest:,.0f}</span></div>"
         "<div>pale: none; white edge: what matters; red: hidden by the robot; green: axis and fan</div></div>"
     )
+
+
+def _on_plane(region: str, figures: PlaneFigures | None) -> str:
+    """Two lines, whether it is known yet or not, so that nothing below them moves."""
+    words = figures.words() if figures else f"{region}: ..."
+    return f'<div style="font-size:12px;line-height:1.35;min-height:2.7em;margin:0 12px 6px">{escape(words)}</div>'
 
 
 def _against(J: float, other: float, log: bool) -> str:

@@ -26,7 +26,7 @@ SIDES: dict[Look, Literal["front", "back"]] = {
     "sphere from outside": "front",
     "hidden": "back",
 }
-AMBIENT, LAMP, LAMP_M = 2.7, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body is as bright as it is at pi
+AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body has its own colour at pi
 SPHERE_EYE_M = (-0.75, 0.95, 0.65)
 MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
@@ -49,6 +49,7 @@ class View3D:
         self._cloud: viser.PointCloudHandle | None = None
         self.points = 0
         self._scene.configure_default_lights(enabled=False, cast_shadow=False)
+        self._scene.configure_environment_map(None)  # the browser shows a pale picture until it has one
         self._scene.add_light_ambient("/light/all", intensity=AMBIENT)
         self._scene.add_light_directional("/light/above", intensity=LAMP, position=LAMP_M, cast_shadow=False)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)

@@ -106,12 +106,17 @@ def test_a_file_is_never_written_over_and_nobody_is_asked_where_nobody_is(comman
 
 
 QUESTIONS = [
-    ("Which lidar?", "ust10"),
-    ("did you mean 'UST-10LX'?", "ust-10lx"),
-    ("How high", "0.6"),
-    ("below it", ""),
-    ("must it see", "wall:2 around"),
-    ("How many seconds", ""),
+    ("Which lidar?", "ust"),
+    ("'ust' is more than one: UST-10LX, UST-20LX", "ust10"),
+    ("did you mean 'UST-10LX'?", "ust-10"),
+    ("How many metres", "sixty"),
+    ("'sixty' is no number", "0.6"),
+    ("in its way", "box:1:1:0.9"),
+    ("is not over it", "none"),
+    ("must it see", "ground from 0.5 to 5"),
+    ("from: not a thing to see", "wall:2 around"),
+    ("How many seconds", "0.1"),
+    ("rpm at most", ""),
 ]
 
 
@@ -124,7 +129,7 @@ def test_on_a_terminal_what_no_flag_answers_is_asked(here):
     try:
         for question, answer in QUESTIONS:
             said = ""
-            while question not in said or not said.endswith(": "):
+            while question not in said or not said.endswith(" > "):
                 assert select.select([screen], [], [], PATIENCE_S)[0], f"not asked: {question!r}, but {said!r}"
                 said += os.read(screen, 4096).decode()
             os.write(screen, f"{answer}\n".encode())

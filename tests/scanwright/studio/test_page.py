@@ -1,25 +1,42 @@
 """The studio in a real browser: what a person does with it, from the first look to the saved task."""
 
 import io
-import json
 import re
+import shutil
+import sys
 import time
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
+import viser.transforms
 from matplotlib.image import imread
 
-from design.angles import load_angles
 from design.search.optimum import find_optimum
 from design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
+from scanwright.serving.style import ramp
 from scanwright.studio.page import Studio
-from scanwright.studio.state import Setting, painted
+from scanwright.studio.panel.build_process import BuildProcess
+from scanwright.studio.state import Dab, Setting, painted
 from scanwright.studio.view import coloured_sphere, workers
 from scanwright.studio.view.scanner_bodies import BodyMesh
 
 HARMLESS = ("THREE.Clock", "GPU stall", "GL Driver Message", "inside passive event listener")
+
+GROUND = """(selector) => {
+  for (let at = document.querySelector(selector); at; at = at.parentElement) {
+    const colour = getComputedStyle(at).backgroundColor.match(/[\\d.]+/g).map(Number);
+    if (colour.length < 4 || colour[3] > 0) return colour;
+  }
+}"""
+RING = """() => document.querySelector('.sw-ring-line').getAttribute('d')"""
+MIDDLE = """() => {
+  const { camera, canvas, nodeRefFromName } = window.__viserMutable;
+  const at = nodeRefFromName[''].localToWorld(camera.position.clone().set(0, 0, 0)).project(camera);
+  const box = canvas.getBoundingClientRect();
+  return [box.left + ((1 + at.x) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
+}"""
 
 
 def box(_scanner, turning):
@@ -70,12 +87,40 @@ def until(true, seconds=60.0, meanwhile=lambda: None):
         time.sleep(0.1)
 
 
+def shown(browser, address, width, height, **options):
+    """The page at half the resolution of its layout: the picture is drawn on the processor here."""
+    return browser.open(address, width, height, device_scale_factor=0.5, **options)
+
+
 def enter(page, number, value):
     """Type an angle beside its slider."""
     field = page.locator("input[type=text]:visible").nth(number)
     field.fill(f"{value:g}")
     field.press("Enter")
     field.blur()
+
+
+def under_the_pointer(page, x, y):
+    """Corners of the brush's ring in pixels, shape (n, 2), with the mouse at a place."""
+    page.mouse.move(x, y)
+    until(lambda: page.evaluate(RING))
+    return np.array([corner.split() for corner in page.evaluate(RING)[1:-1].split("L")], float)
+
+
+def directions(camera, pixels):
+    """Unit vectors to where rays of a camera meet the far wall of the sphere, by what it tells the server."""
+    focal = camera.image_height / 2 / np.tan(camera.fov / 2)
+    middle = np.array([camera.image_width, camera.image_height]) / 2
+    rays = np.column_stack([(pixels - middle) / focal, np.ones(len(pixels))])
+    rays = rays @ viser.transforms.SO3(camera.wxyz).as_matrix().T
+    return np.array([coloured_sphere.direction_hit(camera.position, ray, inside=True) for ray in rays])
+
+
+def contrast(*colours):
+    """Of two colours 0 .. 255, as the guidelines for accessible pages (WCAG 2) define it."""
+    c = np.array(colours) / 255
+    light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722] + 0.05
+    return light.max() / light.min()
 
 
 def tab(page, name):
@@ -89,13 +134,19 @@ def harmless(browser):
 
 def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command):
     studio, gate = studio
-    page = browser.open(gate.address, width=900, height=560)
+    page = shown(browser, gate.address, 900, 560)
     page.set_default_timeout(90_000)
     page.get_by_text("exact").wait_for()
 
-    # the picture is one
+    # the picture is one, never a pale one, and its colours are those of the scale beside it
+    assert page.evaluate("[__viserMutable.scene.environment, __viserMutable.canvas.style.opacity]") == [None, "1"]
     picture = imread(io.BytesIO(page.locator("canvas").first.screenshot(timeout=90_000)))
-    assert len(np.unique((picture[::4, ::4, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 100
+    pixels = (picture[::4, ::4, :3] * 255).astype(int).reshape(-1, 3)
+    assert len(np.unique(pixels, axis=0)) > 100
+    tiles = (picture[80:, :240, :3] * 255).astype(int)[::2, ::2].reshape(-1, 3)  # what nothing stands before
+    tiles = tiles[(tiles < 250).any(axis=1)]
+    off = np.abs(tiles[:, None] - ramp(np.linspace(0, 1, 64)).astype(int)).max(axis=2).min(axis=1)
+    assert (off < 12).mean() > 0.6, np.percentile(off, [10, 50, 90])
 
     # a slider moves J to the value that evaluate prints
     enter(page, 1, -50.0)
@@ -111,7 +162,11 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.get_by_label("brush").check()
     until(lambda: studio.controls.painting.value)
     studio.controls.weight.value = 50.0
+    ring = under_the_pointer(page, 380, 210)
     until(lambda: len(studio.judge.loaded.task.weight) == 2, meanwhile=lambda: page.mouse.click(380, 210))
+    (client,) = studio._server.get_clients().values()
+    edge = directions(client.camera, ring) @ np.array(studio.judge.loaded.task.weight[1].axis)
+    np.testing.assert_allclose(np.degrees(np.arccos(edge)), 12.0, atol=0.3)  # of what was painted there
     tab(page, "Angles")
     page.get_by_role("button", name="Optimise").click()
     page.get_by_text("is still looked for").wait_for()
@@ -121,6 +176,8 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     assert dab.half_angle_deg == 12.0 and dab.value == 50.0
     found = studio.setting
     assert studio.facts.J < studio.judge.exact(Setting(before)).J - 0.01
+    page.keyboard.press("b")
+    until(lambda: not studio.controls.painting.value)
     studio.controls.look.value = "hidden"  # what is not drawn costs no time
 
     # side by side, and back
@@ -154,47 +211,67 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     harmless(browser)
 
 
-def test_a_saved_task_builds(browser, tmp_path, cheapest_task):
-    with opened(tmp_path, cheapest_task) as (studio, gate):
-        page = browser.open(gate.address, width=600, height=400)
+def test_a_saved_task_builds(browser, tmp_path, made):
+    """By the program that a person would call: it finds its build of this very task, made in this session, current."""
+    shutil.copytree(made.folder, tmp_path / "out" / "tilted")
+    with opened(tmp_path, (made.folder / "task.toml").read_text()) as (studio, gate):
+        page = shown(browser, gate.address, 600, 400)
         page.set_default_timeout(300_000)
         studio.controls.look.value = "hidden"
         tab(page, "Save")
+        studio.controls.name.value = "tilted"
         page.get_by_role("button", name="Save and build").click()
-        page.locator(".mantine-Progress-root:visible").wait_for()
-        seen = []
-        until(
-            lambda: "report.html" in studio.controls.built.content or "ended" in studio.controls.built.content,
-            seconds=300,
-            meanwhile=lambda: seen.append(studio.controls.building.value),
-        )
-        page.get_by_text(f"built {tmp_path / 'out' / 'ahead_mine'}: open its report.html").wait_for()
-    assert seen == sorted(seen) and len(set(seen)) > 5
-    built = tmp_path / "out" / "ahead_mine"
-    assert load_angles(built / "angles.json").angles_deg.beta_laser == -60
-    files = json.loads((built / "manifest.json").read_text())["files"]
-    assert {"report.html", "assembly.step"} <= files.keys() and all((built / name).is_file() for name in files)
+        page.get_by_text(f"built {tmp_path / 'out' / 'tilted'}: open its report.html").wait_for()
+    assert load_task(tmp_path / "tilted.toml").sha256() == load_task(made.folder / "task.toml").sha256()
     harmless(browser)
+
+
+@pytest.mark.parametrize("code", [0, 2])
+def test_what_a_build_says_is_told_as_progress(tmp_path, monkeypatch, code):
+    program = tmp_path / "program"
+    lines = "".join(f"echo '  .. line {number}'\n" for number in range(60))
+    program.write_text(f'#!/bin/sh\necho "$@"\n{lines}exit {code}\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(program))
+    told, ended = [], []
+    ends = (lambda *each: told.append(each)), (lambda *end: ended.append(end))
+    build = BuildProcess(tmp_path / "a.toml", tmp_path / "out", *ends)
+    until(lambda: ended)
+    build.stop()
+    shares, said = zip(*told, strict=True)
+    assert said[:2] == (f"-P -m scanwright build {tmp_path / 'a.toml'} --out {tmp_path / 'out'}", "line 0")
+    assert list(shares) == sorted(shares) and len(set(shares)) > 40 and max(shares) < 1
+    assert ended == [(code, "line 59")] and not build.runs
 
 
 def test_on_a_phone_the_facts_can_be_read(studio, browser):
     studio, gate = studio
-    page = browser.open(gate.address, width=390, height=780)
+    page = shown(browser, gate.address, 390, 780)
     page.set_default_timeout(90_000)
     page.get_by_text("exact").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     harmless(browser)
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
-def test_nobody_is_kept_out_of_any_tab(studio, browser, size):
-    _, gate = studio
-    page = browser.open(gate.address, *size)
+def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
+    studio, gate = studio
+    page = shown(browser, gate.address, *size, color_scheme=scheme)
     page.get_by_text("exact").wait_for()
+    studio.say("what is refused", bad=True)
+    studio.controls.painting.value = True  # the line of its mode stands on the view
+    page.get_by_role("status").get_by_text("Painting").wait_for()
     for tab in ("Angles", "Paint", "Compare", "View", "Save"):
         page.get_by_role("tab", name=tab).click()
         page.get_by_role("tab", name=tab, selected=True).wait_for()
         assert browser.barriers(page) == []
+    open_tab = "[role=tab][aria-selected=true]"
+    word = page.locator(open_tab).evaluate("(tab) => getComputedStyle(tab).color.match(/[\\d.]+/g).map(Number)")
+    assert contrast(word, page.evaluate(GROUND, open_tab)) >= 4.5  # which axe-core does not see
+    assert page.evaluate(GROUND, "canvas[data-engine]") == {"light": [255, 255, 255], "dark": [20, 20, 20]}[scheme]
+    studio.controls.painting.value = False
+    studio.say("")
     page.get_by_role("tab", name="Angles").click()
     page.get_by_role("slider", name="beta_rot").wait_for()  # by the name that a screen reader says
     harmless(browser)
@@ -202,7 +279,7 @@ def test_nobody_is_kept_out_of_any_tab(studio, browser, size):
 
 def test_every_control_is_reached_and_moved_by_the_keyboard(studio, browser):
     studio, gate = studio
-    page = browser.open(gate.address, width=1000, height=700)
+    page = shown(browser, gate.address, 1000, 700)
     page.get_by_text("exact").wait_for()
     page.get_by_role("tab", name="Angles").focus()
     name = "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent"
@@ -223,13 +300,79 @@ def test_every_control_is_reached_and_moved_by_the_keyboard(studio, browser):
 
 def test_on_a_phone_the_panel_is_a_sheet_that_fingers_can_use(studio, browser):
     _, gate = studio
-    page = browser.open(gate.address, width=390, height=844, has_touch=True)
+    page = shown(browser, gate.address, 390, 844, has_touch=True)
     page.get_by_text("exact").wait_for()
     sheet = page.locator(".sw-sheet").bounding_box()
     assert sheet["x"] == 0 and sheet["width"] == 390 and sheet["y"] > 0.4 * 844
+    until(lambda: page.locator("canvas[data-engine]").bounding_box()["height"] == pytest.approx(sheet["y"], abs=1))
+    until(
+        lambda: page.evaluate(MIDDLE) == pytest.approx([195, sheet["y"] / 2], abs=3)
+    )  # the scanner is in what is free
     for control in page.locator(".sw-sheet").get_by_role("button").or_(page.get_by_role("tab")).all():
         if control.is_visible():
             assert control.bounding_box()["height"] >= 44
+    harmless(browser)
+
+
+def test_every_change_can_be_undone_and_done_again(studio, browser):
+    studio, gate = studio
+    c = studio.controls
+    page = browser.open(gate.address, width=1000, height=700)
+    page.get_by_text("exact").wait_for()
+    c.look.value, c.weight.value = "hidden", 1.0  # what is not drawn costs no time
+    studio._paint(())
+    studio.move(Setting((0, 90, 0, -90)))
+    first = studio._state()
+    undo = page.get_by_role("button", name=re.compile("^Undo"))
+    words = []
+
+    def did(text):
+        page.get_by_role("button", name=f"Undo: {text}").wait_for()
+        words.append(text)
+
+    enter(page, 3, -40.5)
+    did("beta_laser -90 to -40.5")
+    tab(page, "Paint")
+    weight = page.locator(".mantine-NumberInput-input:visible").last
+    weight.fill("7.5")
+    did("weight 1 to 7.5")
+    studio._paint((Dab((1.0, 0.0, 0.0), 12.0, "matters"),), 1)
+    studio._paint((Dab((1.0, 0.0, 0.0), 12.0, "matters"), Dab((0.9, 0.2, 0.0), 12.0, "matters")), 1)
+    did("paint 2 dabs")
+    page.get_by_role("button", name="Clear paint").click()
+    did("clear paint")
+    tab(page, "Angles")
+    page.get_by_role("button", name="Keep this setting").click()
+    did("keep ")
+    tab(page, "Save")
+    page.get_by_label("overwrite").check()
+    did("overwrite off to on")
+    last = studio._state()
+
+    for text in reversed(words):
+        page.get_by_role("button", name=f"Undo: {text}").wait_for()
+        page.keyboard.press("Control+z")
+        page.get_by_role("button", name=f"Redo: {text}").wait_for()
+    assert studio._state() == first
+    assert page.get_by_role("slider", name="beta_laser", include_hidden=True).get_attribute("aria-valuenow") == "-90"
+    for _ in words:
+        page.get_by_role("button", name="Redo: ").wait_for()
+        before = undo.inner_text()
+        page.keyboard.press("Control+Shift+z")
+        until(lambda before=before: undo.inner_text() != before)
+    assert studio._state() == last and not c.redo.visible
+
+    # in a field what was typed is the field's own, and nothing else is
+    tab(page, "Angles")
+    field = page.locator("input[type=text]:visible").nth(1)
+    field.fill("33")
+    until(lambda: studio.setting.angles_deg[1] == 33)
+    field.press("Enter")
+    field.press("Control+z")
+    until(lambda: studio._state() == last)
+    undo.click()
+    until(lambda: not c.overwrite.value)
+    assert studio.painting.settled(60)
     harmless(browser)
 
 
@@ -248,7 +391,7 @@ def test_values_that_no_control_holds_do_nothing(studio):
     studio.controls.look.value = "through"
     studio.controls.painting.value = True
     studio.controls.brush.value = "gold"
-    studio.dab((3.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    studio.brush.dab((3.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
     assert studio.painting.settled(20) and studio.judge is before
     assert painted(before.loaded, ()).task == before.loaded.task
     assert "none of those" in studio.controls.note.content

@@ -4,6 +4,7 @@ import math
 import os
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,16 +14,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.errors import BuildError, TaskError
+from design.evaluation.metres import on_planes
 from design.objective.problem import problem_of
 from design.objective.score import score
 from design.sphere.directions import spiral
 from design.task.task import load_task
 from firmware_io.twins.world import furnished_room
 from scanwright.serving.page_server import guarded_server
+from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
-from scanwright.studio.state import MOST_DABS, Dab, Setting, painted
+from scanwright.studio.state import MOST_DABS, Canvas, Dab, Setting, painted
 from scanwright.studio.task_file import save_task, task_text
 from scanwright.studio.view import workers
 from scanwright.studio.view.coloured_sphere import (
@@ -146,6 +149,17 @@ def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(
     assert exact.gap_mm == pytest.approx(math.radians(exact.gap_deg) * 10_000)
 
 
+def test_what_a_scan_leaves_on_the_ground_is_told_in_metres_when_the_hand_rests(tmp_path, small_task):
+    ground = '[[weight]]\nshape = "ground"\nfrom_m = 0.5\nto_m = 5\nwidth_m = 4\nheight_m = 0.4\n'
+    (tmp_path / "ground.toml").write_text(small_task + ground)
+    on_ground = load_task(tmp_path / "ground.toml")
+    judge = Judge.for_task(on_ground)
+    (figures,) = on_planes(on_ground, judge.problem, SETTING.angles_rad)
+    dragged = panel_html.facts_html(judge.quick(SETTING), log=True)
+    assert "ground 0.5 to 5 m ahead: ..." in dragged and "points per m2" not in dragged  # no figure of another setting
+    assert figures.words() in panel_html.facts_html(judge.settled(judge.exact(SETTING)), log=True)
+
+
 def test_colours_are_pale_exactly_where_no_beam_comes(loaded):
     from design.evaluation.coverage import mean_density_at
 
@@ -196,6 +210,53 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
     assert newest.settled(10)
     assert (done, rested, newest.replaced) == ([0, 49], [49], 48)
     newest.close()
+
+
+def test_a_slider_that_is_dragged_is_one_step_and_each_stroke_is_one(loaded):
+    now = PageState(Canvas(loaded), SETTING, (), (("radius", 12.0),))
+    at_s = 0.0
+    history = History(now, lambda: at_s)
+
+    def moved(angle):
+        return replace(history._done[-1], setting=Setting((0.0, angle, -80.0, 75.0)))
+
+    assert history.undo() is None and history.redo() is None and (history.undoes, history.redoes) == ("", "")
+    for angle in (-54.0, -53.0, -50.0):
+        at_s += 0.9 * JOINED_S
+        history.note(moved(angle), "beta_rot")
+    assert history.undoes == "beta_rot -55 to -50"
+    at_s += 1.1 * JOINED_S  # the hand had let go
+    history.note(moved(-40.0), "beta_rot")
+    history.note(replace(history._done[-1], fields=(("radius", 20.0),)), "radius")
+    dabs = tuple(Dab((1.0, 0.1 * k, 0.0), 5.0, "matters") for k in range(5))
+    for count, stroke in ((1, 1), (2, 1), (3, 2), (5, 2)):
+        at_s += 100 * JOINED_S
+        history.note(replace(history._done[-1], canvas=Canvas(loaded, dabs[:count])), ("stroke", stroke), math.inf)
+    history.note(replace(history._done[-1], canvas=Canvas(loaded)), None)
+    said = []
+    while history.undoes:
+        said.append(history.undoes)
+        undone = history.undo()
+    assert undone == now and said == [
+        "clear paint",
+        "paint 3 dabs",
+        "paint 2 dabs",
+        "radius 12 to 20",
+        "beta_rot -50 to -40",
+        "beta_rot -55 to -50",
+    ]
+    assert history.redo().setting == Setting((0.0, -50.0, -80.0, 75.0)) and history.redoes == "beta_rot -50 to -40"
+    history.note(moved(-50.0), "beta_rot")  # nothing has changed: what was undone is still there
+    assert history.redoes
+    history.note(moved(10.0), "beta_rot")
+    assert not history.redoes and history.redo() is None
+    history.note(moved(-50.0), "beta_rot")  # back where it was, in one drag
+    assert history.undoes == "beta_rot -55 to -50"
+
+
+def test_the_same_task_loaded_twice_is_another_canvas_and_maps_are_not_compared(loaded):
+    mapped = replace(loaded, maps=(np.ones((2, 2)),))
+    assert Canvas(mapped) == Canvas(mapped) != Canvas(replace(mapped, maps=(np.ones((2, 2)),)))
 
 
 def bodies(scanner, turning):

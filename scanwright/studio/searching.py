@@ -1,0 +1,70 @@
+"""The search of the studio: the optimum of what is on the page, looked for beside everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from threading import Thread
+
+from design.concurrency.second_process import second_process
+from design.errors import ScanwrightError
+from design.search.optimum import Optimum, find_optimum
+from scanwright.pipeline.build import setting_built
+from scanwright.studio.panel.controls import Controls, put
+from scanwright.studio.state import Canvas, Setting
+
+SEARCH_STEPS = 9  # lines that a search says
+
+
+class Searching:
+    """The button, its progress bar, and the thread that searches."""
+
+    def __init__(
+        self,
+        controls: Controls,
+        say: Callable[..., None],
+        now: Callable[[], tuple[Canvas, Setting]],
+        found: Callable[[Optimum], None],
+        move: Callable[[Setting, Hashable], None],
+    ) -> None:
+        """`say` tells a person, `now` is what is on the page, `found` and `move` get what was found for it."""
+        self._controls, self._say, self._now, self._found, self._move = controls, say, now, found, move
+
+    def begin(self) -> None:
+        """Search all angles of the task, and move the sliders to what is found; one search at a time."""
+        c = self._controls
+        if c.optimise.disabled:
+            return
+        c.optimise.disabled = True
+        c.progress.visible, c.progress.animated = True, True
+        Thread(target=self._run, args=(self._now()[0],), name="optimise", daemon=True).start()
+
+    def _run(self, canvas: Canvas) -> None:
+        said = 0
+
+        def told(line: str) -> None:
+            nonlocal said
+            said += 1
+            put(self._controls.progress, min(100.0 * said / SEARCH_STEPS, 95.0))
+            self._say(line)
+
+        try:
+            optimum = find_optimum(canvas.painted(), told)
+            if canvas != self._now()[0]:
+                return
+            self._found(optimum)
+            step = object()  # both moves are one
+            bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
+            self._move(bare, step)
+            found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
+            blind = optimum.hole_lines()
+            holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
+            self._say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
+            with second_process() as begin:
+                chosen = begin(setting_built, optimum)()
+            if (canvas, bare) == self._now():
+                self._move(Setting.within_bounds(chosen.family.angles_deg), step)
+            self._say("; ".join([found, *chosen.lines(), holes]))
+        except ScanwrightError as error:
+            self._say(str(error), bad=True)
+        finally:
+            self._controls.optimise.disabled, self._controls.progress.visible = False, False
