@@ -174,6 +174,8 @@ def _says(fault: Any) -> str:
         return f" = {tag!r}: not one of {known}{suggest(tag, known.replace(chr(39), '').split(', '))}"
     shown = repr(fault["input"])
     value = f" = {shown}" if len(shown) < 80 else ""
+    if fault["type"] == "bool_type":
+        return f"{value}: true or false, without quotes"
     return f"{value}: {fault['msg'].removeprefix('Value error, ')}"
 
 

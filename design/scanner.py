@@ -16,8 +16,10 @@ from design.record import Record
 class Modules(Record):
     """Parts that a scanner works without, and that a task may ask for."""
 
-    ring_cover: bool = Field(default=False, description="a tube around a slip ring with a bore")
-    tripod_foot: bool = Field(default=False, description="a plate under the mount with a nut 1/4-20 for a tripod")
+    ring_cover: bool = Field(default=False, strict=True, description="a tube around a slip ring with a bore")
+    tripod_foot: bool = Field(
+        default=False, strict=True, description="a plate under the mount with a nut 1/4-20 for a tripod"
+    )
 
 
 NO_MODULES = Modules()

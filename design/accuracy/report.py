@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from design.accuracy.methods import Point, Reference, as_log, best_points, measure_methods
 from design.accuracy.stress import StressRow, stress_rows
 from design.accuracy.trials import GREYS, MARKS, write_table
+from design.evaluation.picture_files import save_picture
 from design.objective.problem import problem_of
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
@@ -58,7 +59,7 @@ def work_precision_picture(path: Path, points: list[Point], truth: Reference, ti
     axis.grid(which="major", color="#dddddd", linewidth=0.6)
     axis.legend(fontsize=8)
     axis.set_title(title, fontsize=11)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    save_picture(figure, path)
 
 
 @dataclass(frozen=True, slots=True)

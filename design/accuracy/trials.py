@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from design.accuracy.front import dominators
+from design.evaluation.picture_files import save_picture
 
 T = TypeVar("T")
 REPEATS = 3
@@ -113,4 +114,4 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
         axis.grid(which="major", color="#dddddd", linewidth=0.6)
         axis.margins(0.15)
         axis.legend(fontsize=8)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    save_picture(figure, path)

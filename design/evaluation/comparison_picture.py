@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from design.evaluation.comparison import ComparisonRow
 from design.evaluation.density_picture import INK
+from design.evaluation.picture_files import save_picture
 from design.objective.holes import percent
 
 LONG = {"color": "#555555"}
@@ -19,7 +20,7 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     """Bars of -J, blind share of the weight, widest gap, cost, and what a dollar sees, one candidate below the other.
 
     Args:
-        path: PNG to write.
+        path: PNG to write; an SVG comes beside it.
         rows: of the comparison, the optimum first; a candidate with two rows gets two bars, the shorter time below.
         title: line above all.
     """
@@ -62,7 +63,7 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
         axis.spines[["top", "right"]].set_visible(False)
         axis.set_xlim(0, 1.25 * max(1e-6, *(bar.get_width() for bar in axis.patches)))
     figure.suptitle(title, fontsize=11)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    save_picture(figure, path)
 
 
 def _times(rows: list[ComparisonRow], name: str) -> str:

@@ -14,6 +14,7 @@ from numpy import ndarray
 
 from design.arrays import Array, Setting
 from design.evaluation.coverage import mean_density_at
+from design.evaluation.picture_files import save_picture
 from design.objective.problem import Problem
 
 STEP_DEG = 0.5
@@ -25,8 +26,8 @@ ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
 def density_picture(path: Path, problem: Problem, settings: Mapping[str, Setting], title: str) -> None:
-    """Write `density_figure` to a PNG."""
-    density_figure(problem, settings, title).savefig(path, dpi=110, metadata={"Software": None})
+    """Write `density_figure` to a PNG, and to an SVG beside it."""
+    save_picture(density_figure(problem, settings, title), path)
 
 
 def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str) -> Figure:

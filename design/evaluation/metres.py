@@ -67,12 +67,17 @@ class PlaneFigures:
         )
 
 
+def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
+    """The regions of a task that are planes and count."""
+    return [region for region in loaded.task.weight if isinstance(region, PlaneRegion) and region.value > 0]
+
+
 def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tuple[PlaneFigures, ...]:
     """What a full scan of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] leaves on each plane.
 
     A region counts where it has a weight above 0. Masked directions are no part of it.
     """
-    regions = [r for r in loaded.task.weight if isinstance(r, PlaneRegion) and r.value > 0]
+    regions = planes_of(loaded)
     if not regions:
         return ()
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)

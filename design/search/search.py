@@ -17,7 +17,7 @@ from design.objective.problem import Problem
 from design.search.coarse import Landscape, Progress, coarse_landscape
 from design.search.coarse_sweep import swept_landscape
 from design.search.constraints import Requirements
-from design.search.families import Family, best_leader, find_leaders, refine_leaders
+from design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
 from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.limits import allowed_planes
 from design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
@@ -73,28 +73,22 @@ def search(
     fine = _grid(problem, ranges, limits)
     progress(_looked_over(problem, fine))
     avoid = ranges.holes == "avoid"
-    land, exact = _landscape(problem, fine, progress, limits, avoid)
     least_blind = None
-    if avoid and not np.isfinite(land.kept.by_plane).any():  # nothing is free of holes: the lowest J of all
-        least_blind = _least_blind(problem, land, fine)
+    found = _best(problem, fine, progress, limits, avoid)
+    if avoid and found.leader is None:  # nothing is free of holes: the lowest J of all
+        least_blind = _least_blind(problem, found.land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
         avoid = False
-        land, exact = _landscape(problem, fine, progress, limits, avoid)
+        found = _best(problem, fine, progress, limits, avoid)
+    land, winner = found.land, found.leader
     required = Requirements(problem, limits, avoid)
-    winner = best_leader(land, *fine, required)
-    asked = limits
-    while winner is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
-        # what is dense enough at the nodes is not between them: ask for more at the nodes
-        asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
-        land, exact = _landscape(problem, fine, progress, asked, avoid)
-        winner = best_leader(land, *fine, required)
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
         leaders = find_leaders(land, *fine, mirrors, required)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
-        leaders = find_leaders(_landscape(problem, coarse, progress, asked, avoid)[0], *coarse, mirrors, required)
+        leaders = find_leaders(_landscape(problem, coarse, progress, found.asked, avoid)[0], *coarse, mirrors, required)
     progress("refining the minima")
     families = refine_leaders(problem, ranges, [winner, *leaders], required)
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
@@ -106,7 +100,7 @@ def search(
         covered=covered,
         evaluated=different,
         seconds=time.perf_counter() - start,
-        left_out=_left_out(ranges, covered, different, len(fine[0].first) - exact),
+        left_out=_left_out(ranges, covered, different, len(fine[0].first) - found.exact),
         planes=_plane_table(*fine, land.plain),
         axes=np.column_stack([fine[1].settings_deg, land.plain.by_axis[fine[1].flip.astype(int), fine[1].classes]]),
     )
@@ -114,6 +108,34 @@ def search(
 
 Grid = tuple[Folded, Folded]
 """Scan planes and axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Best:
+    """The setting of a grid that is best.
+
+    Attributes:
+        land: what it is the lowest of.
+        exact: scan planes that were looked at.
+        asked: limits of the nodes; those of a task, or more where what keeps them at the nodes does not between them.
+        leader: it; None where no setting keeps what is asked.
+    """
+
+    land: Landscape
+    exact: int
+    asked: Limits
+    leader: Leader | None
+
+
+def _best(problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid: bool) -> _Best:
+    required, asked = Requirements(problem, limits, avoid), limits
+    land, exact = _landscape(problem, grid, progress, limits, avoid)
+    leader = best_leader(land, *grid, required)
+    while leader is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
+        asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
+        land, exact = _landscape(problem, grid, progress, asked, avoid)
+        leader = best_leader(land, *grid, required)
+    return _Best(land, exact, asked, leader)
 
 
 def _grid(problem: Problem, ranges: AngleRanges, limits: Limits) -> Grid:

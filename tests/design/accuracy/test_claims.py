@@ -50,14 +50,12 @@ KINDS = {
     "rectangles on planes": 13,
     "a map": 24,
     "a mask of cells": 10,
-    "a scene": 20,
+    "a scene, required": 20,
     "a scene, swept": 9,
     "tiny regions": 57,
-    "swept": 8,
     "stops": 18,
     "kl": 36,
     "homogeneity": 16,
-    "required": 14,
     "worst": 422,  # one sliver has a count less than all nodes of the first rule
 }
 

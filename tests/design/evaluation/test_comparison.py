@@ -224,7 +224,11 @@ def test_the_command_end_to_end(command, tmp_path, rows):
     assert (code, err) == (0, [])
     assert out.splitlines()[: len(rows) + 1] == table(rows)
     assert "not verified of HDL-64E: elevations_deg" in out
-    assert sorted(path.name for path in (tmp_path / "ceiling").iterdir()) == ["compare.csv", "compare.png"]
+    assert sorted(path.name for path in (tmp_path / "ceiling").iterdir()) == [
+        "compare.csv",
+        "compare.png",
+        "compare.svg",
+    ]
 
 
 def test_the_command_as_json(command, tmp_path, rows, monkeypatch):

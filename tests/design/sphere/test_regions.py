@@ -168,7 +168,7 @@ def test_circle_means_agree_with_dense_sampling(seed):
         assert share == pytest.approx(1 - f.masked_at(points).mean(), abs=2 * f.edges / count + 1e-9)
 
 
-def total(f, axis, circles=400_000):
+def total(f, axis, circles=100_000):
     """`int w dO / 4 pi` and the unmasked share by circles about one axis: midpoints in z, error about circles**-1.5."""
     z = 1 - 2 * (np.arange(circles) + 0.5) / circles
     means, shares = f.on_circles(np.array(axis) / np.linalg.norm(axis), np.arccos(z))

@@ -1,0 +1,26 @@
+"""Pictures as files: PNG for whoever can show nothing else, SVG beside it for print and zoom, always the same bytes."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+DPI = 110  # of the PNG, and of what the SVG holds as pixels: maps and dense meshes
+NO_DATE = {"Date": None, "Creator": None}
+
+
+def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
+    """Write a figure to a PNG, and to an SVG of the same name beside it."""
+    figure.savefig(path, dpi=dpi, metadata={"Software": None})
+    path.with_suffix(".svg").write_bytes(svg_bytes(figure, dpi))
+
+
+def svg_bytes(figure: Figure, dpi: float = DPI) -> bytes:
+    """A figure as SVG; its letters are outlines, so that no font is missing where it is shown."""
+    stream = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "scanwright"}):  # its names are random otherwise
+        figure.savefig(stream, format="svg", dpi=dpi, metadata=NO_DATE)
+    return stream.getvalue()
