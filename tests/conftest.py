@@ -18,6 +18,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 import checked_arrays
 import quick_tests
+from made_once import MadeOnce
 
 checked_arrays.install()
 
@@ -206,42 +207,64 @@ def browser(chromium):
 
 
 @pytest.fixture(scope="session")
-def built_once(tmp_path_factory):
-    """Of a scanner on fdm-0.4, the folder of its parts and what `build_parts` gave: made once, for reading only."""
-    from cad.files.part_files import build_parts
-
-    kept = {}
-
-    def build(scanner):
-        key = scanner.angles.to_json()
-        if key not in kept:
-            folder = tmp_path_factory.mktemp("parts")
-            kept[key] = folder, build_parts(scanner, folder, lambda _: None)
-        return kept[key]
-
-    return build
+def once(tmp_path_factory):
+    """Makes what is dear once for all workers: `MadeOnce`."""
+    folder = tmp_path_factory.getbasetemp()  # of this worker alone, where there are several
+    return MadeOnce(folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder)
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory, built_once):
-    """One tilted scanner with all its files: the folder, what was made and exported, and the scanner."""
-    from cad.files.workshop_files import export_scanner
-    from cad.layout.layout import mount_offset_mm
-    from design.angles import Angles, AngleSet
-    from design.catalogue.catalogue import load_catalogue
-    from design.scanner import scanner_of
+def parts_of(once):
+    """Of a scanner, all its parts and the bodies around them: made once, for reading only."""
+    from cad.assembly.make import make_parts
 
-    angles = AngleSet(
-        task="tilted",
-        angles_deg=Angles(alpha_rot=0, beta_rot=35, alpha_laser=-20, beta_laser=-70),
-        sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring="UH1256-02-0610-06S",
-        motion={"mode": "spin", "period_s": 18.0},
-    )
-    offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", load_catalogue()))
-    scanner = scanner_of(angles.model_copy(update={"t_world_rot_mm": offset}), "fdm-0.4", load_catalogue())
-    parts, result = built_once(scanner)
-    folder = shutil.copytree(parts, tmp_path_factory.mktemp("made"), dirs_exist_ok=True)
-    exports = export_scanner(scanner, result, folder, lambda _: None)
-    return SimpleNamespace(folder=folder, result=result, exports=exports, scanner=scanner)
+    return lambda scanner: once(f"parts {scanner}", lambda _: make_parts(scanner))
+
+
+TILTED = """
+name = "tilted"
+sensor = "UTM-30LX"
+servo = "MX-64R"
+slip_ring = "UH1256-02-0610-06S"
+printer = "fdm-0.4"
+[motion]
+period_s = 18.0
+[angles]
+alpha_rot_deg = 0
+beta_rot_deg = 35
+alpha_laser_deg = -20
+beta_laser_deg = -70
+[[weight]]
+shape = "all"
+"""
+
+
+@pytest.fixture(scope="session")
+def made(once):
+    """The build of one tilted scanner, which has a bearing and a counterweight.
+
+    Its folder, what was made and exported, and the scanner: for reading only.
+    """
+    from cad.files import part_files, workshop_files
+    from scanwright.api import build
+
+    def all_of_it(folder):
+        given = {}
+
+        def keeping(function):
+            def kept(scanner, *words):
+                given["scanner"], given[function.__name__] = scanner, function(scanner, *words)
+                return given[function.__name__]
+
+            return kept
+
+        folder.mkdir()
+        (folder / "tilted.toml").write_text(TILTED)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(part_files, "build_parts", keeping(part_files.build_parts))
+            patch.setattr(workshop_files, "export_scanner", keeping(workshop_files.export_scanner))
+            built = build(folder / "tilted.toml", folder / "out")
+        result, exports = given["build_parts"], given["export_scanner"]
+        return SimpleNamespace(folder=built.folder, result=result, exports=exports, scanner=given["scanner"])
+
+    return once("the tilted scanner", all_of_it)

@@ -1,6 +1,7 @@
 """The imports of the house, read from its files: wherever they stand, in functions and under TYPE_CHECKING too."""
 
 import ast
+import functools
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ def modules(root=ROOT, floors=FLOORS):
     return found
 
 
+@functools.cache
 def imports(root=ROOT, floors=FLOORS):
     """All imports of all modules, of the house and of libraries; those of the house name the module, not the name."""
     known = modules(root, floors)

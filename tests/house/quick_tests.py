@@ -4,11 +4,11 @@ A test is slow if it takes more than a tenth of a second of processor, processes
 it needs included, or waits for more than a second. What is parametrised is slow if one of its cases is.
 """
 
-import os
 import time
 from pathlib import Path
 
 import pytest
+from made_once import busy_s
 
 SLOW = Path(__file__).parent / "slow.txt"
 MOST_S, MOST_WAIT_S = 0.1, 1.0
@@ -76,7 +76,7 @@ def _is_used(item, name, place):
 
 
 def _taken():
-    return sum(os.times()[:4]), time.monotonic()
+    return busy_s(), time.monotonic()
 
 
 def _cost(began):

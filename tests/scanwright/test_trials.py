@@ -8,7 +8,7 @@ import pytest
 
 from cad.geometry import mesh_trials as meshes
 from design.accuracy.trials import Trial, best_trials
-from firmware_io.twins.dynamics import plant_of
+from firmware_io.twins.servo_plant import plant_of
 from scanwright.trials import axis
 from scanwright.trials import solver as solvers
 

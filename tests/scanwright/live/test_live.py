@@ -186,7 +186,8 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
         view = CloudView(server, "hall", np.zeros(3))
         nothing = np.zeros(len(floor), np.float32)
         view.add(CloudGrowth(floor, nothing, nothing, (), 0))
-        page = browser.open(gate.address, width=900, height=600)
+        small = {"width": 900, "height": 600, "device_scale_factor": 0.5}  # drawn on the processor here
+        page = browser.open(gate.address, **small, color_scheme="dark")
         assert page.title() == "a page"
         page.get_by_text("20,000 points").wait_for()
         assert browser.barriers(page) == []

@@ -34,7 +34,6 @@ def agrees_with_the_parts(row, task):
     """The numbers of a row by other ways: weighed solid by solid, J of the beams that get past the parts."""
     import numpy as np
 
-    from cad.assembly.make import make_parts
     from cad.assembly.shadow import PartsWorkshop
     from design.angles import Angles, AngleSet
     from design.objective.problem import problem_of
@@ -47,13 +46,14 @@ def agrees_with_the_parts(row, task):
     motion = loaded.task.motion
     record = AngleSet(task="ahead", angles_deg=angles, sensor="URG-04LX", servo="AX-12A", slip_ring=None, motion=motion)
     scanner = scanner_of(record, loaded.task.printer, loaded.products)
-    assembly = make_parts(scanner)
+    workshop = PartsWorkshop(scanner)
+    assembly = workshop.assembly(scanner)
     density = {"servo_shaft": 2.7, "journal_sleeve": 2.7}  # turned from aluminium
     made = sum(s.Volume() / 1000 * density.get(n, scanner.printer.density_g_cm3) for n, s in assembly.made.items())
     assert float(row["mass_g"]) == pytest.approx(made + loaded.lidar.mass_g + loaded.servo.mass_g, rel=1e-4)
     assert float(row["cost_usd"]) == loaded.lidar.price_usd + loaded.servo.price_usd
     setting = np.radians([0.0, 0.0, 0.0, -60.0])
-    shadow = PartsWorkshop(scanner).shadow(setting)
+    shadow = workshop.shadow(setting)
     assert float(row["hidden_fraction"]) == pytest.approx(shadow.hidden().mean(), rel=1e-5)
     problem = problem_of(loaded)
     bare = score(problem, setting).J
