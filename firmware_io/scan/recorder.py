@@ -43,7 +43,7 @@ class Recorder:
         self._attached = attached
         self._lock = threading.Lock()
         self._done = threading.Event()
-        self._failure: OSError | None = None
+        self._failure: Exception | None = None
 
     def __enter__(self) -> Recorder:
         try:
@@ -88,12 +88,14 @@ class Recorder:
                 with self._lock:
                     self._messages.flush()
                 self._file.sync()
-        except OSError as error:
+        except Exception as error:  # whatever it is, the thread that writes next raises it
             self._failure = error
 
     def _check(self) -> None:
-        if self._failure is not None:
+        if isinstance(self._failure, OSError):
             raise self._lost(self._failure) from self._failure
+        if self._failure is not None:
+            raise self._failure
 
     def _lost(self, error: OSError) -> RecordingError:
         return self._error(error, f"; what came before is safe: make room, then `scanwright repair {self._path}`")

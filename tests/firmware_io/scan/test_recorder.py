@@ -12,10 +12,11 @@ import pytest
 from mcap.reader import make_reader
 
 from design.errors import RecordingError
-from firmware_io.recording.recording import open_recording
+from firmware_io.recording.recording import MessageWriter, open_recording
 from firmware_io.recording.repair.repair import repair, repaired_place
 from firmware_io.samples import Scan
 from firmware_io.scan.recorder import CHUNK_S, Recorder
+from tests.house.patience import until
 
 
 def a_scan(stamp_ns, beams=5):
@@ -127,6 +128,15 @@ def test_a_full_disk_keeps_what_was_there_and_says_what_to_do(tmp_path):
     assert failed_ns - summary.times_ns[1] < 10 * 10**9
     assert 0 < summary.messages["/scan"] < written
     assert summary.lost_bytes == 0  # the write that did not fit was taken back
+
+
+def test_a_fault_of_our_own_while_it_waits_for_the_disk_ends_the_scan(tmp_path, monkeypatch):
+    def broken(_messages):
+        raise AttributeError("no such thing in this release")
+
+    monkeypatch.setattr(MessageWriter, "flush", broken)
+    with pytest.raises(AttributeError, match="no such thing"), Recorder(tmp_path / "live.mcap", {}, {}) as recorder:
+        until(lambda: recorder.joint(1, 1.0))
 
 
 def test_a_chunk_is_well_below_the_second_that_may_be_lost():
