@@ -60,6 +60,16 @@ def run(*words: str | Path) -> str:
     return told.stdout
 
 
+def scan_once_or_twice(folder: Path, recording: Path) -> None:
+    """A computer that stands still for a second looks like both devices falling silent, and a scan ends so by right."""
+    try:
+        run("scan", folder, "-o", recording)
+    except AssertionError as silent:
+        print("scanned once more, after:", silent, sep="\n")
+        recording.unlink(missing_ok=True)
+        run("scan", folder, "-o", recording)
+
+
 def scan_the_twins(folder: Path) -> None:
     """From an angle set to a map."""
     (folder / "angles.json").write_text(json.dumps(ANGLES))
@@ -69,7 +79,7 @@ def scan_the_twins(folder: Path) -> None:
                 assert twins.poll() is None
                 time.sleep(0.1)
             for scan in ("a", "c"):
-                run("scan", folder, "-o", folder / f"{scan}.mcap")
+                scan_once_or_twice(folder, folder / f"{scan}.mcap")
         finally:
             twins.terminate()
     run("assemble", folder / "a.mcap", "--angles", folder / "angles.json", "-o", folder / "b.ply")

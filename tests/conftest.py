@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,10 +23,14 @@ from made_once import MadeOnce
 
 checked_arrays.install()
 
-# CI judges the change, not the dice, and shares its cores; at a developer's desk every run draws new examples
+# CI judges the change, not the dice; at a developer's desk every run draws new examples. Cores are shared everywhere.
 settings.register_profile("ci", derandomize=True, deadline=None)
-if os.environ.get("CI"):
-    settings.load_profile("ci")
+settings.register_profile("desk", deadline=None)
+settings.load_profile("ci" if os.environ.get("CI") else "desk")
+
+# what a shell starts in the background ignores Ctrl-C, and so would every process that a test starts and ends with it
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser):

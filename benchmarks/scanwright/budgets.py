@@ -52,6 +52,12 @@ TURN = """async (seconds) => {
   }
   return (1000 * (drawn.frame - before)) / (performance.now() - began);
 }"""
+THERE = """Object.entries(window.__viserMutable?.nodeRefFromName ?? {}).reduce((points, [name, node]) => {
+  if (node && name.startsWith("/cloud/")) node.traverse((child) => {
+    if (child.isPoints) points += child.geometry.attributes.position?.count ?? 0;
+  });
+  return points;
+}, 0)"""
 CARD = """() => {
   const gl = document.createElement('canvas').getContext('webgl2');
   return gl.getParameter(gl.getExtension('WEBGL_debug_renderer_info').UNMASKED_RENDERER_WEBGL);
@@ -124,9 +130,7 @@ def frames(chromium: Any, points: int) -> None:
         page = chromium.new_context(viewport=SIZE).new_page()
         page.set_default_timeout(300_000)
         page.goto(gate.address)
-        page.wait_for_function(
-            f"window.__viserTestpoints?.rendererInfo.render.points >= {view.points - view.forgotten}"
-        )
+        page.wait_for_function(f"{THERE} >= {view.points - view.forgotten}")
         page.wait_for_timeout(2000)
         rate = page.evaluate(TURN, TURNED_S)
         per_scan_ms = 1e3 * statistics.median(spent)

@@ -10,6 +10,8 @@ from typing import Literal, get_args
 
 import numpy as np
 import viser
+from jaxtyping import Int64
+from numpy import ndarray
 
 from design.arrays import Float32s, Vector
 from firmware_io.clouds.cloud import Cloud
@@ -116,7 +118,7 @@ class CloudView:
             chunk = self.chunks[-1]
         chunk.handle = self._server.scene.add_point_cloud(
             name,
-            chunk.points_m,
+            chunk.points_m[_out_of_order(chunk)],
             self._colours(chunk),
             point_size=self._size.value / 1000,
             point_shape="circle",
@@ -139,7 +141,7 @@ class CloudView:
     def _colours(self, chunk: _Chunk) -> Colours:
         by = self.by.value if self.by.value in COLOUR_BY else "height"
         low, high = self._spans[by]
-        return ramp((chunk.values[by] - low) / max(high - low, 1e-6))
+        return ramp((chunk.values[by][_out_of_order(chunk)] - low) / max(high - low, 1e-6))
 
     def _recolour(self) -> None:
         for chunk in list(self.chunks):
@@ -148,3 +150,8 @@ class CloudView:
     def _resize(self) -> None:
         for chunk in list(self.chunks):
             chunk.handle.point_size = float(np.clip(self._size.value, 1.0, 200.0)) / 1000
+
+
+def _out_of_order(chunk: _Chunk) -> Int64[ndarray, " n"]:
+    """The order in which a page gets a chunk's points: the first of them are all of them, thinned."""
+    return np.random.default_rng(0).permutation(len(chunk.points_m))

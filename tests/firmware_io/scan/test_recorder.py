@@ -16,7 +16,6 @@ from firmware_io.recording.recording import MessageWriter, open_recording
 from firmware_io.recording.repair.repair import repair, repaired_place
 from firmware_io.samples import Scan
 from firmware_io.scan.recorder import CHUNK_S, Recorder
-from tests.house.patience import until
 
 
 def a_scan(stamp_ns, beams=5):
@@ -136,7 +135,7 @@ def test_a_fault_of_our_own_while_it_waits_for_the_disk_ends_the_scan(tmp_path, 
 
     monkeypatch.setattr(MessageWriter, "flush", broken)
     with pytest.raises(AttributeError, match="no such thing"), Recorder(tmp_path / "live.mcap", {}, {}) as recorder:
-        until(lambda: recorder.joint(1, 1.0))
+        wait_until(lambda: recorder.joint(1, 1.0))
 
 
 def test_a_chunk_is_well_below_the_second_that_may_be_lost():

@@ -8,6 +8,7 @@ from multiprocessing import Pipe
 import numpy as np
 import pytest
 from patience import until
+from scipy.stats import kstest
 from websockets.sync.client import connect
 
 from design.angles import Angles, AngleSet
@@ -129,6 +130,22 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         np.testing.assert_allclose(ranges, np.linalg.norm(kept.points_m, axis=1), rtol=1e-6)
 
 
+def test_the_first_points_of_a_chunk_are_all_of_them_thinned():
+    height = np.linspace(-1, 1, 5000, dtype=np.float32)
+    points, nothing = np.stack([0 * height, 0 * height, height], axis=1), np.zeros(5000, np.float32)
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server, "scan", np.zeros(3))
+        for part in range(0, 5000, 1000):  # as they come: from below to above
+            some = slice(part, part + 1000)
+            view.add(CloudGrowth(points[some], nothing[some], nothing[some], (), 0))
+        sent = view.chunks[0].handle
+        np.testing.assert_array_equal(np.sort(sent.points[:, 2]), height)
+        assert kstest(sent.points[:250, 2], "uniform", (-1, 2)).pvalue > 1e-3
+        by_height = np.argsort(sent.points[:, 2])
+        assert (np.diff(sent.colors[by_height, 0].astype(int)) >= 0).all()  # each has its own colour, dark to bright
+        np.testing.assert_array_equal(view.cloud().points_m, points)
+
+
 def test_the_address_is_said_and_the_page_seen_before_the_scan_begins(tmp_path, capsys):
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     opened = []
@@ -208,4 +225,33 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
         download.value.save_as(tmp_path / "hall.ply")
         (cloud,), _ = read_clouds(tmp_path / "hall.ply")
         np.testing.assert_array_equal(cloud.points_m, floor)
+    browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
+
+
+SLOWLY = """async () => {
+  const { cameraControl, requestRender } = window.__viserMutable;
+  let fewest = Infinity;
+  for (let k = 0; k < 30; k++) {
+    cameraControl.rotate(0.02, 0, false);
+    requestRender();
+    const now = await new Promise(requestAnimationFrame);
+    while (performance.now() < now + 80);
+    fewest = Math.min(fewest, window.__viserTestpoints.rendererInfo.render.points);
+  }
+  return fewest;
+}"""
+
+
+def test_a_computer_that_draws_slowly_draws_fewer_points_while_the_view_moves_and_all_of_them_at_rest(browser):
+    rng = np.random.default_rng(0)
+    with guarded_server("a page") as (server, gate):
+        view = CloudView(server, "hall", np.zeros(3))
+        nothing = np.zeros(60_000, np.float32)
+        for _ in range(2):
+            view.add(CloudGrowth(rng.uniform(-3, 3, (60_000, 3)).astype(np.float32), nothing, nothing, (), 0))
+        page = browser.open(gate.address, width=900, height=600, device_scale_factor=0.5)
+        drawn = "window.__viserTestpoints?.rendererInfo.render.points"
+        page.wait_for_function(f"{drawn} === 120_000")
+        assert 20_000 <= page.evaluate(SLOWLY) < 40_000
+        page.wait_for_function(f"{drawn} === 120_000")
     browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
