@@ -11,6 +11,7 @@ scans are recorded again. Times are those of this machine; the bounds to hold ar
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import resource
@@ -168,6 +169,8 @@ def outside(out: Path, twins: EmulatedScanner, number: int | None) -> Outcome:
         preexec_fn=limit,
     ) as process:
         while not any(path.stat().st_size > 100_000 for path in (out / "recordings").glob("*.mcap")):
+            if process.poll() is not None:
+                raise TooBusyError(process.communicate()[1].strip())
             time.sleep(0.01)
         if number:
             process.send_signal(number)
@@ -207,7 +210,9 @@ def trials(name: str, runs: int) -> list[Outcome]:
         try:
             outcomes.append(trial(name, seed))
         except TooBusyError as busy:
-            print(f"not counted: {name}, seed {seed}: failed before the fault: {busy.__cause__}", file=sys.stderr)
+            print(
+                f"not counted: {name}, seed {seed}: failed before the fault: {busy.__cause__ or busy}", file=sys.stderr
+            )
         seed += 1
     return outcomes
 
@@ -229,14 +234,16 @@ def row(name: str, outcomes: list[Outcome]) -> str:
 
 def main() -> None:
     """Run every fault, or those that are named, as often as asked for, and print a table of the worst cases."""
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    names = sys.argv[2:] or ALL
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="?", type=int, default=100, help="of each fault; 100 if nothing else is said")
+    parser.add_argument("fault", nargs="*", help=f"all if none is named: {'; '.join(ALL)}")
+    asked = parser.parse_args()
     with suppress(PermissionError):
         os.nice(-10)  # twins need their time, as hardware does not
     print("| fault | runs | ends with | servo stands after | recording lost | scans again after |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for name in names:
-        print(row(name, trials(name, runs)), flush=True)
+    for name in asked.fault or ALL:
+        print(row(name, trials(name, asked.runs)), flush=True)
 
 
 if __name__ == "__main__":
