@@ -9,7 +9,7 @@ from pathlib import Path
 import scanwright as sw
 
 SETTINGS_DEG = {  # alpha_rot, beta_rot, alpha_laser, beta_laser
-    "the optimum of this task": (180, 55.9, 78.1, -80.3),
+    "the optimum of this task": (180, 55.6, 78.7, -79.8),
     "rolling: about the line ahead": (0, 90, 0, -90),
     "pitching: nodding about the left": (-90, 0, 90, 0),
 }

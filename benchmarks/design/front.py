@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from design.accuracy.methods import reference
+from design.accuracy.reference import smooth_reference
 from design.density.beams import scan_lines
 from design.objective.problem import FRONT, Problem, problem_of
 from design.objective.score import quick_J
@@ -36,7 +36,7 @@ def main() -> None:
             ball_rad = float(np.radians(rng.choice([1.0, 2.0])))
             problem = replace(plain.with_beams(plain.bearings_rad, lines), ball_rad=ball_rad)
             angles = np.radians(rng.uniform([-180, -90, -90, -90], [180, 90, 90, 90]))
-            cases.append((problem, angles, reference(problem, angles).J))
+            cases.append((problem, angles, smooth_reference(problem, angles).J))
     rows = []
     for nodes in NODES:
         errors, seconds = [], []

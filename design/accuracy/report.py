@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.methods import Point, Reference, as_log, best_points, measure_methods
-from design.accuracy.stress import StressRow, stress_rows
-from design.accuracy.trials import GREYS, MARKS, write_table
+from design.accuracy.machine import this_machine
+from design.accuracy.reference import Reference
+from design.accuracy.search_trials import search_trials
+from design.accuracy.stress import StressRow, as_turning, stress_rows
+from design.accuracy.trials import GREYS, MARKS, RING, report_trials, write_table
+from design.accuracy.work_precision import Point, best_points, measure_methods
 from design.evaluation.picture_files import save_picture
+from design.motion import Shortest
 from design.objective.problem import problem_of
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
@@ -20,15 +24,16 @@ from design.task.task import LoadedTask
 
 def write_method_points(path: Path, points: list[Point], truth: Reference) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
-    header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front failed"
+    header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front"
     rows = []
     for point, front in zip(points, best_points(points, truth.J_error), strict=True):
         seconds = point.seconds or (np.nan,)
         numbers = [point.J, point.J_error, point.argmin_error_deg]
-        numbers += [float(np.median(seconds)), min(seconds), max(seconds), point.peak_mb]
+        numbers += [point.median_s if point.seconds else np.nan, min(seconds), max(seconds), point.peak_mb]
         cells = ["" if np.isnan(n) else f"{n:.6g}" for n in numbers]
-        rows.append([point.method, point.setting, *cells, str(front).lower(), point.failed])
-    write_table(path, header.split(), rows)
+        marks = [str(front).lower(), str(point.chosen).lower()]
+        rows.append([point.method, point.setting, *cells, *marks, point.failed])
+    write_table(path, [*header.split(), "chosen", "failed"], rows)
 
 
 def write_rows(path: Path, rows: list[StressRow]) -> None:
@@ -45,20 +50,23 @@ def work_precision_picture(path: Path, points: list[Point], truth: Reference, ti
     methods = list(dict.fromkeys(point.method for point in points))
     for i, method in enumerate(methods):
         mine = [p for p in points if p.method == method and p.seconds]
-        seconds = [float(np.median(p.seconds)) for p in mine]
+        seconds = [p.median_s for p in mine]
         error = [max(p.J_error, floor) for p in mine]
         axis.plot(seconds, error, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
         for s, e, p in zip(seconds, error, mine, strict=True):
             axis.annotate(p.setting.split()[0], (s, e), textcoords="offset points", xytext=(4, 4), fontsize=6.5)
     for p in points:
-        if not p.seconds:
-            axis.plot([], [], " ", label=f"{p.method}, {p.setting}: {p.failed}")
+        if p.chosen:
+            axis.plot([p.median_s], [max(p.J_error, floor)], "o", label="chosen", **RING)
+    for method in methods:
+        if failed := next((p.failed for p in points if p.method == method and p.failed), ""):
+            axis.plot([], [], " ", label=f"{method}: {failed}")
     axis.axhline(floor, color="#888888", linestyle=":", linewidth=1)
     axis.annotate("error of the reference", (1, floor), xycoords=("axes fraction", "data"), ha="right", va="bottom")
     axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel="error of J")
     axis.grid(which="major", color="#dddddd", linewidth=0.6)
     axis.legend(fontsize=8)
-    axis.set_title(title, fontsize=11)
+    axis.set_title(f"{title}\n{this_machine()}", fontsize=10)
     save_picture(figure, path)
 
 
@@ -70,15 +78,17 @@ class StressReport:
     passed: bool
 
 
-def report_stress(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> StressReport:
-    """Run the stiff and extreme cases on a task and write `stress.csv`.
+def report_stress(
+    loaded: LoadedTask, folder: Path, say: Callable[[str], None], more: Iterable[StressRow] = ()
+) -> StressReport:
+    """Run the stiff and extreme cases on a task, `more` of other rooms beside them, and write `stress.csv`.
 
     Raises:
         TaskError: no direction has a weight.
     """
     say("stiff and extreme cases")
-    loaded = as_log(loaded)
-    rows = stress_rows(loaded, problem_of(loaded))
+    loaded = as_turning(loaded)
+    rows = [*stress_rows(loaded, problem_of(loaded)), *more]
     folder.mkdir(parents=True, exist_ok=True)
     write_rows(folder / "stress.csv", rows)
     failed = sum(not row.passed for row in rows)
@@ -97,14 +107,24 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
-    optimum = find_optimum(as_log(loaded), say)
-    truth, points = measure_methods(optimum.problem, optimum.search.best[0].angles_rad, say)
+    optimum = find_optimum(loaded, say)
+    truth, points = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, say)
     folder.mkdir(parents=True, exist_ok=True)
     write_method_points(folder / "work_precision.csv", points, truth)
     work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
-    lines = [f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
+    lines = [this_machine(), f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
     for point, front in zip(points, best_points(points, truth.J_error), strict=True):
-        seconds = f"{sorted(point.seconds)[len(point.seconds) // 2]:.4f} s" if point.seconds else point.failed
-        mark = "*" if front else " "
+        seconds = f"{point.median_s:.4f} s" if point.seconds else point.failed
+        mark = "=" if point.chosen else "*" if front else " "
         lines.append(f"{mark} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
-    return [*lines, f"* nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}"]
+    return [*lines, f"= chosen, * nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}"]
+
+
+def report_search(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
+    """Measure what a search spends and gains, write `search.csv` and `search.png`; in words.
+
+    Raises:
+        TaskError: no setting keeps the limits, of which a period is to be found.
+    """
+    asked = find_optimum(loaded, say).loaded if isinstance(loaded.task.motion, Shortest) else loaded
+    return report_trials(list(search_trials(asked, say)), folder, "search")

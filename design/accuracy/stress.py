@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.accuracy.methods import smooth_pieces
+from design.accuracy.reference import smooth_pieces
 from design.arrays import Array
 from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density.spin import mean_count, zones
 from design.errors import TaskError
+from design.motion import Spin, Sweep
 from design.objective.named_objectives import log
 from design.objective.problem import Problem
 from design.objective.score import quick_J, score
@@ -45,6 +46,14 @@ class StressRow:
         return bool(self.error <= self.allowed)
 
 
+def as_turning(loaded: LoadedTask) -> LoadedTask:
+    """The task with the objective `log` and an axis that turns all around: the laws below are those of its beams."""
+    task = loaded.task
+    density = task.density.model_copy(update={"objective": "log"})
+    motion = Spin(period_s=task.motion.period_s) if isinstance(task.motion, Sweep) else task.motion
+    return replace(loaded, task=task.model_copy(update={"density": density, "motion": motion}))
+
+
 def stress_rows(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """All cases, with the beams of a task."""
     cases: list[Callable[[LoadedTask, Problem], list[StressRow]]] = [
@@ -60,7 +69,8 @@ def stress_rows(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     return [row for case in cases for row in case(loaded, problem)]
 
 
-def _row(case: str, quantity: str, expected: float, got: float, allowed: float) -> StressRow:
+def row(case: str, quantity: str, expected: float, got: float, allowed: float) -> StressRow:
+    """A case with its error: relative, unless 0 is expected."""
     error = abs(got - expected) / (abs(expected) if expected else 1.0)
     return StressRow(case, quantity, expected, got, error, allowed)
 
@@ -79,7 +89,7 @@ def _law(
 ) -> StressRow:
     lines = scan_lines(turns, 1.0).count
     expected = len(bearings) * lines * 2 * np.pi * (1 - np.cos(ball))
-    return _row(name, "integral of d", expected, _integral(bearings, plane, turns, ball), allowed)
+    return row(name, "integral of d", expected, _integral(bearings, plane, turns, ball), allowed)
 
 
 def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
@@ -90,7 +100,7 @@ def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
         polar, _ = polar_and_azimuth(beam_directions_rot(b, tilt, 0.0))
         got = mean_count(np.array([np.pi / 2]), polar, scan_lines(720, 1.0), ball)[0]
         name = f"scan plane {tilt:g} rad from perpendicular to the axis"
-        rows.append(_row(name, "d on the equator", len(b) * 720 * ball / np.pi, float(got), 1e-6))
+        rows.append(row(name, "d on the equator", len(b) * 720 * ball / np.pi, float(got), 1e-6))
         rows.append(_law(name, b, (tilt, 0.0), 720, ball, 1e-6))
     for tilt_deg in (1e-3, 30.0, 61.98, 89.999):
         plane = (float(np.radians(tilt_deg)), 0.0)
@@ -112,7 +122,7 @@ def _focus(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     # 1e-9 rad off, the beams on the rim are met by half of their lines, or by none
     rim = 720.0 * int((np.abs(np.abs(b) - ball) < 1e-6).sum()) / max(expected, 1)
     return [
-        _row(f"focus point, {t:g} rad off", "d", expected, float(d), 1e-9 if t == 0 else rim + 1e-6)
+        row(f"focus point, {t:g} rad off", "d", expected, float(d), 1e-9 if t == 0 else rim + 1e-6)
         for t, d in zip(at, got, strict=True)
     ]
 
@@ -137,7 +147,7 @@ def _lines(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     whole = quick_J(_with_turns(problem, 720), angles, 2187)
     for turns in (720 - 1e-7, 720 + 1e-12):  # beating with the turn: the last gap is nearly full, or nothing is left
         got = quick_J(_with_turns(problem, turns), angles, 2187)
-        rows.append(_row(f"T f = 720 {turns - 720:+.0e}: the rate beats with the turn", "J", whole, got, 1e-6))
+        rows.append(row(f"T f = 720 {turns - 720:+.0e}: the rate beats with the turn", "J", whole, got, 1e-6))
     return rows
 
 
@@ -151,7 +161,7 @@ def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
         ("(alpha, beta) about u is (-alpha, -beta) about -u", (0, 0, 30, -40), (180, 0, -30, 40)),
     ]
     return [
-        _row(name, "J", quick_J(problem, np.radians(a), 6561), quick_J(problem, np.radians(b), 6561), 1e-5)
+        row(name, "J", quick_J(problem, np.radians(a), 6561), quick_J(problem, np.radians(b), 6561), 1e-5)
         for name, a, b in pairs
     ]
 
@@ -162,9 +172,7 @@ def _weights(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     cone = {"shape": "cone", "axis": [1, 0, -1], "half_angle_deg": 40}
     plain = quick_J(_with(loaded, problem, [cone]), angles, 2187)
     return [
-        _row(
-            f"weights of {w:g}", "J", plain, quick_J(_with(loaded, problem, [cone | {"value": w}]), angles, 2187), 1e-9
-        )
+        row(f"weights of {w:g}", "J", plain, quick_J(_with(loaded, problem, [cone | {"value": w}]), angles, 2187), 1e-9)
         for w in (1e-300, 1e-30, 1e30, 1e300)
     ]
 
@@ -177,7 +185,7 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g[0])
     axis = [float(np.sin(at[0])), 0.0, float(np.cos(at[0]))]
     return [
-        _row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)
+        row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)
         for half, allowed in ((1.0, 2e-2), (0.1, 1e-2), (0.01, 1e-3), (0.001, 1e-4))
         for region in ({"shape": "cone", "axis": axis, "half_angle_deg": half},)
     ]
@@ -187,15 +195,15 @@ def _refusals(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """What has no answer is refused, and no number comes instead: 1 for a refusal."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
-    rows = [_row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
+    rows = [row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
     masked = _refused(lambda: problem.with_objective(log(field_of(hidden))), angles)
-    rows.append(_row("everything masked", "refused", 1, masked, 0))
+    rows.append(row("everything masked", "refused", 1, masked, 0))
     try:
         AllRegion.model_validate({"shape": "all", "value": float("nan")})
         refused = 0
     except ValueError:
         refused = 1
-    rows.append(_row("NaN weight", "refused", 1, refused, 0))
+    rows.append(row("NaN weight", "refused", 1, refused, 0))
     return rows
 
 

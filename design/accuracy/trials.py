@@ -11,17 +11,20 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from design.accuracy.front import dominators
+from design.accuracy.machine import this_machine
 from design.evaluation.picture_files import save_picture
 
 T = TypeVar("T")
 REPEATS = 3
+COLUMNS = 3  # of a picture
 MARKS = "osD^vP*X"
+RING: dict[str, Any] = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "black"}
 GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
 
 
@@ -95,8 +98,13 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[objec
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
     """A diagram for each choice: error against median seconds, both logarithmic, the chosen setting ringed."""
     choices = list(dict.fromkeys(trial.choice for trial in trials))
-    figure = Figure(figsize=(5.4 * len(choices), 5), layout="constrained")
-    for axis, choice in zip(figure.subplots(1, len(choices), squeeze=False)[0], choices, strict=True):
+    columns = min(len(choices), COLUMNS)
+    rows = -(-len(choices) // columns)
+    figure = Figure(figsize=(5.4 * columns, 5 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for empty in axes[len(choices) :]:
+        empty.remove()
+    for axis, choice in zip(axes, choices, strict=False):
         here = [trial for trial in trials if trial.choice == choice]
         floor = min((t.error for t in here if t.error > 0), default=1e-16) / 3
         for i, method in enumerate(dict.fromkeys(trial.method for trial in here)):
@@ -107,11 +115,25 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
                 axis.annotate(trial.setting, at, textcoords="offset points", xytext=(5, 4), fontsize=6.5)
         for trial in here:
             if trial.chosen:
-                ring = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "black"}
-                axis.plot([trial.median_s], [max(trial.error, floor)], "o", label="chosen", **ring)
+                axis.plot([trial.median_s], [max(trial.error, floor)], "o", label="chosen", **RING)
         axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=f"error [{here[0].unit}]")
         axis.set_title(choice, fontsize=11)
         axis.grid(which="major", color="#dddddd", linewidth=0.6)
         axis.margins(0.15)
         axis.legend(fontsize=8)
+    figure.suptitle(this_machine(), fontsize=9)
     save_picture(figure, path)
+
+
+def report_trials(trials: Sequence[Trial], folder: Path, name: str) -> list[str]:
+    """Write their table and picture under a name; in words."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_trials(folder / f"{name}.csv", trials)
+    trials_picture(folder / f"{name}.png", trials)
+    lines = [this_machine()]
+    for trial, best in zip(trials, best_trials(trials), strict=True):
+        mark = "=" if trial.chosen else "*" if best else " "
+        method = f"{trial.method}, {trial.setting}"
+        price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
+        lines.append(f"{mark} {trial.choice:26} {method:50} {price}")
+    return [*lines, f"= chosen, * nothing is both faster and nearer; wrote {name}.csv and .png to {folder}"]

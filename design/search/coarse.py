@@ -82,8 +82,32 @@ class Landscape:
         return np.any(found, axis=0) if found else np.zeros((1, 1, 1), dtype=bool)
 
 
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What a search spends where it has a choice: `design.accuracy.search_trials` measures what more of it brings.
+
+    Attributes:
+        fineness: of the nodes or directions that coarse J is taken from, 1 as `coarse_landscape` says.
+        margin: what coarse J may be off by: planes whose bound is further above the best stay a bound.
+        rounds: in which the best setting is refined, at most `len(refinement.REFINE_ROUNDS)`.
+    """
+
+    fineness: float = 1.0
+    margin: float = MARGIN
+    rounds: int = 2
+
+
+USUAL = Effort()
+
+
 def coarse_landscape(
-    problem: Problem, planes: Folded, axes: Folded, progress: Progress, limits: Limits, avoid_holes: bool
+    problem: Problem,
+    planes: Folded,
+    axes: Folded,
+    progress: Progress,
+    limits: Limits,
+    avoid_holes: bool,
+    effort: Effort = USUAL,
 ) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact.
 
@@ -91,7 +115,8 @@ def coarse_landscape(
     """
     few = len(axes.first) <= FEW_AXES
     # caustics are as wide as the ball: a node every quarter of it, and every 0.5 deg at least
-    half = min((MOST_NODES - 1) // 2, int(max(180, 2 * np.pi / problem.ball_rad))) if few else 90
+    usual = max(180, 2 * np.pi / problem.ball_rad) if few else 90
+    half = min((MOST_NODES - 1) // 2, int(effort.fineness * usual))
     nodes = 2 * half + 1  # odd: one at the equator, which turning round leaves where it is
     circles = max(nodes - 1, 720 - 720 % (nodes - 1)) if few else nodes - 1
     polar = np.linspace(0, np.pi, nodes)
@@ -134,7 +159,7 @@ def coarse_landscape(
     best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
     while True:
         for batch in _batches(bounds):
-            batch = batch[may_win(bounds[:, batch], best + SCOUTED) & ~exact[batch]]
+            batch = batch[may_win(bounds[:, batch], best + SCOUTED + effort.margin) & ~exact[batch]]
             if not len(batch):
                 continue
             if exact.sum() // REPORT > (exact.sum() - BATCH) // REPORT:
@@ -148,7 +173,7 @@ def coarse_landscape(
         plain, kept = lowest_of(everything, everything)
         bounds = by_plane((plain, kept))
         best = np.where(exact, bounds, np.inf).min(axis=1)
-        if not np.any(may_win(bounds, best) & ~exact):
+        if not np.any(may_win(bounds, best + effort.margin) & ~exact):
             break
     return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())
 
@@ -159,8 +184,8 @@ def by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
 
 
 def may_win(bounds: Float[ndarray, "2 planes"], best: Float[ndarray, " 2"]) -> Mask:
-    """Planes whose bound is not above the best by more than the search may be off."""
-    return (np.isfinite(bounds) & (bounds <= best[:, None] + MARGIN)).any(axis=0)
+    """Planes whose bound is not above the best: that of all settings, or that of those that keep the constraints."""
+    return (np.isfinite(bounds) & (bounds <= best[:, None])).any(axis=0)
 
 
 def _within(weights: Array) -> Array:

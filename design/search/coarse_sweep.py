@@ -17,7 +17,7 @@ from design.errors import TaskError
 from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.objective.score import blind_to_sweep
-from design.search.coarse import BLIND_MARGIN, Landscape, Progress, by_plane, may_win
+from design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, by_plane, may_win
 from design.search.constraints import AtMost, Constraint
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import Lowest, lowest, one_way
@@ -33,7 +33,13 @@ REPORT = 200
 
 
 def swept_landscape(
-    problem: Problem, planes: Folded, axes: Folded, progress: Progress, limits: Limits, avoid_holes: bool
+    problem: Problem,
+    planes: Folded,
+    axes: Folded,
+    progress: Progress,
+    limits: Limits,
+    avoid_holes: bool,
+    effort: Effort = USUAL,
 ) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact; the others keep their bound.
 
@@ -47,7 +53,8 @@ def swept_landscape(
             "take a larger step_deg, or fix an angle"
         )
     share = float((problem.field.weight_at(spiral(MOST_DIRECTIONS)) > 0).mean())
-    directions = spiral(int(np.clip(IN_REGION / max(share, 1e-9), DIRECTIONS, MOST_DIRECTIONS)))
+    usual = np.clip(IN_REGION / max(share, 1e-9), DIRECTIONS, MOST_DIRECTIONS)
+    directions = spiral(int(effort.fineness * usual))
     weigh = _weights if share * len(directions) >= IN_REGION else _weights_nearby
     weights = tuple(weigh(moment.field, axes, directions) for moment in problem.objective.moments)
     beams = [beam_directions_rot(problem.bearings_rad, *np.radians(plane)) for plane in planes.settings_deg]
@@ -77,7 +84,7 @@ def swept_landscape(
 
     bounds = by_plane(lowest_of(slice(None)))
     for c in np.argsort(bounds[0], kind="stable"):
-        if not may_win(bounds[:, c : c + 1], best)[0]:
+        if not may_win(bounds[:, c : c + 1], best + effort.margin)[0]:
             continue
         if exact.sum() % REPORT == 0:
             progress(f"exact densities: {exact.sum()} of at most {len(beams):,} scan planes")

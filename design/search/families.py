@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -18,8 +16,8 @@ from design.objective.tolerance import worst_within
 from design.search.coarse import Landscape
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
-from design.search.simplex import Enough, lowest_by_simplex
-from design.task.angle_ranges import NAMES, AngleRanges
+from design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
+from design.task.angle_ranges import AngleRanges
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
@@ -30,11 +28,6 @@ NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
 PIECE = 128  # planes whose J are made together
 MOST_LOOKS = 80  # for local minima, before the list is left shorter
 MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
-REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
-ROUGH = Enough(0.1, 1e-4, 30)  # deg, J, values an angle: of all that are not built, as far as their errors reach
-FINE = Enough(0.005, 1e-7, 30)
-FINEST_DEG = 0.01
-STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,8 +206,9 @@ def refine_leaders(
         if len(families) == FAMILIES:
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
-            refined = _refined(problem, ranges, leader, REFINE_ROUNDS[: 1 if families else rounds], required)
-            refined, again = _allowed(refined, leader.angles_deg, required)
+            its_rounds = REFINE_ROUNDS[: min(rounds, 1) if families else rounds]
+            refined = refined_setting(problem, ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
+            refined, again = allowed_setting(refined, leader.angles_deg, required)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
@@ -229,16 +223,6 @@ def refine_leaders(
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
-
-
-def _allowed(refined: Setting, leader: Setting, required: Requirements) -> tuple[Setting, Score | None]:
-    """A refined setting and its score; where all nodes refuse it, the next one on the way back to its leader."""
-    for share in STEPS_BACK:
-        setting = ((1 - share) * refined + share * leader).round(2) + 0.0
-        found = required.score(setting)
-        if found is not None:
-            return setting, found
-    return leader, None
 
 
 def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
@@ -265,56 +249,3 @@ def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
     u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
     v = R_world_rot(*np.radians(better.angles_deg[:2]))[:, 2]
     return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)
-
-
-def _refined(
-    problem: Problem, ranges: AngleRanges, leader: Leader, rounds: tuple[tuple[float, int], ...], required: Requirements
-) -> Setting:
-    """The nearest minimum of J that keeps the constraints, rounded to 0.01 deg.
-
-    Angles that the task fixes stay, and an axis that is any.
-    """
-    limits = np.array([ranges.limits(name) for name in NAMES])
-    free = limits[:, 1] > limits[:, 0]
-    free[:2] &= not leader.every_axis
-    angles = leader.angles_deg.copy()
-    if not free.any() or not rounds:
-        return angles
-    for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
-
-        def J(moved: Array, nodes: int = nodes) -> float:
-            setting = angles.copy()
-            setting[free] = moved
-            designed = required.J(setting, nodes)
-            if not ranges.tolerance_deg or not np.isfinite(designed):
-                return designed
-            return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
-
-        corners, values = _simplex(J, angles[free], reach * ranges.step_deg, limits[free])
-        enough = FINE if len(rounds) > 1 else ROUGH
-        most = replace(enough, values=enough.values * int(free.sum()) - len(values))
-        angles[free] = lowest_by_simplex(J, corners, values, limits[free], most)
-    # of the settings around it the nearest: rounding may leave the constraints
-    finest = rounds[-1][1]
-    below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
-    corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
-    corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
-    for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
-        setting = angles.copy()
-        setting[free] = corner
-        if np.isfinite(required.J(setting, finest)):
-            return setting + 0.0  # -0.0 is 0.0
-    return leader.angles_deg
-
-
-def _simplex(J: Callable[[Array], float], start: Array, step: float, limits: Array) -> tuple[Array, Array]:
-    """A setting and one a step along each angle, (free + 1, free): to the side of the lower J, for one may be refused.
-
-    With their J.
-    """
-    corners = [(start, J(start))]
-    for i, (low, high) in enumerate(limits):
-        sides = [np.where(np.arange(len(start)) == i, start + sign * step, start) for sign in (1, -1)]
-        allowed = [side for side in sides if low <= side[i] <= high] or [np.clip(sides[0], *limits.T)]
-        corners.append(min(((side, J(side)) for side in allowed), key=lambda pair: pair[1]))
-    return np.array([point for point, _ in corners]), np.array([value for _, value in corners])

@@ -14,7 +14,7 @@ from design.left_out import LeftOut
 from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.named_objectives import Moment, Objective
 from design.objective.problem import Problem
-from design.search.coarse import Landscape, Progress, coarse_landscape
+from design.search.coarse import USUAL, Effort, Landscape, Progress, coarse_landscape
 from design.search.coarse_sweep import swept_landscape
 from design.search.constraints import Requirements
 from design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
@@ -62,6 +62,7 @@ def search(
     ranges: AngleRanges,
     progress: Progress = lambda _: None,
     limits: Limits = NONE,
+    effort: Effort = USUAL,
 ) -> SearchResult:
     """Find the best families of settings in the ranges of a task that keep its limits and, if they can, have no hole.
 
@@ -74,12 +75,12 @@ def search(
     progress(_looked_over(problem, fine))
     avoid = ranges.holes == "avoid"
     least_blind = None
-    found = _best(problem, fine, progress, limits, avoid)
+    found = _best(problem, fine, progress, limits, avoid, effort)
     if avoid and found.leader is None:  # nothing is free of holes: the lowest J of all
         least_blind = _least_blind(problem, found.land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
         avoid = False
-        found = _best(problem, fine, progress, limits, avoid)
+        found = _best(problem, fine, progress, limits, avoid, effort)
     land, winner = found.land, found.leader
     required = Requirements(problem, limits, avoid)
     if winner is None:
@@ -88,9 +89,11 @@ def search(
         leaders = find_leaders(land, *fine, mirrors, required)
     else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
         coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
-        leaders = find_leaders(_landscape(problem, coarse, progress, found.asked, avoid)[0], *coarse, mirrors, required)
+        leaders = find_leaders(
+            _landscape(problem, coarse, progress, found.asked, avoid, effort)[0], *coarse, mirrors, required
+        )
     progress("refining the minima")
-    families = refine_leaders(problem, ranges, [winner, *leaders], required)
+    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds)
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
     return SearchResult(
@@ -127,13 +130,13 @@ class _Best:
     leader: Leader | None
 
 
-def _best(problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid: bool) -> _Best:
+def _best(problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid: bool, effort: Effort) -> _Best:
     required, asked = Requirements(problem, limits, avoid), limits
-    land, exact = _landscape(problem, grid, progress, limits, avoid)
+    land, exact = _landscape(problem, grid, progress, limits, avoid, effort)
     leader = best_leader(land, *grid, required)
     while leader is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
         asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
-        land, exact = _landscape(problem, grid, progress, asked, avoid)
+        land, exact = _landscape(problem, grid, progress, asked, avoid, effort)
         leader = best_leader(land, *grid, required)
     return _Best(land, exact, asked, leader)
 
@@ -153,10 +156,10 @@ def _looked_over(problem: Problem, grid: Grid) -> str:
 
 
 def _landscape(
-    problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid_holes: bool
+    problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid_holes: bool, effort: Effort
 ) -> tuple[Landscape, int]:
     make = coarse_landscape if problem.sweep is None else swept_landscape
-    return make(problem, *grid, progress, limits, avoid_holes)
+    return make(problem, *grid, progress, limits, avoid_holes, effort)
 
 
 def _plain(

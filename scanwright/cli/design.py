@@ -87,6 +87,7 @@ def accuracy(
     choices: Annotated[
         bool, typer.Option("--choices", help="Meshes, integrator of the emulated servo and its angle instead.")
     ] = False,
+    search: Annotated[bool, typer.Option("--search", help="What the search spends and gains instead.")] = False,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one folder of reports per task.")] = Path(
         "out/accuracy"
     ),
@@ -103,13 +104,17 @@ def accuracy(
 
         show(report_choices(loaded, folder, Progress()))
         return
-    from design.accuracy.report import report_precision, report_stress
+    from design.accuracy.report import report_precision, report_search, report_stress
 
     if stress:
-        told = report_stress(loaded, folder, Progress())
+        from firmware_io.twins.servo_plant import plant_of
+        from scanwright.trials.stress import range_rows, servo_rows
+
+        more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
+        told = report_stress(loaded, folder, Progress(), more)
         show(told.lines)
         raise typer.Exit(0 if told.passed else 1)
-    show(report_precision(loaded, folder, Progress()))
+    show((report_search if search else report_precision)(loaded, folder, Progress()))
 
 
 @app.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from design.accuracy.trials import best_trials, trials_picture, write_trials
+from design.accuracy.trials import report_trials
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 from firmware_io.twins.servo_plant import plant_of
@@ -26,13 +26,4 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
     optimum = find_optimum(loaded, say)
     solids = make_parts(loaded.scanner(optimum.angle_set())).made
     trials = [*mesh_trials(solids, say), *solver_trials(plant_of(loaded.task.servo), say), *axis_trials(say)]
-    folder.mkdir(parents=True, exist_ok=True)
-    write_trials(folder / "choices.csv", trials)
-    trials_picture(folder / "choices.png", trials)
-    lines = []
-    for trial, best in zip(trials, best_trials(trials), strict=True):
-        mark = "=" if trial.chosen else "*" if best else " "
-        method = f"{trial.method}, {trial.setting}"
-        price = f"{trial.error:.1e} {trial.unit:11} {trial.median_s:.4f} s {trial.size}"
-        lines.append(f"{mark} {trial.choice:26} {method:50} {price}")
-    return [*lines, f"= chosen, * nothing is both faster and nearer; wrote choices.csv and .png to {folder}"]
+    return report_trials(trials, folder, "choices")

@@ -14,8 +14,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.objective import score as scoring
 from design.objective.problem import problem_of
 from design.objective.score import score
-from design.search import coarse, families
-from design.search.coarse import coarse_landscape
+from design.search.coarse import Effort, coarse_landscape
 from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from design.search.optimum import directions_left_out
 from design.search.search import search
@@ -25,6 +24,7 @@ from design.sphere.polar_rule import breaks_of
 from design.task.task import Limits, LoadedTask, Task, load_task
 
 BAND = {"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}
+EXACT = Effort(margin=np.inf, rounds=0)  # so that no bound stands for a J
 CONE = {"shape": "cone", "axis": [0.5, 0.2, -0.6], "half_angle_deg": 25}
 FAST = {"motion": {"period_s": 2.0}}
 SWEEP = {
@@ -79,9 +79,8 @@ def test_neither_chance_nor_evolution_beats_the_search():
 
 
 @pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX"])
-def test_equivalent_settings_folded_and_not(sensor, monkeypatch):
+def test_equivalent_settings_folded_and_not(sensor):
     """Every grid setting a class of its own, against the folded grid: the same lowest J for each plane and axis."""
-    monkeypatch.setattr(coarse, "MARGIN", np.inf)  # all exact, so that no bound stands for a J
     uneven = {"weight": [{"shape": "all", "value": 0.2}, CONE], "sensor": sensor}
     # no beam is just a ball from an axis: rounding would decide whether it is in
     problem, ranges = case(uneven | {"density": {"ball_radius_deg": 2.3}}, {"step_deg": 45})
@@ -90,7 +89,7 @@ def test_equivalent_settings_folded_and_not(sensor, monkeypatch):
     assert len(folded[0].first) * len(folded[1].first) < 0.3 * len(whole[0].first) * len(whole[1].first)
     lowest = []
     for axes, planes in (folded, whole):
-        land, _ = coarse_landscape(problem, planes, axes, lambda _: None, Limits(), avoid_holes=False)
+        land, _ = coarse_landscape(problem, planes, axes, lambda _: None, Limits(), avoid_holes=False, effort=EXACT)
         by_plane = land.plain.by_plane[planes.flip.astype(int), planes.classes]
         lowest.append((by_plane, land.plain.by_axis[axes.flip.astype(int), axes.classes]))
     for of_folded, of_whole in zip(*lowest, strict=True):
@@ -98,12 +97,10 @@ def test_equivalent_settings_folded_and_not(sensor, monkeypatch):
 
 
 @pytest.mark.parametrize("motion", [{}, SWEEP], ids=["spin", "sweep"])
-def test_densities_bounded_and_computed(motion, monkeypatch):
-    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
+def test_densities_bounded_and_computed(motion):
     problem, ranges = case({"weight": [BAND]} | motion, {"step_deg": 45, "alpha_rot_deg": 0, "beta_rot_deg": [0, 45]})
-    bounded = search(problem, ranges)
-    monkeypatch.setattr(coarse, "MARGIN", np.inf)
-    computed = search(problem, ranges)
+    bounded = search(problem, ranges, effort=Effort(rounds=0))
+    computed = search(problem, ranges, effort=EXACT)
     told = {entry.what: entry for entry in bounded.left_out}
     assert told["exact densities"].saved > 0
     assert "exact densities" not in {entry.what for entry in computed.left_out}
@@ -111,12 +108,10 @@ def test_densities_bounded_and_computed(motion, monkeypatch):
     assert (bounded.planes[:, 2] <= computed.planes[:, 2] + 1e-5).all(), "a bound is a lower bound"
 
 
-def test_an_angle_that_is_fixed_and_the_same_angle_searched(monkeypatch):
-    monkeypatch.setattr(families, "REFINE_ROUNDS", ())
-    monkeypatch.setattr(coarse, "MARGIN", np.inf)
+def test_an_angle_that_is_fixed_and_the_same_angle_searched():
     fixed, ranges = case({"weight": [BAND]}, {"step_deg": 30, "alpha_rot_deg": 0, "beta_laser_deg": -60})
     _, free_ranges = case({"weight": [BAND]}, {"step_deg": 30, "alpha_rot_deg": 0})
-    one, all_of_them = search(fixed, ranges), search(fixed, free_ranges)
+    one, all_of_them = (search(fixed, these, effort=EXACT) for these in (ranges, free_ranges))
     at = all_of_them.planes[:, 1] == -60
     assert {e.what: e.saved for e in one.left_out}["search over alpha_rot_deg, beta_laser_deg"] == 2
     np.testing.assert_array_equal(one.planes[:, :2], all_of_them.planes[at, :2])

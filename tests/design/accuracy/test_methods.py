@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from design.accuracy.methods import METHODS, Point, best_points, by_ball_count, by_ball_search, reference
+from design.accuracy.methods import METHODS, by_ball_count, by_ball_search
+from design.accuracy.reference import smooth_reference
+from design.accuracy.work_precision import Point, best_points
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import zones
 from design.errors import TaskError
@@ -39,13 +41,13 @@ def test_the_reference_is_right_without_any_of_our_quadrature(ground):
     g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
     total = simpson(g * np.sin(t), x=t)
     expected = total / (np.cos(band[0]) - np.cos(band[1]))
-    truth = reference(problem, ANGLES)
+    truth = smooth_reference(problem, ANGLES)
     assert pytest.approx(expected, abs=2e-6) == truth.J
     assert truth.J_error < 1e-6
 
 
 def test_the_program_is_as_near_as_it_says(ground):
-    truth = reference(ground, ANGLES)
+    truth = smooth_reference(ground, ANGLES)
     ours = score(ground, ANGLES)
     assert abs(ours.J - truth.J) <= ours.J_error + truth.J_error
 
@@ -59,7 +61,7 @@ def test_every_method_converges_to_the_reference(ground, name):
     method, _, values = METHODS[name]
     # g of the mean count is a bound and keeps its distance: 2e-5 here; harmonics see the region's edges blurred
     within = 3e-3 if name == "harmonics" else 1e-3
-    assert method(ground, ANGLES, values[-1]) == pytest.approx(reference(ground, ANGLES).J, abs=within)
+    assert method(ground, ANGLES, values[-1]) == pytest.approx(smooth_reference(ground, ANGLES).J, abs=within)
 
 
 def point(seconds, error):
@@ -113,7 +115,7 @@ def test_a_tolerance_and_a_budget_choose_from_the_front():
 
 def test_a_looser_task_states_a_larger_error_and_keeps_it():
     loaded = load_task(Path("ground_ahead"))
-    truth = reference(problem_of(loaded), ANGLES)
+    truth = smooth_reference(problem_of(loaded), ANGLES)
     stated = []
     for tolerance in (3e-3, 1e-4, 3e-5):
         density = loaded.task.density.model_copy(update={"tolerance": tolerance})

@@ -10,7 +10,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import problem_of
 from design.objective.score import Score, score, score_on
-from design.search import families
+from design.search import families, refinement
 from design.search.constraints import Requirements, fan_reach
 from design.search.search import search
 from design.sphere.directions import weighted_samples
@@ -102,9 +102,9 @@ def test_a_minimum_that_all_nodes_refuse_is_left_for_the_nearest_place_on_the_wa
             return kept if angles_deg[0] <= 3.5 else None
 
     edge = Edge(problem_of(loaded()), Limits(), True)
-    setting, found = families._allowed(refined, leader, edge)
+    setting, found = refinement.allowed_setting(refined, leader, edge)
     assert found == kept and setting.tolist() == [3.4, -1.7, 0.85, 0.0]
-    assert families._allowed(refined + 9, leader + 9, edge)[1] is None
+    assert refinement.allowed_setting(refined + 9, leader + 9, edge)[1] is None
 
 
 def test_where_nothing_is_free_of_holes_the_smallest_share_is_told(monkeypatch):

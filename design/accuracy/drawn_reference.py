@@ -14,7 +14,7 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from design.arrays import Array, Mask, Setting
+from design.arrays import Array, Ints, Mask, Setting
 from design.motion import Spin, StopAndGo, Sweep
 from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
 from design.task.task import LoadedTask
@@ -38,7 +38,14 @@ class Counted:
 
 
 def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = POINTS) -> Counted:
-    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+
+    Args:
+        loaded: the task.
+        angles_rad: the setting.
+        seed: of the scramblings.
+        points: directions that each scrambling draws in every region; a power of two.
+    """
     layers = _layers(loaded)
     ball = np.radians(loaded.task.density.ball_radius_deg)
     to_rot = Rotation.from_euler("XY", angles_rad[:2]).inv()
@@ -50,7 +57,7 @@ def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = 
     objective = loaded.task.density.objective
     moments, least, none = [], np.iinfo(int).max, 0.0
 
-    def counted(cubes: list[Array]) -> tuple[Array, Array, Array, Array]:
+    def counted(cubes: list[Array]) -> tuple[Ints, Array, Array, Array]:
         directions, value, area, required, phase = _weighted(layers, cubes)
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
         counts = repeats * _counts(to_rot.apply(directions), beams[order], turned, mine, lines, first, ball)
@@ -265,7 +272,7 @@ def _weighted(
     return d, np.where(seen, value, 0.0), 1 / np.where(seen, often, np.inf), required, phase
 
 
-def _lines(loaded: LoadedTask) -> tuple[Array, Array, int, float]:
+def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
     """Sorted joint angles [rad, 0 .. 2 pi] of start phases, one after the other; where each begins; repeats.
 
     And how far the start phase turns all lines alike: a grid of phases would beat with that of the lines.
@@ -300,8 +307,8 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Array, int, float]:
 
 @njit(cache=True)
 def _counts(
-    directions: Array, beams: Array, turned: Array, listed: Array, lines: Array, first: Array, ball: float
-) -> Array:
+    directions: Array, beams: Array, turned: Array, listed: Ints, lines: Array, first: Ints, ball: float
+) -> Ints:
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
@@ -331,7 +338,7 @@ def _counts(
     return counts
 
 
-def _moments(objective: str, counts: Array, value: Array, area: Array, required: Array) -> Array:
+def _moments(objective: str, counts: Ints, value: Array, area: Array, required: Array) -> Array:
     """What `_joined` takes: integrals over the weight, and over what has one."""
     weight, logs = value * area, np.log(1 + counts)
     if objective == "required":

@@ -1,0 +1,138 @@
+"""Error against run time of every way to compute J at one setting: what the numerical defaults are chosen from."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.accuracy.front import undominated
+from design.accuracy.methods import Method, methods_for
+from design.accuracy.reference import Reference, is_smooth, reference
+from design.arrays import Array, Setting
+from design.errors import ScanwrightError
+from design.objective.problem import Problem
+from design.task.task import LoadedTask
+
+REPEATS = 5
+SLOW_S = 2.0  # a point slower than this is timed once
+LOOK_DEG = 2.0  # how far around the setting a method's own minimum is looked for
+LOOKS = 9
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One method at one setting of its knob; NaN and a word in `failed` where it gave no answer.
+
+    Attributes:
+        method: its name.
+        setting: the knob and its value.
+        J: its answer.
+        J_error: distance from the reference.
+        argmin_error_deg: distance of its minimum over beta_laser from that of the reference; NaN where not looked for.
+        seconds: of the repeats, shortest to longest.
+        peak_mb: highest memory that Python and NumPy asked for.
+        chosen: whether the program begins with it.
+        failed: why there is no answer.
+    """
+
+    method: str
+    setting: str
+    J: float
+    J_error: float
+    argmin_error_deg: float
+    seconds: tuple[float, ...]
+    peak_mb: float
+    chosen: bool = False
+    failed: str = ""
+
+    @property
+    def median_s(self) -> float:
+        """Median of the repeats [s]; infinite where there is no answer."""
+        return float(np.median(self.seconds)) if self.seconds else np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class _Nearby:
+    """Where the minimum over beta_laser is looked for, and where the reference has it [deg from the setting]."""
+
+    steps_deg: Array
+    minimum_deg: float
+
+
+def measure_methods(
+    loaded: LoadedTask, problem: Problem, angles_rad: Setting, progress: Progress
+) -> tuple[Reference, list[Point]]:
+    """All methods at all their knobs on one setting, against the reference.
+
+    The minima of methods are compared where the reference is smooth: a drawn one jumps more than they are apart.
+    """
+    progress("reference")
+    truth = reference(loaded, problem, angles_rad)
+    nearby = None
+    if is_smooth(problem):
+        steps = LOOK_DEG * np.linspace(-1, 1, LOOKS)
+        J = [reference(loaded, problem, _turned(angles_rad, d)).J for d in steps]
+        nearby = _Nearby(steps, _minimum(steps, J))
+    points = []
+    for name, (method, knob, values) in methods_for(problem).items():
+        for value in values:
+            progress(f"{name}, {value} {knob}")
+            points.append(_point(problem, angles_rad, truth, nearby, name, method, knob, value))
+    return truth, points
+
+
+def best_points(points: list[Point], reference_error: float) -> list[bool]:
+    """Whether no other point is both faster and nearer; errors below the reference's own count as equal."""
+    costs = np.array([[p.median_s, max(p.J_error, reference_error)] for p in points])
+    answered = np.isfinite(costs[:, 1])
+    return (undominated(np.where(answered[:, None], costs, np.inf)) & answered).tolist()
+
+
+def _point(
+    problem: Problem,
+    angles_rad: Setting,
+    truth: Reference,
+    nearby: _Nearby | None,
+    name: str,
+    method: Method,
+    knob: str,
+    value: int,
+) -> Point:
+    setting = f"{value} {knob}"
+    chosen = name in ("segments", "directions") and value == problem.nodes
+    try:
+        J = method(problem, angles_rad, value)  # and warms up
+        tracemalloc.start()
+        method(problem, angles_rad, value)
+        peak = tracemalloc.get_traced_memory()[1] / 1e6
+        tracemalloc.stop()
+    except (ScanwrightError, MemoryError, np.linalg.LinAlgError) as error:
+        return Point(name, setting, np.nan, np.nan, np.nan, (), np.nan, failed=str(error))
+    seconds: list[float] = []
+    while len(seconds) < REPEATS and (not seconds or seconds[0] < SLOW_S):
+        start = time.perf_counter()
+        method(problem, angles_rad, value)
+        seconds.append(time.perf_counter() - start)
+    moved = np.nan
+    if nearby is not None and seconds[0] < SLOW_S:
+        around = [method(problem, _turned(angles_rad, d), value) for d in nearby.steps_deg]
+        moved = abs(_minimum(nearby.steps_deg, around) - nearby.minimum_deg)
+    return Point(name, setting, J, abs(J - truth.J), moved, tuple(sorted(seconds)), peak, chosen)
+
+
+def _turned(angles_rad: Setting, degrees: float) -> Setting:
+    return angles_rad + np.array([0.0, 0.0, 0.0, np.radians(degrees)])
+
+
+def _minimum(x: Array, y: list[float]) -> float:
+    """Where the parabola through the lowest sample and its neighbours is lowest."""
+    i = int(np.clip(np.argmin(y), 1, len(y) - 2))
+    a, b, c = y[i - 1], y[i], y[i + 1]
+    bend = a - 2 * b + c
+    return float(x[i] + (0 if bend <= 0 else np.clip((a - c) / (2 * bend), -1, 1)) * (x[1] - x[0]))

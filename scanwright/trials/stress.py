@@ -1,0 +1,129 @@
+"""Stiff and extreme cases of the emulated servo, and of the way from a range to a point: their answers are known.
+
+The servo: whatever it carries, however its teeth and loops are, it ends at the speed at which its torque is that of
+friction, or at the one that its loop holds; what is stalled is held where the two springs balance. Ranges: a point is
+as far from the optical centre as its beam was long, from a millimetre to ten kilometres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from design.accuracy.stress import StressRow, row
+from design.angles import Angles, AngleSet
+from design.motion import Spin
+from design.scene.ray_caster import build_scene, cast
+from firmware_io.assembly.deskew import deskew
+from firmware_io.samples import JointLog, Scan
+from firmware_io.twins.dynamics import HornMotion, Motion
+from firmware_io.twins.servo_plant import Actuation, Load, Plant, equations
+from firmware_io.twins.world import furnished_room
+
+SETTLED = 25.0  # time constants of rotor and load
+GOAL_RAD_S = 1.0
+RINGS_S, RK_STEPS = 0.05, 25_000
+BRAKE = 50.0  # stall torques a radian: the spring that holds a blocked horn
+SIZES = 1e-3, 1.0, 1e3, 1e4
+ROTORS_KG_M2 = {"next to nothing": 1e-8, "a screw": 1e-6, "a lidar": 5e-4, "a machine": 0.5, "a car": 50.0}
+
+
+def servo_rows(plant: Plant) -> Iterator[StressRow]:
+    """A plant with light and heavy rotors, stiff and soft teeth, no play and much, loops slow and tight, stalled."""
+    full = Actuation("share", 1.0)
+    for name, inertia in ROTORS_KG_M2.items():
+        yield _speed(f"servo at full duty, it turns {name} ({inertia:g} kg m2)", plant, Load(inertia), full)
+    for factor in (1e-2, 1e2):
+        teeth = replace(plant, stiffness_nm_rad=factor * plant.stiffness_nm_rad)
+        yield _speed(f"servo at full duty, teeth {factor:g} times as stiff", teeth, Load(), full)
+    for play_deg in (0.0, 5.0):
+        loose = replace(plant, backlash_rad=math.radians(play_deg))
+        yield _speed(f"servo at full duty, {play_deg:g} deg of play", loose, Load(), full)
+    for factor in (0.1, 1.0):
+        loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
+        end = _end(loop, Load(), Actuation("velocity", GOAL_RAD_S))
+        yield row(f"servo's loop, gains {factor:g} times as high", "speed held", GOAL_RAD_S, end.rate_rad_s, 1e-3)
+    for factor in (10.0, 100.0):  # it rings, and hits its teeth on both sides: no law, but another integrator
+        yield _ringing(f"servo's loop, gains {factor:g} times as high: it rings", plant, factor)
+    for name, inertia in ROTORS_KG_M2.items():
+        yield _stalled(f"servo stalled at full duty with {name}", plant, Load(inertia))
+
+
+def range_rows() -> Iterator[StressRow]:
+    """Rooms and beams from a millimetre to ten kilometres."""
+    directions = np.random.default_rng(0).normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    walls_m = furnished_room()
+    near = cast(build_scene(walls_m), np.zeros((2000, 3)), directions).range_m
+    for size in SIZES:
+        far = cast(build_scene(size * walls_m), np.zeros((2000, 3)), directions).range_m
+        off = float(np.abs(far / (size * near) - 1).max())
+        yield StressRow(f"a room {size:g} times as large", "ranges in it", 1.0, 1.0 + off, off, 1e-9)
+    angles = AngleSet(
+        task="stress",
+        angles_deg=Angles(alpha_rot=10, beta_rot=-55, alpha_laser=-80, beta_laser=75),
+        sensor="UTM-30LX",
+        servo="MX-64R",
+        motion=Spin(period_s=2.0),
+    )
+    log = JointLog(np.array([0, 10**9]), np.array([0.0, math.pi]))
+    centre_m = angles.T_world_rot(0.0)[:3, 3]
+    for size in SIZES:
+        scan = Scan(
+            stamp_ns=10**8,
+            angle_min_rad=-2.0,
+            angle_increment_rad=0.01,
+            time_increment_s=1e-5,
+            scan_time_s=0.025,
+            range_min_m=0.0,
+            range_max_m=1e5,
+            range_m=np.full(400, size, np.float32),
+            intensity=np.empty(0, np.float32),
+        )
+        long = np.linalg.norm(deskew(scan, log, angles) - centre_m, axis=1)
+        off = float(np.abs(long / np.float32(size) - 1).max())
+        yield StressRow(f"beams of {size:g} m", "length of their points", 1.0, 1.0 + off, off, 1e-9)
+
+
+def _speed(case: str, plant: Plant, load: Load, drive: Actuation) -> StressRow:
+    """What is left of the no-load speed when friction takes its share of the torque."""
+    friction = (plant.friction_nm + load.bearing_nm) / plant.stall_torque_nm
+    expected = plant.no_load_rad_s * (drive.goal - friction)
+    return row(case, "end speed", expected, _end(plant, load, drive).rate_rad_s, 1e-4)
+
+
+def _ringing(case: str, plant: Plant, factor: float) -> StressRow:
+    """Where the horn is after a while, beside the classical Runge-Kutta rule in steps of 2 us."""
+    loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
+    drive = Actuation("velocity", GOAL_RAD_S)
+    axis = HornMotion(loop, Load(), 0)
+    axis.drive(0, drive)
+    rhs, t, h = equations(loop, Load(), drive, 0.0, 0.0, 0.0), 0.0, RINGS_S / RK_STEPS
+    y = np.array([0, 0, 0, 0, GOAL_RAD_S / plant.no_load_rad_s, 0])  # the integral begins at what the speed will need
+    for _ in range(RK_STEPS):
+        a = np.array(rhs(t, y))
+        b = np.array(rhs(t + h / 2, y + h / 2 * a))
+        c = np.array(rhs(t + h / 2, y + h / 2 * b))
+        d = np.array(rhs(t + h, y + h * c))
+        y, t = y + h / 6 * (a + 2 * b + 2 * c + d), t + h
+    return row(case, "angle after 50 ms", float(y[2]), axis.motion(round(1e9 * RINGS_S)).angle_rad, 1e-4)
+
+
+def _stalled(case: str, plant: Plant, load: Load) -> StressRow:
+    """A blocked horn gives way until the brake's spring balances the motor, or less by what friction may carry."""
+    end = _end(plant, load, Actuation("share", 1.0, blocked=True))
+    return row(case, "way it gives", 1 / BRAKE, end.angle_rad, plant.friction_nm / plant.stall_torque_nm)
+
+
+def _end(plant: Plant, load: Load, drive: Actuation) -> Motion:
+    """The horn when all has settled; NaN where the solver gave up."""
+    constant_s = (plant.inertia_kg_m2 + load.inertia_kg_m2) * plant.no_load_rad_s / plant.stall_torque_nm
+    axis = HornMotion(plant, load, 0)
+    axis.drive(0, drive)
+    try:
+        return axis.motion(round(1e9 * max(SETTLED * constant_s, 5.0)))
+    except ArithmeticError:
+        return Motion(math.nan, math.nan, math.nan, math.nan)

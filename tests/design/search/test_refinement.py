@@ -1,0 +1,80 @@
+"""The simplex against scipy's: same steps, fewer values, nothing beyond the bounds; and where it walks."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize, rosen
+
+from design.frames import R_world_rot
+from design.objective.problem import problem_of
+from design.search.grid_classes import plane_key
+from design.search.refinement import Enough, _Chart, lowest_by_simplex
+from design.search.search import search
+from design.task.task import load_task
+
+CORNERS = np.array([[-1.2, 0.8, 0.5], [-0.7, 0.8, 0.5], [-1.2, 0.4, 0.5], [-1.2, 0.8, 0.9]])
+
+
+@pytest.mark.parametrize("bounds", [[-9.0, 9.0], [-2.0, 0.9]])
+def test_it_goes_where_that_of_scipy_goes(bounds):
+    bounds = np.array([bounds] * 3)
+    values = np.array([rosen(corner) for corner in CORNERS])
+    found = lowest_by_simplex(rosen, CORNERS, values, bounds, Enough(1e-6, 1e-9, 2000))
+    options = {"initial_simplex": CORNERS, "xatol": 1e-6, "fatol": 1e-9}
+    theirs = minimize(rosen, CORNERS[0], method="Nelder-Mead", bounds=bounds, options=options)
+    assert found == pytest.approx(theirs.x, abs=1e-9)
+
+
+@pytest.mark.parametrize("most", [3, 4, 31, 62])
+def test_it_takes_no_more_values_than_it_may(most):
+    taken = []
+
+    def counted(point):
+        taken.append(point)
+        return rosen(point)
+
+    values = np.array([rosen(corner) for corner in CORNERS])
+    found = lowest_by_simplex(counted, CORNERS, values, np.array([[-9.0, 9.0]] * 3), Enough(1e-6, 1e-9, most))
+    assert len(taken) <= most + len(CORNERS) - 1, "only a simplex that shrinks is brought to its end"
+    assert rosen(found) == min([*values, *(rosen(point) for point in taken)])
+
+
+def test_what_is_refused_is_kept_off():
+    """The lowest value lies at the edge of what is allowed; beyond it the values would be lower still."""
+
+    def value(point):
+        return point.sum() if (point >= 1).all() else np.inf
+
+    corners = np.array([[3.0, 3.0], [2.5, 3.0], [3.0, 2.5]])
+    found = lowest_by_simplex(value, corners, corners.sum(axis=1), np.array([[-9.0, 9.0]] * 2), Enough(1e-3, 1e-3, 200))
+    assert found == pytest.approx([1, 1], abs=0.05)
+
+
+@given(st.tuples(st.floats(-180, 180), st.floats(-90, 90), st.floats(-90, 90), st.floats(-90, 90)), st.integers(0, 3))
+def test_a_step_of_a_coordinate_is_as_long_on_its_sphere_also_at_a_pole(angles, which):
+    limits = np.array([[-180.0, 180.0], [-90.0, 90.0], [-90.0, 90.0], [-90.0, 90.0]])
+    chart = _Chart(np.array(angles), np.ones(4, dtype=bool), limits, on_spheres=True)
+    before, after = (
+        np.radians(chart.setting(moved)) for moved in (np.zeros(4), np.where(np.arange(4) == which, 3.0, 0.0))
+    )
+    axes = [R_world_rot(*setting[:2])[:, 2] for setting in (before, after)]
+    keys = [np.append(key, np.sqrt(max(1 - key @ key, 0))) for key in plane_key(np.array([before[2:], after[2:]]))]
+    apart = np.degrees([np.linalg.norm(axes[0] - axes[1]), np.linalg.norm(keys[0] - keys[1])])
+    moved, still = (0, 1) if which < 2 else (1, 0)
+    assert apart[still] < 1e-5
+    assert apart[0] == pytest.approx(3.0, abs=1e-3) if moved == 0 else apart[1] <= 3.001  # q may be mirrored back
+
+
+def test_an_optimum_beside_a_pole_is_found_from_any_grid():
+    """The simplex over angles stopped at beta_laser = -90, where alpha moves nothing: J = -6.1848 on a grid of 10."""
+    loaded = load_task(Path("ground_ahead"))
+    cones = (((0.365, 0.294, 0.028), 36.0), ((-0.163, -0.482, 0.599), 15.0))
+    weight = [{"shape": "cone", "axis": axis, "half_angle_deg": half} for axis, half in cones]
+    task = loaded.task.model_validate(loaded.task.model_dump() | {"weight": weight, "mask": []})
+    for step in (20.0, 10.0):
+        found = search(problem_of(replace(loaded, task=task)), task.angles.model_copy(update={"step_deg": step}))
+        assert found.best[0].score.J < -6.189
