@@ -94,6 +94,7 @@ SERVOS = {  # model and protocol
     "protocol 2.0": ("MX-64R", "2.0"),
     "XL430-W250": ("XL430-W250", "2.0"),
     "STS3215": ("STS3215", "STS"),
+    "PD42-3-1140": ("PD42-3-1140", "TMCL"),
 }
 LIDARS = ("STL27L", "RPLIDAR A2", "TiM561", "LMS 200")  # one of each family
 ALL = [
@@ -101,7 +102,7 @@ ALL = [
     *[name for name in (*INSIDE, *SIGNALS, FULL_DISK) if name != "servo unplugged"],
     *[
         f"{name}, {servo}"
-        for servo in ("XL430-W250", "STS3215")
+        for servo in ("XL430-W250", "STS3215", "PD42-3-1140")
         for name in ("servo unplugged", "stall", "garbage", "servo brown-out", "kill -9")
     ],
     *[
@@ -199,6 +200,8 @@ def trial(name: str, seed: int) -> Outcome:
     ):
         out = Path(folder)
         (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        if protocol == "TMCL":  # as `servo-setup --baud 1000000` leaves it: at its 9600 it tells nine angles a second
+            twins.servo.memory[1065] = 11
         return inside(out, twins, INSIDE[fault]) if fault in INSIDE else outside(out, twins, SIGNALS.get(fault))
 
 

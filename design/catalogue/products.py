@@ -171,7 +171,7 @@ class Servo(Product):
     case_screw: Literal["M2", "M2.5", "M3"]
     case_holes_mm: tuple[Pair, ...] = Field(min_length=4)
     case_holes_z_mm: float
-    case_rear_holes_mm: tuple[Pair, ...] = Field(min_length=4)
+    case_rear_holes_mm: tuple[Pair, ...] = Field(description="at least four, or none where something covers the back")
     case_rear_holes_z_mm: float
     usb_ids: tuple[UsbId, ...] | None = Field(
         default=None,

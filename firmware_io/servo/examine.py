@@ -59,11 +59,11 @@ def examine_servo(port: str, model: str | None, servo_id: int | None) -> ServoEx
         listen_first(bus)
         unit = find_servo(bus, model, servo_id)
         table = unit.table
-        reports, has_torque = unit.told(unit.read(table.block)), bool(unit.count(table.torque))
+        reports, has_torque = unit.told(unit.present()), unit.has_torque()
         unfit = tuple(unfit_settings(unit))
         bus.return_delay_ns = unit.value(table.return_delay_ns)
         began_s = time.monotonic()
-        answers = [unit.read(table.block) for _ in range(_READS)]
+        answers = [unit.present() for _ in range(_READS)]
         reads_hz = _READS / (time.monotonic() - began_s)
         return ServoExamination(
             who=str(unit),

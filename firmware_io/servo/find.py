@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.bus import BROADCAST, ServoBus
+from firmware_io.servo.bus.bus import ServoBus
 from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.servo.bus.unit import PING_S, ServoUnit
@@ -96,7 +96,7 @@ def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
     for speed, packets in _ways(None, baud):
         bus.packets = packets
         if bus.set_baud(speed):
-            found |= {(speed, number) for number in bus.ping(BROADCAST, PING_S)}
+            found |= {(speed, number) for number in bus.ping(packets.everyone, PING_S)}
     return sorted(found)
 
 
@@ -126,7 +126,7 @@ def _answering(
     for speed, packets in _ways(model, baud):
         bus.packets = packets
         if bus.set_baud(speed):
-            answering = bus.ping(BROADCAST if servo_id is None else servo_id, wait_s)
+            answering = bus.ping(packets.everyone if servo_id is None else servo_id, wait_s)
             if len(answering) > 1:
                 raise DeviceError(f"{bus.port}: servos {answering} answer: say which one with --servo-id")
             if answering:

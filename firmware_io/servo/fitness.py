@@ -44,7 +44,8 @@ def prepare(unit: ServoUnit) -> tuple[str, ...]:
     """
     notes, table, bus = [], unit.table, unit.bus
     unit.answer_everything()
-    if reported := unit.told(unit.write(table.torque, 0)):
+    stopped = unit.write(table.torque, 0)
+    if reported := unit.told(unit.present() if table.alarms else stopped):
         notes.append(f"it reported {reported} and was reset: find out why before it turns again")
         _recover(unit)
     for register, count in table.neutral:
@@ -69,20 +70,23 @@ def unfit_settings(unit: ServoUnit) -> list[Unfit]:
     """What is not, or was not, as the driver wants it; only asks. The order is the one in which it can be set."""
     table = unit.table
     level, delay = table.status_return, table.return_delay_ns
+    levels = () if level is None else ((level, table.answers_all),)
     wanted: list[tuple[Setting, str]] = [
-        ((level, table.answers_all), "so that it does not answer what it is told"),
+        *((setting, "so that it does not answer what it is told") for setting in levels),
         *((setting, _HARM_NEUTRAL) for setting in table.neutral),
         ((delay, 0), f"so that its answers come {unit.value(delay) / 1e3:g} us late"),
     ]
     known = [(register, unit.count(register), count, harm) for (register, count), harm in wanted]
-    muted = [Unfit(level, 0, table.answers_all, "so that it answers nothing but pings")] if unit.was_mute else []
+    muted = (
+        [Unfit(level, 0, table.answers_all, "so that it answers nothing but pings")] if unit.was_mute and level else []
+    )
     return [*muted, *(Unfit(*one) for one in known if one[1] != one[2]), *_slow(unit)]
 
 
 def settable(table: ControlTable) -> dict[str, Register]:
     """The settings that `unfit_settings` may name, and the number of the servo, by their names."""
     registers = [
-        table.status_return,
+        *([table.status_return] if table.status_return else []),
         table.return_delay_ns,
         table.baud,
         table.id,
@@ -109,6 +113,8 @@ def slow_adapter(port: str) -> str | None:
 def _recover(unit: ServoUnit) -> None:
     """Let it turn again: the torque limit, which is less after a shutdown; without such a register by a restart."""
     table = unit.table
+    if table.alarms:  # to read it was enough
+        return
     if table.torque_limit and table.max_torque:
         unit.bus.write(unit.id, table.torque_limit, unit.read(table.max_torque).data)
         return
@@ -122,7 +128,7 @@ def _recover(unit: ServoUnit) -> None:
 def _slow(unit: ServoUnit) -> Iterator[Unfit]:
     """Its speed, where it keeps the servo from being read 100 times a second."""
     table, bus = unit.table, unit.bus
-    wire_s = (bus.packets.overhead + table.block.size) * 10 / bus.baud
+    wire_s = sum(bus.packets.overhead + register.size for register in table.present) * 10 / bus.baud
     if wire_s > _READ_S:
         register, count = table.fast
         harm = f"{bus.baud} baud, so that it can be read {1 / wire_s:.0f} times a second at best"

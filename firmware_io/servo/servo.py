@@ -7,7 +7,7 @@ that it could not be stopped.
 `read` it at least every two seconds: turns are counted from what is read, and a servo that nobody listens to is
 stopped (by the guard process, and by the bus watchdog where the servo has one).
 
-What nobody can help: a servo without a watchdog (protocol 1.0, STS) that spins goes on when its bus is cut.
+What nobody can help: a servo without a watchdog (protocol 1.0, STS, TMCL) that spins goes on when its bus is cut.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, DeviceFaultError
 from firmware_io.servo.bus.bus import ServoAnswer
-from firmware_io.servo.bus.registers import RPM, Setting
+from firmware_io.servo.bus.registers import RPM
 from firmware_io.servo.bus.unit import ServoUnit
 from firmware_io.servo.find import find_servo, open_bus
 from firmware_io.servo.fitness import prepare
@@ -57,7 +57,7 @@ class ServoDriver:
         self.step_rad = abs(table.position.unit)
         self._unit, self._bus, self._table, self._warnings = unit, bus, table, warnings
         self._product = load_catalogue().get(table.model, Servo)
-        self._mode: tuple[Setting, ...] = ()
+        self._spins: bool | None = None  # in wheel mode; None without torque
         self._order: TurnOrder | None = None
         self._known: ServoState | None = None  # the last state with a position, from which turns are counted
         self._guard = Guard(bus.fileno(), *unit.torque_off())
@@ -113,7 +113,7 @@ class ServoDriver:
             DeviceError: the rate is beyond the motor.
         """
         self._check_rate(rate_rad_s)
-        self._enter(self._table.wheel)
+        self._enter(spins=True)
         self._observe()  # turns are counted from here
         self._watch()
         self._unit.write(self._table.wheel_speed, rate_rad_s)
@@ -133,22 +133,22 @@ class ServoDriver:
         if not rate_rad_s > 0:
             raise DeviceError(f"{self}: sweep at {math.degrees(rate_rad_s):.1f} deg/s: choose a rate above 0")
         self._check_rate(rate_rad_s)
-        self._enter(table.joint)
+        self._enter(spins=False)
         self._observe()
         self._watch()
         self._unit.write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
-        self._unit.write(table.goal, angle_rad + table.centre * table.goal.unit)
+        self._unit.write(table.goal, angle_rad + table.centre * table.position.unit)
         self._order = TurnOrder(rate_rad_s, angle_rad)
 
     def hold(self) -> None:
         """Stand where it is, with torque on. An AX-12A that spins only loses its drive, for want of a speed loop."""
         self._observe()
-        if self._mode == self._table.joint:
+        if self._spins is False:
             self._unit.write(self._table.goal, self._here())
-        elif self._mode == self._table.wheel:
+        elif self._spins:
             self._unit.write(self._table.wheel_speed, 0.0)
         else:
-            self._enter(self._table.joint)
+            self._enter(spins=False)
         self._rest()
 
     def release(self) -> None:
@@ -173,11 +173,10 @@ class ServoDriver:
         return state
 
     def _observe(self) -> ServoState:
-        answer = self._unit.read(self._table.block)
+        answer = self._unit.present()
         if answer.conditions:
             self._fault(self._told(answer))
-        spins = self._mode == self._table.wheel
-        state = state_of(self._table, answer, spins=spins, known=self._known, order=self._order)
+        state = state_of(self._table, answer, spins=bool(self._spins), known=self._known, order=self._order)
         if not math.isnan(state.position_rad):
             self._known = state
         return state
@@ -186,9 +185,10 @@ class ServoDriver:
         """The order with the progress made; None when the goal is reached."""
         progress = follow(order, state, self.step_rad)
         if isinstance(progress, Stall):
-            if self._unit.value(self._table.torque) == 0:
+            if not self._unit.has_torque():
                 self._fault(f"it has restarted by itself, {state.voltage_V:.1f} V now: {_ADVICE['voltage']}")
-            self._fault(f"{progress}, load {state.load:.0%}: {_ADVICE['overload']}")
+            load = "" if math.isnan(state.load) else f", load {state.load:.0%}"
+            self._fault(f"{progress}{load}: {_ADVICE['overload']}")
         if progress is None:
             self._rest()
         return progress
@@ -210,7 +210,7 @@ class ServoDriver:
         raise error
 
     def _neglected(self) -> NoReturn:
-        self._order, self._mode = None, ()
+        self._order, self._spins = None, None
         heard = self._guard.dismiss(stands=False)
         stopped = "so it was stopped" if heard else "and did not answer when it was to be stopped: take its power"
         neglected = f"not read for {SILENCE_S:g} s while it turned, {stopped}"
@@ -222,22 +222,28 @@ class ServoDriver:
             fastest = f"at most {math.degrees(fastest_rad_s):.0f} deg/s, at {self._product.rated_v:g} V"
             raise DeviceError(f"{self}: rate {math.degrees(rate_rad_s):.1f} deg/s: {fastest} and without load")
 
-    def _enter(self, mode: tuple[Setting, ...]) -> None:
+    def _enter(self, *, spins: bool) -> None:
         """Wheel or joint mode, standing, torque on."""
         table = self._table
-        if mode == self._mode:
+        if spins is self._spins:
             return
         self._stop()
-        for register, count in mode:
+        for register, count in table.wheel if spins else table.joint:
             self._unit.set_kept(register, count)
-        if mode == table.wheel:
+        if table.counters:
+            self._unit.write(table.wheel_speed, 0.0)  # steps that went on without torque, too
+        for counter in table.counters:
+            self._unit.write(counter, self._here())
+        if spins:
             self._unit.write(table.wheel_speed, 0.0)
         else:
             self._unit.write(table.joint_speed, _GENTLE_RAD_S)
             self._unit.write(table.goal, self._here())
             self._known = None
-        self._unit.write(table.torque, 1)
-        self._mode = mode
+        self._unit.write(table.torque, table.torque_on)
+        if table.driven:
+            self._unit.write(table.driven, 1)
+        self._spins = spins
 
     def _watch(self) -> None:
         """From here on, silence stops it."""
@@ -254,13 +260,13 @@ class ServoDriver:
             self._unit.write(self._table.watchdog, 0.0)
 
     def _stop(self) -> None:
-        self._mode, self._order = (), None
+        self._spins, self._order = None, None
         self._unit.write(self._table.torque, 0)
         self._rest()
 
     def _here(self) -> float:
         """The goal that is the present position; in protocol 2.0 that one may count turns, which a goal must not."""
-        return self._unit.value(self._table.position) % ((self._table.last + 1) * self._table.goal.unit)
+        return self._unit.value(self._table.position) % ((self._table.last + 1) * self._table.position.unit)
 
 
 def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:

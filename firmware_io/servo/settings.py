@@ -127,7 +127,7 @@ def check_torque(unit: ServoUnit) -> None:
     Raises:
         DeviceError: its torque is on.
     """
-    if unit.count(unit.table.torque):
+    if unit.has_torque():
         raise DeviceError(
             f"{unit} has its torque on, and holds or turns something: "
             "end what drives it, or switch its power off and on; nothing was changed"

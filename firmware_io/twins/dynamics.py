@@ -74,7 +74,7 @@ class HornMotion:
             t = max((time_ns - self._origin_ns) / 1e9, self._drives[-1][0])
             state = self._states(np.array([t]))[:, 0]
             last_s, last, start, _ = self._drives[-1]
-            walking = last.mode == drive.mode == "position"
+            walking = last.mode == drive.mode and drive.mode in ("position", "steps")
             setpoint = walked_rad(t - last_s, start, last.goal, last.rate_rad_s) if walking else float(state[2])
             if drive.mode != "velocity" or last.mode != "velocity":
                 state[4] = drive.goal / self._plant.no_load_rad_s if drive.mode == "velocity" else 0.0

@@ -61,6 +61,7 @@ def test_all_products_of_the_issue_are_there(shipped):
             "XH430-W350",
             "XM540-W270",
             "STS3215",
+            "PD42-3-1140",
         ),
     }
     assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"}

@@ -37,8 +37,8 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     """Lay out the scanner of a capsule ring.
 
     Raises:
-        BuildError: no bearing or belt of the catalogue fits the capsule, the heads of the horn's screws leave no wall,
-            or the lidar would hang upside down.
+        BuildError: no bearing or belt of the catalogue fits the capsule, the horn stands above the belt, the heads of
+            its screws leave no wall, or the lidar would hang upside down.
     """
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
     assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
@@ -70,6 +70,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     while replace(alone, teeth=teeth).tip_radius - belt.tooth_height_mm < alone.boss_radius + 1.0:
         teeth += TEETH_STEP
     alone = replace(alone, teeth=teeth)
+    _check_horn(alone)
     _check_heads(alone, scanner.printer)
     least = _least_centre(alone, servo)
     stock = sorted(n for n in belt.teeth if centre_of(n, teeth, belt.pitch_mm) >= least)
@@ -120,6 +121,18 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
         raise BuildError(
             f"{BEARING_TOWER}: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
             f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
+        )
+
+
+def _check_horn(stack: BeltStack) -> None:
+    """The pulley's foot reaches down to the horn."""
+    most = stack.teeth_low - stack.horn - stack.servo.case_max_mm[2]
+    if stack.horn > stack.teeth_low:
+        servo = stack.servo
+        raise BuildError(
+            f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.doubt('case_max_mm')}: the horn of "
+            f"{servo.name} stands {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
+            "servo whose horn lies lower"
         )
 
 

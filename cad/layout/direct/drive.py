@@ -12,6 +12,7 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
 from cad.screws import SCREWS
 from design.catalogue.products import Servo
+from design.errors import BuildError
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -95,7 +96,16 @@ def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
 
 
 def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
-    """The servo's case."""
+    """The servo's case.
+
+    Raises:
+        BuildError: it has no holes on its back.
+    """
+    if len(servo.case_rear_holes_mm) < 4:
+        raise BuildError(
+            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(servo.case_rear_holes_mm)}: {servo.name} has no "
+            "four holes on its back to stand on; take a capsule ring, whose plate holds its front, or another servo"
+        )
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:

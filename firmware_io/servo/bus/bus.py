@@ -16,9 +16,6 @@ from firmware_io.servo.bus.packet_format import PacketFormat, Status
 from firmware_io.servo.bus.registers import Register
 from firmware_io.servo.bus.serial_line import SerialLine
 
-PING, READ, WRITE, REBOOT = 1, 2, 3, 8
-BROADCAST = 254
-
 _TRIES = 3
 _EXCUSED = 10  # tries in which this computer was kept from running: they say nothing of the servo
 _LATE = 4  # times the wait for an answer, until it is given up for good
@@ -107,16 +104,16 @@ class ServoBus:
             ProtocolError: what came was damaged, three times.
             DeviceError: the servo refuses.
         """
-        number = self.packets.number
-        return self._ask(servo_id, READ, number(register.address) + number(register.size), register.size)
+        request = self.packets.reading(servo_id, register.address, register.size)
+        return self._ask(servo_id, request, register.size, reads=True)
 
     def write(self, servo_id: int, register: Register, data: bytes) -> ServoAnswer:
         """Write the bytes of a register; raises as `read` does."""
-        return self._ask(servo_id, WRITE, self.packets.number(register.address) + data, 0)
+        return self._ask(servo_id, self.write_packet(servo_id, register, data))
 
     def write_packet(self, servo_id: int, register: Register, data: bytes) -> bytes:
         """The bytes on the wire of a write."""
-        return self.packets.packet(servo_id, WRITE, self.packets.number(register.address) + data)
+        return self.packets.writing(servo_id, register.address, data)
 
     def write_unanswered(self, servo_id: int, register: Register, data: bytes) -> None:
         """Write to a servo that may be set not to answer writes."""
@@ -124,10 +121,10 @@ class ServoBus:
             self._line.port.write(self.write_packet(servo_id, register, data))
 
     def ping(self, servo_id: int, wait_s: float) -> list[int]:
-        """Which servos answer a ping of one, or of all (254), in time; damaged answers are left out."""
+        """Which servos answer a ping of one, or of all, in time; damaged answers are left out."""
         found: set[int] = set()
         with self._port_errors():
-            self._send(self.packets.packet(servo_id, PING, b""), wait_s)
+            self._send(self.packets.ping(servo_id), wait_s)
             while not self._line.isPacketTimeout() and servo_id not in found:
                 with suppress(DeviceTimeoutError, ProtocolError):
                     found.add(self.packets.receive(self._line).id)
@@ -135,16 +132,15 @@ class ServoBus:
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo of protocol 2.0; raises as `read` does."""
-        self._ask(servo_id, REBOOT, b"", 0)
+        self._ask(servo_id, self.packets.reboot(servo_id))
 
-    def _ask(self, servo_id: int, instruction: int, parameters: bytes, expected: int) -> ServoAnswer:
-        request = self.packets.packet(servo_id, instruction, parameters)
+    def _ask(self, servo_id: int, request: bytes, expected: int = 0, *, reads: bool = False) -> ServoAnswer:
         with self._port_errors():
             tries = excused = 0
             while True:
                 try:
                     self._send(request, self._line.wait_s + (expected + 11) * self._line.byte_s)
-                    return self._checked(self._receive(servo_id), instruction, expected)
+                    return self._checked(self._receive(servo_id), expected, reads=reads)
                 except (DeviceTimeoutError, ProtocolError) as error:
                     silent = isinstance(error, DeviceTimeoutError)
                     if silent and self._line.overslept() and excused < _EXCUSED:
@@ -175,11 +171,11 @@ class ServoBus:
             if status.id == servo_id:
                 return status
 
-    def _checked(self, status: Status, instruction: int, expected: int) -> ServoAnswer:
+    def _checked(self, status: Status, expected: int, *, reads: bool) -> ServoAnswer:
         meaning, complete = self.packets.meaning(status.error), len(status.data) == expected
         if meaning.damaged:
             raise ProtocolError("the request arrived damaged: look at cable and ground")
-        if meaning.refusal and not (complete and instruction == READ):  # a read that brings its values was no mistake
+        if meaning.refusal and not (complete and reads):  # a read that brings its values was no mistake
             raise DeviceError(f"{self.port}: servo {status.id}: refused: {meaning.refusal}")
         if not complete:
             raise ProtocolError(f"{len(status.data)} bytes where {expected} were asked for")

@@ -49,12 +49,20 @@ class PacketFormat(Protocol):
     """As the maker calls it: "2.0"."""
     overhead: int
     """Bytes of a reading, request and answer, around its values."""
+    everyone: int
+    """The number that all answer to; where there is none, the one that they have from the factory."""
 
-    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
-        """The bytes of a request."""
+    def ping(self, servo_id: int) -> bytes:
+        """The request to say no more than that it is there."""
 
-    def number(self, value: int) -> bytes:
-        """An address or a length, as requests carry it."""
+    def reading(self, servo_id: int, address: int, size: int) -> bytes:
+        """The request for the values at an address."""
+
+    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
+        """The request to take these values to an address."""
+
+    def reboot(self, servo_id: int) -> bytes:
+        """The request to restart."""
 
     def acknowledged(self, servo_id: int) -> bytes:
         """What the answer to a write that was obeyed begins with."""

@@ -98,6 +98,13 @@ class ControlTable:
         max_torque: what `torque_limit` is when the servo starts; after a shutdown it is less.
         lock: 1 in it keeps settings as they are, or writes to them from outlasting the power.
         watchdog: stops a servo to which nobody talks for so long.
+        torque_on: count of `torque` with which it holds.
+        scattered: True where each value has a request of its own, instead of all in one stretch of addresses.
+        alarms: among the present values, what it reports of itself, eight bits of `faults` each; reading clears them.
+            None where each answer tells.
+        driven: memory that a restart clears, which the driver sets beside the torque, of a servo that has its torque as
+            soon as it has its power.
+        counters: what counts the steps that are sent to the motor, and must say the encoder's angle before it holds.
     """
 
     model: str
@@ -118,12 +125,12 @@ class ControlTable:
     id: Register
     baud: Register
     return_delay_ns: Register
-    status_return: Register
+    status_return: Register | None
     torque: Register
     wheel_speed: Register
     joint_speed: Register
     goal: Register
-    load: Register
+    load: Register | None
     velocity: Register
     position: Register
     voltage: Register
@@ -133,6 +140,11 @@ class ControlTable:
     hardware_error: Register | None = None
     lock: Register | None = None
     watchdog: Register | None = None
+    torque_on: int = 1
+    scattered: bool = False
+    alarms: tuple[Register, ...] = ()
+    driven: Register | None = None
+    counters: tuple[Register, ...] = ()
 
     @property
     def protocol(self) -> str:
@@ -165,22 +177,30 @@ class ControlTable:
     @property
     def reach_rad(self) -> tuple[float, float]:
         """The angles that it can go to, and tell."""
-        ends = [(count - self.centre) * self.goal.unit for count in (0, self.last)]
+        ends = [(count - self.centre) * self.position.unit for count in (0, self.last)]
         return min(ends), max(ends)
 
     @property
-    def block(self) -> Register:
-        """All present values as one stretch of addresses, to be read in one transaction."""
-        present = (self.load, self.velocity, self.position, self.voltage, self.temperature)
-        first = min(register.address for register in present)
-        return Register(first, max(register.address + register.size for register in present) - first)
+    def present(self) -> tuple[Register, ...]:
+        """What is asked for to know all present values, each in a transaction; the one with the position is first."""
+        asked = (self.position, *self.alarms, self.load, self.velocity, self.voltage, self.temperature)
+        values = tuple(register for register in asked if register)
+        if self.scattered:
+            return values
+        first = min(register.address for register in values)
+        return (Register(first, max(register.address + register.size for register in values) - first),)
 
     def names(self, code: int) -> str:
         """The faults that a fault byte tells of."""
         named = " and ".join(name for bit, name in self.faults.items() if code >> bit & 1)
         return named or f"fault code {code}"
 
-    def pick(self, register: Register, block: bytes) -> float:
-        """One value out of the block."""
-        start = register.address - self.block.address
-        return register.decode(block[start : start + register.size])
+    def pick(self, register: Register | None, data: bytes) -> float:
+        """One value out of those of `present`; NaN where the servo tells none."""
+        if register is None:
+            return math.nan
+        if self.scattered:
+            start = sum(one.size for one in self.present[: self.present.index(register)])
+        else:
+            start = register.address - self.present[0].address
+        return register.decode(data[start : start + register.size])

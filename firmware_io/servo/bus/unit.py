@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo.bus.bus import ServoAnswer, ServoBus
@@ -35,6 +35,19 @@ class ServoUnit:
     def read(self, register: Register) -> ServoAnswer:
         """The bytes of a register or a block; raises as `ServoBus.read`."""
         return self.bus.read(self.id, register)
+
+    def present(self) -> ServoAnswer:
+        """The present values, for `ControlTable.pick`, and the time of the position; raises as `ServoBus.read`."""
+        answers = [self.read(register) for register in self.table.present]
+        data, table = b"".join(answer.data for answer in answers), self.table
+        codes = [round(table.pick(alarm, data)) & 0xFF for alarm in table.alarms]
+        alarm = int.from_bytes(codes, "little") & sum(1 << bit for bit in table.faults)
+        return replace(answers[0], data=data, conditions=alarm if table.alarms else answers[0].conditions)
+
+    def has_torque(self) -> bool:
+        """Whether it holds or turns because somebody has told it to."""
+        table = self.table
+        return bool(self.count(table.torque)) and (table.driven is None or bool(self.count(table.driven)))
 
     def value(self, register: Register) -> float:
         """What a register holds, in SI units."""
@@ -127,6 +140,8 @@ class ServoUnit:
     def answer_everything(self) -> None:
         """Let it answer whatever is asked of it or told to it."""
         level = self.table.status_return
+        if level is None:
+            return
         with_answer = level.encode(self.table.answers_all)
         try:
             answers = self.read(level).data == with_answer

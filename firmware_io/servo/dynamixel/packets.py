@@ -19,6 +19,8 @@ from design.errors import DeviceTimeoutError, ProtocolError
 from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
 from firmware_io.servo.bus.serial_line import SerialLine
 
+_PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
+_EVERYONE = 254
 _CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
 _CHECKSUM_1 = 0b0001_0000
 _REFUSALS_1 = {2: "an angle beyond its limits", 8: "a value out of range", 64: "an instruction it does not know"}
@@ -40,6 +42,7 @@ class Protocol1:
 
     protocol = "1.0"
     overhead = 14
+    everyone = _EVERYONE
 
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
         """The bytes of a request."""
@@ -47,9 +50,21 @@ class Protocol1:
         Protocol1PacketHandler().txPacket(tape, [0, 0, servo_id, *length, instruction, *parameters, 0])
         return tape.packet
 
-    def number(self, value: int) -> bytes:
-        """An address or a length."""
-        return value.to_bytes(1, "little")
+    def ping(self, servo_id: int) -> bytes:
+        """As `PacketFormat.ping`, and so are those below."""
+        return self.packet(servo_id, _PING, b"")
+
+    def reading(self, servo_id: int, address: int, size: int) -> bytes:
+        """The request for the values at an address."""
+        return self.packet(servo_id, _READ, address.to_bytes(1, "little") + size.to_bytes(1, "little"))
+
+    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
+        """The request to take these values to an address."""
+        return self.packet(servo_id, _WRITE, address.to_bytes(1, "little") + values)
+
+    def reboot(self, servo_id: int) -> bytes:
+        """The request to restart, which only protocol 2.0 knows."""
+        return self.packet(servo_id, _REBOOT, b"")
 
     def acknowledged(self, servo_id: int) -> bytes:
         """What the answer to a write begins with; whatever the servo reports of itself."""
@@ -73,6 +88,7 @@ class Protocol2:
 
     protocol = "2.0"
     overhead = 25
+    everyone = _EVERYONE
 
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
         """The bytes of a request."""
@@ -81,9 +97,21 @@ class Protocol2:
         Protocol2PacketHandler().txPacket(tape, [0, 0, 0, 0, servo_id, *length, instruction, *parameters, 0, 0])
         return tape.packet
 
-    def number(self, value: int) -> bytes:
-        """An address or a length."""
-        return value.to_bytes(2, "little")
+    def ping(self, servo_id: int) -> bytes:
+        """As `PacketFormat.ping`, and so are those below."""
+        return self.packet(servo_id, _PING, b"")
+
+    def reading(self, servo_id: int, address: int, size: int) -> bytes:
+        """The request for the values at an address."""
+        return self.packet(servo_id, _READ, address.to_bytes(2, "little") + size.to_bytes(2, "little"))
+
+    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
+        """The request to take these values to an address."""
+        return self.packet(servo_id, _WRITE, address.to_bytes(2, "little") + values)
+
+    def reboot(self, servo_id: int) -> bytes:
+        """The request to restart, which only protocol 2.0 knows."""
+        return self.packet(servo_id, _REBOOT, b"")
 
     def acknowledged(self, servo_id: int) -> bytes:
         """What the answer to a write begins with; whatever the servo reports of itself."""

@@ -14,6 +14,7 @@ from design.errors import DeviceTimeoutError, ProtocolError
 from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
 from firmware_io.servo.bus.serial_line import SerialLine
 
+_PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 _HEADER = b"\xff\xff"
 _SHORTEST = 6  # header, id, length, status, sum
 _LAST_ID = b"\xfd"
@@ -62,14 +63,23 @@ class Sts:
 
     protocol = "STS"
     overhead = 14
+    everyone = 254
 
-    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
-        """The bytes of a request."""
-        return request(servo_id, instruction, parameters)
+    def ping(self, servo_id: int) -> bytes:
+        """As `PacketFormat.ping`, and so are those below."""
+        return request(servo_id, _PING, b"")
 
-    def number(self, value: int) -> bytes:
-        """An address or a length."""
-        return value.to_bytes(1, "little")
+    def reading(self, servo_id: int, address: int, size: int) -> bytes:
+        """The request for the values at an address."""
+        return request(servo_id, _READ, bytes([address, size]))
+
+    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
+        """The request to take these values to an address."""
+        return request(servo_id, _WRITE, bytes([address]) + values)
+
+    def reboot(self, servo_id: int) -> bytes:
+        """The request to restart."""
+        return request(servo_id, _REBOOT, b"")
 
     def acknowledged(self, servo_id: int) -> bytes:
         """What the answer to a write begins with; whatever the servo reports of itself."""

@@ -36,7 +36,10 @@ class DynamixelMachine:
         table: what the driver knows of the model.
         memory: the control table.
         axis: the true motion of the horn.
+        forgets_ns: as `ServoMachine` has it; assumed.
     """
+
+    forgets_ns = 100_000_000
 
     def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
         self.table = table

@@ -54,7 +54,10 @@ class FeetechMachine:
         table: what the driver knows of the model.
         memory: the memory table, signs as on the wire.
         axis: the true motion of the horn.
+        forgets_ns: as `ServoMachine` has it; assumed.
     """
+
+    forgets_ns = 100_000_000
 
     def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
         self.table = table
@@ -166,7 +169,7 @@ class FeetechMachine:
         motion, memory, table = self.axis.motion(now_ns), self.memory, self.table
         memory[_PRESENT] = (round(motion.angle_rad / table.position.unit) + table.centre - self._offset()) % 4096
         memory[58] = _sized(round(motion.rate_rad_s / table.velocity.unit), 15)
-        memory[60] = _sized(round(motion.duty / table.load.unit), 10)
+        memory[60] = _sized(round(motion.duty * -1000), 10)
         memory[62], memory[63] = round(self._supply * self._rated_v * 10), self._hot_degC
         memory[65], memory[66] = self._status(), int(abs(motion.rate_rad_s) > 0.01)
         return bytes(memory.data[address : address + size]).ljust(size, b"\0")

@@ -8,7 +8,6 @@ from typing import Protocol
 
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.twins.dynamics import HornMotion
-from firmware_io.twins.servo.memory import Memory
 
 BROADCAST = 254
 
@@ -32,12 +31,27 @@ class Request:
     intact: bool
 
 
+class Entries(Protocol):
+    """What a servo keeps at its addresses."""
+
+    def __getitem__(self, address: int) -> int:
+        """The count at an address."""
+
+    def __setitem__(self, address: int, value: int) -> None:
+        """Set it, whatever the servo would take."""
+
+
 class ServoMachine(Protocol):
     """A servo without its bus: control table, instructions, motion and protection, at whatever time it is told."""
 
     table: ControlTable
-    memory: Memory
     axis: HornMotion
+    forgets_ns: int
+    """The pause after which it forgets the beginning of a request that did not go on."""
+
+    @property
+    def memory(self) -> Entries:
+        """Its control table."""
 
     @property
     def id(self) -> int:

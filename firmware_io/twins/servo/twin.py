@@ -30,7 +30,6 @@ from firmware_io.twins.servo.models import machine_of
 from firmware_io.twins.servo_plant import Load
 
 _TICK_S = 0.02  # between two looks of the servo at itself
-_FORGET_NS = 100_000_000  # a request that stays incomplete is dropped
 
 
 class ServoTwin:
@@ -186,7 +185,7 @@ class ServoTwin:
                 data = os.read(self._master, 4096)
                 if self._echo:  # the adapter does that, whatever the servo makes of it
                     self._send(data)
-                if now_ns - heard_ns > _FORGET_NS:
+                if now_ns - heard_ns > self._servo.forgets_ns:
                     buffer.clear()
                 heard_ns = now_ns
                 if not self._cut and (hearing := self._hearing(now_ns)):

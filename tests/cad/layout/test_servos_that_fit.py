@@ -101,3 +101,25 @@ def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
         BuildError, match=r"-32.75\)\] \(nobody has verified it: measure yours\): STS3215 needs two pairs"
     ):
         layout_of(scanner_for("STS3215", "UST-10LX", None))
+
+
+@pytest.mark.parametrize(
+    ("ring", "why"),
+    [
+        (None, r"base_mount: deck: case_rear_holes_mm = \[\]: PD42-3-1140 has no four holes on its back to stand on"),
+        (
+            "SRC022A-6",
+            r"drive_pulley: foot: case_max_mm = .* PD42-3-1140 stands 10.5 mm above its case, and the belt 7",
+        ),
+        ("UH1256-02-0610-06S", r"a circle of 16 mm \(nobody has verified it: measure yours\) leave 5.25"),
+    ],
+)
+def test_a_stepper_with_a_hub_on_its_shaft_is_refused_with_what_is_in_the_way(ring, why):
+    with pytest.raises(BuildError, match=why):
+        layout_of(scanner_for("PD42-3-1140", "LD06", ring))
+
+
+def test_a_lower_hub_is_all_that_the_stepper_s_belt_asks_for():
+    scanner = scanner_for("PD42-3-1140", "LD06", "SRC022A-6")
+    lower = scanner.servo.model_copy(update={"case_max_mm": (21.15, 21.15, -7.0), "case_holes_z_mm": -7.0})
+    assert layout_of(replace(scanner, servo=lower)).drive.stack.servo is lower

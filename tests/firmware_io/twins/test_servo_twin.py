@@ -30,8 +30,10 @@ from firmware_io.twins.servo.twin import ServoTwin
 from firmware_io.twins.servo_plant import Load
 
 MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
-MODELS += [("STS3215", "STS")]
-FAMILIES = [("MX-64R", "1.0"), ("MX-64R", "2.0"), ("STS3215", "STS")]
+MODELS += [("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
+FAMILIES = [("MX-64R", "1.0"), ("MX-64R", "2.0"), ("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
+BAUDS = {"STS": 1_000_000, "TMCL": 9600}  # from the factory
+VOLTS = {"XL330-M288": 5.0, "PD42-3-1140": 24.0}
 MODELS_2 = [table.model for table in TABLES if table.protocol == "2.0"]
 RATE = math.radians(180)
 # Bytes that make up headers and stuffing; random ones hardly ever do.
@@ -333,7 +335,7 @@ def test_bytes_take_their_time_and_the_return_delay_is_kept(monkeypatch):
 def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
     with ServoTwin(model, protocol, angle_rad=-3.0) as twin, open_servo(twin.port, model) as servo:
         assert (servo.model, servo.protocol, servo.id) == (model, protocol, 1)
-        assert servo.baud == (1_000_000 if protocol == "STS" else 57600)
+        assert servo.baud == BAUDS.get(protocol, 57600)
         servo.spin(-RATE)
         states = read_for(servo, 0.3)
         for state in states:
@@ -342,7 +344,7 @@ def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
         assert states[-1].velocity_rad_s == pytest.approx(-RATE, rel=0.02)
         servo.hold()
         until(lambda: not turns(twin))
-        volts = 5.0 if model == "XL330-M288" else 12.0
+        volts = VOLTS.get(model, 12.0)
         assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(volts), 30)
         servo.sweep_to(2.0, 3.0)
         until(lambda: abs(servo.read().position_rad - 2.0) < 0.03)
@@ -366,8 +368,7 @@ def test_the_tables_of_driver_and_twin_are_of_one_servo(model):
 
 def slack_rad(servo, state):
     """By how much a reading may differ from the truth: half a count, and the turn within the stated time."""
-    step_rad = math.radians(300 / 1024 if servo.model == "AX-12A" else 360 / 4096)
-    return step_rad / 2 + (state.time_bound_ns / 1e9 + 1e-4) * 2 * RATE
+    return servo.step_rad / 2 + (state.time_bound_ns / 1e9 + 1e-4) * 2 * RATE
 
 
 def test_the_dead_sector_is_marked_and_never_guessed():
@@ -490,10 +491,10 @@ def test_two_programs_cannot_share_a_port():
 # Faults: whatever happens, the servo stands, and the error says what to do
 
 FAULTS = [
-    ("overload", "overload at 12.0 V, 30 degC: free what brakes the axis"),
-    ("overheat", r"overheating at 12.0 V, \d5 degC: let it cool down"),
+    ("overload", "overload at {volts} V, 30 degC: free what brakes the axis"),
+    ("overheat", r"overheating at {volts} V, \d+5 degC: let it cool down"),
     ("stall", r"stall: moved 0\.\d deg where"),
-    ("brown_out", r"restarted by itself, 12\.0 V now: look at its supply"),
+    ("brown_out", r"restarted by itself, {volts} V now: look at its supply"),
     ("low", r"voltage at \d.\d V, 30 degC: look at its supply"),
 ]
 
@@ -501,6 +502,9 @@ FAULTS = [
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 @pytest.mark.parametrize(("fault", "words"), FAULTS)
 def test_a_fault_stops_the_turn_and_says_what_to_do(model, protocol, fault, words):
+    if (protocol, fault) == ("TMCL", "low"):
+        pytest.skip("with so little it is off, and says nothing")
+    words = words.replace("{volts}", str(VOLTS.get(model, 12.0)))
     with ServoTwin(model, protocol) as twin:
         with open_servo(twin.port, servo_id=1) as servo:
             servo.spin(RATE)

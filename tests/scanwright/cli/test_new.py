@@ -36,7 +36,9 @@ def test_every_pair_is_a_task_without_a_warning_or_one_line_says_why_not(here, l
     except TaskError as error:
         assert f"{lidar} on {servo}: these cannot work together: " in str(error)
         assert "\n" not in str(error)
-        assert PRODUCTS.get(lidar, Lidar).mass_g > 1000 and servo in ("AX-12A", "STS3215", "XL330-M288", "XL430-W250")
+        heavy = PRODUCTS.get(lidar, Lidar).mass_g > 1000
+        weak = ("AX-12A", "STS3215", "XL330-M288", "XL430-W250")
+        assert servo == "PD42-3-1140" or (heavy and servo in weak)  # whose hub no layout takes
     else:
         assert write_task_file(here / "pair.toml", text) == []
 

@@ -1,0 +1,1 @@
+"""Trinamic TMCL: a stepper with its driver and encoder; datagrams of nine bytes, parameters instead of registers."""
