@@ -101,9 +101,11 @@ def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
     Raises:
         BuildError: it has no holes on its back.
     """
-    if len(servo.case_rear_holes_mm) < 4:
+    holes = servo.case_rear_holes_mm
+    if len(holes) < 4:
+        doubt = servo.doubt("case_rear_holes_mm")
         raise BuildError(
-            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(servo.case_rear_holes_mm)}: {servo.name} has no "
+            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(holes)}{doubt}: {servo.name} has no "
             "four holes on its back to stand on; take a capsule ring, whose plate holds its front, or another servo"
         )
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
@@ -115,7 +117,7 @@ def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
         rear=stack.horn + servo.case_min_mm[2],
         ears=stack.horn + servo.case_rear_holes_z_mm,
         screw=SCREWS[servo.case_screw],
-        holes=_corner_holes(servo.case_rear_holes_mm),
+        holes=_corner_holes(holes),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
         discs=((around, stack.horn), (around, top)),
         stands_alone=True,

@@ -106,7 +106,7 @@ def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
 @pytest.mark.parametrize(
     ("ring", "why"),
     [
-        (None, r"base_mount: deck: case_rear_holes_mm = \[\]: PD42-3-1140 has no four holes on its back to stand on"),
+        (None, r"base_mount: deck: case_rear_holes_mm = .* PD42-3-1140 has no four holes on its back to stand on"),
         (
             "SRC022A-6",
             r"drive_pulley: foot: case_max_mm = .* PD42-3-1140 stands 10.5 mm above its case, and the belt 7",

@@ -518,7 +518,10 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, twins):
             acquire.acquire(plan, lambda _: None)
 
 
-@pytest.mark.parametrize(("servo", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")])
+SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
+
+
+@pytest.mark.parametrize(("servo", "protocol"), SERVOS)
 def test_a_servo_is_emulated_as_it_comes_from_the_factory(servo, protocol):
     with emulated_scanner(angle_set(servo=servo), room(None)) as twins, open_servo(twins.ports.servo) as opened:
         assert (opened.model, opened.protocol) == (servo, protocol)
