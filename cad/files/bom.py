@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
 from cad.assembly.assembly import Assembly
+from cad.assembly.print_settings import print_words
 from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
 from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
@@ -99,7 +100,7 @@ def items_of(
     items = []
     for name in assembly.made:
         part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
-        how = f"{scanner.printer.name}, solid, from print/{name}.3mf"
+        how = f"{scanner.printer.name}, {print_words(scanner.printer)}, from print/{name}.3mf"
         if part.metal:
             how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
         note = f"{how}; drawing drawings/{name}.pdf"

@@ -57,12 +57,14 @@ def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]
     return [_laid(printed, sizes, names[::-1], bed_mm) for _, names in plates]
 
 
-def plate_files(plates: Sequence[Plate], bed_mm: tuple[float, float, float], about: str) -> dict[str, bytes]:
-    """Print file and picture of each plate; `about` says what the parts were made from."""
+def plate_files(
+    plates: Sequence[Plate], bed_mm: tuple[float, float, float], about: str, settings: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Print file and picture of each plate; `about` says what the parts were made from, `settings` are a slicer's."""
     files = {}
     for number, plate in enumerate(plates, start=1):
         name = f"plate_{number}"
-        files[f"print/{name}.3mf"] = threemf_bytes(plate, name, f"{about}, as they lie on the bed")
+        files[f"print/{name}.3mf"] = threemf_bytes(plate, name, f"{about}, as they lie on the bed", settings)
         files[f"print/{name}.png"] = _picture(plate, bed_mm)
     return files
 

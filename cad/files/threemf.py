@@ -1,5 +1,6 @@
 """3MF of parts as they lie on the bed: core specification, millimetres, the same bytes for the same meshes.
 
+Beside the model lies what PrusaSlicer sets for its objects (Metadata/Slic3r_PE_model.config), which other readers skip.
 The entries are stored, not deflated, with the zip format's first date: what a compressor makes of them depends on its
 version.
 """
@@ -19,6 +20,7 @@ CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
 <Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
 <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+<Default Extension="config" ContentType="application/xml"/>
 </Types>
 """
 RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
@@ -28,13 +30,14 @@ RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str) -> bytes:
+def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str, settings: Mapping[str, str]) -> bytes:
     """The file of parts that are printed together.
 
     Args:
         meshes: by name, in the frame of the bed.
         title: of the file.
         description: what it was made from.
+        settings: of PrusaSlicer, for each part.
     """
     model = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -55,6 +58,7 @@ def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str) -
         "[Content_Types].xml": CONTENT_TYPES,
         "_rels/.rels": RELATIONSHIPS,
         "3D/3dmodel.model": "\n".join(model),
+        "Metadata/Slic3r_PE_model.config": "\n".join(_config(meshes, settings)),
     }
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as package:
@@ -73,3 +77,16 @@ def _object(number: int, part: str, mesh: TriMesh) -> Iterator[str]:
     yield from ("</vertices>", "<triangles>")
     yield from (f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
     yield from ("</triangles>", "</mesh>", "</object>")
+
+
+def _config(meshes: Mapping[str, TriMesh], settings: Mapping[str, str]) -> Iterator[str]:
+    """Settings of every object; a reader takes the triangles of an object that it finds here from its volumes."""
+    yield from ('<?xml version="1.0" encoding="UTF-8"?>', "<config>")
+    for number, (part, mesh) in enumerate(meshes.items(), start=1):
+        yield f'<object id="{number}" instances_count="1">'
+        for key, value in {"name": part, **settings}.items():
+            yield f'<metadata type="object" key="{key}" value={quoteattr(value)}/>'
+        yield f'<volume firstid="0" lastid="{len(mesh.faces) - 1}">'
+        yield f'<metadata type="volume" key="name" value={quoteattr(part)}/>'
+        yield from ("</volume>", "</object>")
+    yield from ("</config>", "")

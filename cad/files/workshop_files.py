@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from cad.assembly.print_settings import slicer_settings
 from cad.checks.remarks import without_traps
 from cad.drawings.files import drawing_files
 from cad.files.bom import bom_text, items_of
@@ -64,13 +65,14 @@ def export_scanner(
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
     coupon = checked_mesh(fit_coupon(scanner, assembly.layout.stack), FIT_COUPON)
+    settings = slicer_settings(scanner.printer)
     lying = on_bed(coupon, print_pose(coupon, scanner.printer.bed_mm))
     files = {
-        f"print/{part}.3mf": threemf_bytes({part: mesh}, part, f"{about}, as it lies on the bed")
+        f"print/{part}.3mf": threemf_bytes({part: mesh}, part, f"{about}, as it lies on the bed", settings)
         for part, mesh in (printed | {FIT_COUPON: lying}).items()
     }
     plates = plates_of(printed, scanner.printer.bed_mm)
-    files |= plate_files(plates, scanner.printer.bed_mm, about)
+    files |= plate_files(plates, scanner.printer.bed_mm, about, settings)
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv, wiring.svg and assembly.md with its pictures")

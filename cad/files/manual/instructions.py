@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from cad.assembly.assembly import Assembly
+from cad.assembly.print_settings import print_words
 from cad.checks.retention import material_of
 from cad.files.manual.pictures import StepPictures
 from cad.files.manual.scenes import StepScene, scenes_of
@@ -60,7 +61,8 @@ def instructions_text(
         "you need.",
         "",
         f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
-        f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm).",
+        f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
+        f"everything {print_words(scanner.printer)}: the files tell PrusaSlicer so, other slicers have to be told.",
         "",
         *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
         f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "

@@ -3,6 +3,7 @@
 import itertools
 import shutil
 import zipfile
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,11 +14,15 @@ from lib3mf import get_wrapper
 from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
+from cad.assembly.print_settings import print_words, slicer_settings
 from cad.files.threemf import threemf_bytes
 from cad.geometry.mesh import TriMesh
 from cad.geometry.print_pose import on_bed, print_pose
 from cad.labels.glyphs import GLYPHS, text_width
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Printer
 
+SETTINGS = {"layer_height": "0.25", "fill_density": "100%"}
 BED = (220.0, 220.0, 250.0)
 TABLE = trimesh.boolean.union(
     [
@@ -147,6 +152,7 @@ def test_a_slicer_takes_a_print_file_without_repair(made):
     assert found.closed
     assert found.volume_mm3 == pytest.approx(volumes["slip_ring_adapter"], rel=1e-3)
     assert found.height_mm == pytest.approx(found.size_mm[2], abs=0.3)  # a layer of its own choice
+    assert found.layer_mm == made.scanner.printer.layer_mm  # it read its settings
 
 
 def test_a_slicer_is_believed_because_it_sees_a_hole(tmp_path):
@@ -154,13 +160,38 @@ def test_a_slicer_is_believed_because_it_sees_a_hole(tmp_path):
         pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
     open_box = trimesh.creation.box(extents=(20, 20, 20))
     open_box.update_faces(np.arange(len(open_box.faces)) > 0)
-    (tmp_path / "open.3mf").write_bytes(threemf_bytes({"open": mesh(open_box)}, "open", "a box that lacks a triangle"))
+    (tmp_path / "open.3mf").write_bytes(
+        threemf_bytes({"open": mesh(open_box)}, "open", "a box that lacks a triangle", {})
+    )
     assert not sliced(tmp_path / "open.3mf").closed
 
 
+def test_a_slicer_is_told_of_every_part_how_it_is_printed(made):
+    printer = made.scanner.printer
+    said = slicer_settings(printer)
+    assert said["layer_height"] == f"{printer.layer_mm:g}" and said["fill_density"] == "100%"
+    assert {said[key] for key in said if key.endswith("extrusion_width")} == {f"{printer.line_mm:g}"}
+    with zipfile.ZipFile(made.folder / "print" / "plate_1.3mf") as package:
+        model, config = (package.read(name) for name in ("3D/3dmodel.model", "Metadata/Slic3r_PE_model.config"))
+    core = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+    parts = ElementTree.fromstring(model).iter(f"{core}object")
+    told = {each.get("id"): each for each in ElementTree.fromstring(config).iter("object")}
+    for part in parts:
+        keys = {each.get("key"): each.get("value") for each in told[part.get("id")].findall("metadata")}
+        assert keys == {"name": part.get("name"), **said}
+        (volume,) = told[part.get("id")].findall("volume")
+        count = len(part.findall(f".//{core}triangle"))
+        assert (volume.get("firstid"), volume.get("lastid")) == ("0", str(count - 1))
+
+
+def test_what_lays_no_filament_has_no_lines():
+    resin = load_catalogue().get("sla", Printer)
+    assert slicer_settings(resin) == {} and print_words(resin) == "solid"
+
+
 def test_the_zip_holds_no_date_and_no_platform(tmp_path):
-    data = threemf_bytes({"a <part>": mesh(TABLE)}, "a <part>", 'of "x" & y')
-    assert data == threemf_bytes({"a <part>": mesh(TABLE)}, "a <part>", 'of "x" & y')
+    data = threemf_bytes({"a <part>": mesh(TABLE)}, "a <part>", 'of "x" & y', SETTINGS)
+    assert data == threemf_bytes({"a <part>": mesh(TABLE)}, "a <part>", 'of "x" & y', SETTINGS)
     (tmp_path / "a.3mf").write_bytes(data)
     for entry in zipfile.ZipFile(tmp_path / "a.3mf").infolist():
         assert entry.date_time == (1980, 1, 1, 0, 0, 0)
