@@ -8,7 +8,7 @@ from pydantic import Field
 
 from design.angles import AngleSet
 from design.catalogue.catalogue import Catalogue
-from design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
+from design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing, SlotSwitch
 from design.deck_holes import Circle, Rectangle
 from design.record import Record
 
@@ -20,9 +20,13 @@ class Modules(Record):
     tripod_foot: bool = Field(
         default=False, strict=True, description="a plate under the mount with a nut 1/4-20 for a tripod"
     )
+    homing_flag: bool = Field(
+        default=False, strict=True, description="a flag on the rotor, and a bracket with an optical switch for it"
+    )
 
 
 NO_MODULES = Modules()
+HOMING_SWITCH = "EE-SX672"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,7 @@ class Scanner:
         belts: those that a capsule ring's scanner may choose from, the narrowest first.
         deck: holes that the base mount is screwed to; None where the mount may choose them.
         modules: what else was asked for.
+        switch: that a homing flag passes; None where none was asked for.
     """
 
     angles: AngleSet
@@ -45,6 +50,7 @@ class Scanner:
     belts: tuple[Belt, ...] = ()
     deck: Rectangle | Circle | None = None
     modules: Modules = NO_MODULES
+    switch: SlotSwitch | None = None
 
 
 def scanner_of(
@@ -69,4 +75,5 @@ def scanner_of(
         belts=catalogue.belts(),
         deck=deck,
         modules=modules,
+        switch=catalogue.get(HOMING_SWITCH, SlotSwitch) if modules.homing_flag else None,
     )

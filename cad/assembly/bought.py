@@ -22,6 +22,7 @@ from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.leads import RotorLead
 from cad.layout.direct.stack import DirectStack
 from cad.layout.layout import Layout
+from cad.layout.modules.homing_flag import HomingBracket, bracket_of
 from cad.parts.part_spec import STEEL, Colour
 from design.catalogue.products import Bearing
 
@@ -84,6 +85,10 @@ def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
         yield _ring(names.RING_ROTOR, "rot", partial(draw.ring_rotor, stack))
     if stack.bearing is not None:
         yield from _bearing(stack.bearing, stack.bearing_top, "")
+    bracket = bracket_of(layout.scanner, stack)
+    if isinstance(bracket, HomingBracket):
+        make = partial(draw.slot_switch, bracket)
+        yield BodySpec(name=names.SWITCH_BODY, product=names.SWITCH, frame="servo", colour=CASE, make=make)
 
 
 def _of_belt(stack: BeltStack) -> Iterator[BodySpec]:

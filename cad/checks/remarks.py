@@ -14,6 +14,7 @@ from cad.layout.direct.stack import DirectStack
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.joints import Joint
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
+from cad.layout.modules.homing_flag import bracket_of
 from cad.layout.modules.ring_cover import cover_of
 from cad.layout.modules.unasked import unasked
 from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
@@ -66,6 +67,9 @@ def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     cover = cover_of(layout.scanner, layout.stack)
     if isinstance(cover, LeftOut):
         out.append(cover)
+    bracket = bracket_of(layout.scanner, layout.stack)
+    if isinstance(bracket, LeftOut):
+        out.append(bracket)
     if layout.deck.tripod is None:
         out.append(unasked(TRIPOD_FOOT))
     if layout.deck.flat:

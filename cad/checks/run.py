@@ -21,6 +21,7 @@ from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
 from cad.checks.rotor_leads import lead_checks
+from design.catalogue.products import SlotSwitch
 from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
 from design.scanner import Scanner
@@ -71,7 +72,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(scanner, layout.stack, bodies),
         *retention_checks(scanner, assembly),
-        *electric_checks(scanner),
+        *electric_checks(scanner, layout.drive.switch),
         *lead_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *mount_checks(scanner, assembly, bodies, meshes),
@@ -81,9 +82,9 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     return checks, shadow
 
 
-def electric_checks(scanner: Scanner) -> list[Check]:
+def electric_checks(scanner: Scanner, switch: SlotSwitch | None = None) -> list[Check]:
     """Every broken rule of the wiring, or one word that it keeps them; and what the catalogue does not know of it."""
-    network = network_of(scanner)
+    network = network_of(scanner, switch)
     faults = [
         Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
         for fault in broken_rules(network)

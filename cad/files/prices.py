@@ -35,6 +35,7 @@ EACH: dict[str, tuple[tuple[str, float, float], ...]] = {
         ("power lead", 3.0, 15.0),
         ("cables and power", 10.0, 60.0),
         ("plug, socket", 5.0, 15.0),
+        ("socket of", 2.0, 8.0),
         ("cable tie", 0.05, 0.20),
         ("soft tube", 1.0, 5.0),
     ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cad.files.schematic import schematic_svg
+from design.catalogue.products import SlotSwitch
 from design.electrics.network import Network
 from design.electrics.rules import broken_rules
 from design.electrics.sizing import OVER_PEAK
@@ -22,14 +23,15 @@ STALLED = (
 )
 
 
-def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
+def wiring_files(scanner: Scanner, digest: str, switch: SlotSwitch | None = None) -> dict[str, bytes]:
     """Both files by name.
 
     Args:
         scanner: angles and products.
         digest: of what shapes the parts.
+        switch: that a homing flag passes, where there is one.
     """
-    network = network_of(scanner)
+    network = network_of(scanner, switch)
     title = f"{scanner.angles.task}: wiring ({digest})"
     return {
         "wiring.svg": schematic_svg(network, title).encode("utf-8"),

@@ -79,7 +79,7 @@ def export_scanner(
     items = items_of(scanner, assembly, joints, masses, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
-    files |= wiring_files(scanner, digest)
+    files |= wiring_files(scanner, digest, assembly.layout.drive.switch)
     progress("drawing the parts")
     files |= (drawn or begin_drawings(scanner, made))()
     write_files(folder, files)

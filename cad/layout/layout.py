@@ -13,6 +13,7 @@ from cad.layout.deck import Deck, deck_of
 from cad.layout.direct.drive import direct_drive
 from cad.layout.drive import DriveLayout, Stack
 from cad.layout.linkage import AlignmentLinkage, linkage_of
+from cad.layout.modules.homing_flag import bracket_of, flag_of
 from design.left_out import LeftOut
 from design.motion import Sweep
 from design.scanner import NO_MODULES, Scanner
@@ -45,7 +46,14 @@ def layout_of(scanner: Scanner) -> Layout:
     bar = counterweight_of(scanner, deck, linkage)
     if isinstance(bar, Counterweight):
         linkage = replace(linkage, ear=bar.ear)
+    linkage = replace(linkage, flag=flag_of(bracket_of(scanner, drive.stack), drive.stack, _taken(linkage)))
     return Layout(scanner, drive, deck, linkage, bar)
+
+
+def _taken(linkage: AlignmentLinkage) -> tuple[float, ...]:
+    """Azimuths at which the hub has screws, the way of the wires and the ear of a bar."""
+    taken = (*linkage.cross_azimuths, sum(linkage.cross_azimuths) / 2)
+    return taken if linkage.ear is None else (*taken, linkage.ear.azimuth)
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:

@@ -20,6 +20,7 @@ from cad.layout.envelope import (
     envelope_of,
 )
 from cad.layout.joints import round_wall_mm
+from cad.layout.modules.homing_flag import Flag
 from cad.layout.names import ALIGNMENT_LINKAGE
 from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from design.arrays import Array
@@ -72,6 +73,7 @@ class AlignmentLinkage:
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
     cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
     ear: Ear | None = None
+    flag: Flag | None = None
 
 
 def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:

@@ -11,6 +11,7 @@ from cad.parts.bearing_tower import tower_spec
 from cad.parts.capsule_holder import holder_spec
 from cad.parts.counterweight import counterweight_spec
 from cad.parts.drive_plate import plate_spec
+from cad.parts.homing_bracket import bracket_spec
 from cad.parts.horn_cup import cup_spec
 from cad.parts.journal_sleeve import sleeve_spec
 from cad.parts.main_shaft import main_shaft_spec
@@ -41,6 +42,7 @@ OF_ALL = (
     counterweight_spec,
     sleeve_spec,
     ring_cover_spec,
+    bracket_spec,
     tripod_foot_spec,
 )
 

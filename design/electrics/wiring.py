@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from design.catalogue.products import Lidar, Servo, SlipRing, Ways
+from design.catalogue.products import Lidar, Servo, SlipRing, SlotSwitch, Ways
 from design.electrics.network import Box, Branch, Circuit, Drop, Network, Wire
 from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, supply_for, wire_drop_v, wire_for
 from design.scanner import Scanner
@@ -24,6 +24,13 @@ DATA = {
 }
 PLUG = {"usb": "USB", "usb-powered": "USB", "ethernet": "Ethernet", "serial": "serial port"}
 SIGNALS = {"rs485": ("D+", "D-"), "ttl": ("DATA",)}
+HOMING = ("+", "-", "OUT")
+FLAG_SWITCH = "switch of the flag"
+COMPUTER_SIDE = {  # net and colour at pins of the computer; the input pulls up to its own voltage
+    "5 V out": ("5 V", "brown"),
+    "0 V out": ("0 V", "blue"),
+    "input with pull-up": ("home", "black"),
+}
 COLOURS = {
     "VBUS": "red",
     "D-": "white",
@@ -85,8 +92,8 @@ class _Load:
         return 1.0 if self.volts == SUPPLY_V else self.set_v / SUPPLY_V / CONVERTER
 
 
-def network_of(scanner: Scanner) -> Network:
-    """The wiring of one scanner.
+def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
+    """The wiring of one scanner, and of the switch that its homing flag passes, where it has one.
 
     Raises:
         ValueError: a device draws more than any fuse of the table carries.
@@ -98,8 +105,8 @@ def network_of(scanner: Scanner) -> Network:
     branches = [_branch(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
     return Network(
-        boxes=tuple(_boxes(scanner, loads, branches, circuits)),
-        wires=tuple(_wires(scanner, loads, branches, circuits)),
+        boxes=tuple(_boxes(scanner, switch, loads, branches, circuits)),
+        wires=tuple(_wires(scanner, switch, loads, branches, circuits)),
         circuits=circuits,
         branches=tuple(branches),
         drops=tuple(_drops(loads, branches)),
@@ -177,7 +184,13 @@ def _feed(load: _Load) -> str:
     return f"{load.volts:g} V"
 
 
-def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuits: tuple[Circuit, ...]) -> list[Box]:
+def _boxes(
+    scanner: Scanner,
+    switch: SlotSwitch | None,
+    loads: list[_Load],
+    branches: list[Branch],
+    circuits: tuple[Circuit, ...],
+) -> list[Box]:
     lidar, servo = scanner.lidar, scanner.servo
     total = sum(branch.peak_a for branch in branches)
     supply, fuse = supply_for(total), fuse_for(total)
@@ -197,8 +210,9 @@ def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
             boxes.append(Box(f"{load.name} converter", title, size, ("in +", "in -"), ("out +", "out -"), 3))
     signals = SIGNALS[servo.bus or "ttl"]
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
+    homing = () if switch is None else tuple(COMPUTER_SIDE)
     boxes += [
-        Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug), 4),
+        Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug, *homing), 4),
         Box("adapter", "servo adapter", ("such as U2D2: data only",), ("USB",), (*signals, "GND"), 5),
         Box(
             "servo",
@@ -209,6 +223,8 @@ def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
             6,
         ),
     ]
+    if switch is not None:
+        boxes.append(Box(FLAG_SWITCH, switch.name, (switch.output,), (*HOMING, "L"), (), 6, ("L",)))
     data = _data(lidar)
     power = () if lidar.link == "usb-powered" else ("+", "-")
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
@@ -224,7 +240,13 @@ def _boxes(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
     return boxes
 
 
-def _wires(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuits: tuple[Circuit, ...]) -> list[Wire]:
+def _wires(
+    scanner: Scanner,
+    switch: SlotSwitch | None,
+    loads: list[_Load],
+    branches: list[Branch],
+    circuits: tuple[Circuit, ...],
+) -> list[Wire]:
     lidar, servo = scanner.lidar, scanner.servo
     total = sum(branch.peak_a for branch in branches)
     thick = wire_for(fuse_for(total))
@@ -263,6 +285,10 @@ def _wires(scanner: Scanner, loads: list[_Load], branches: list[Branch], circuit
     signals = SIGNALS[servo.bus or "ttl"]
     wires += [Wire(("adapter", pin), ("servo", pin), pin, 0.0, 0.0, "servo cable") for pin in signals]
     wires.append(Wire(("adapter", "GND"), ("servo", "GND data"), "GND", 0.0, 0.0, "servo cable"))
+    if switch is not None:
+        for (pin, (net, colour)), end in zip(COMPUTER_SIDE.items(), HOMING, strict=True):
+            amps = 0.0 if end == "OUT" else switch.current_a
+            wires.append(Wire(("computer", pin), (FLAG_SWITCH, end), net, amps, 0.0, colour))
     peaks = dict(_nets(lidar))
     for net in (*_data(lidar), "shield"):
         colour = COLOURS[net]

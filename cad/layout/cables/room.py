@@ -17,6 +17,7 @@ from cad.layout.deck import FOOT_THICKNESS, Deck
 from cad.layout.envelope import Box, box_corners, envelope_of
 from cad.layout.layout import Layout
 from cad.layout.linkage import neck_corners
+from cad.layout.modules.homing_flag import ARM_HIGH, VANE, VANE_HALF, Flag
 from cad.screws import SCREWS
 from design.arrays import Array, Mask
 from design.catalogue.products import Lidar
@@ -114,6 +115,8 @@ def room_of(layout: Layout) -> RotorRoom:
     boxes = [envelope.body, envelope.plate, envelope.under]
     corners = [box_corners(box) @ R.T for box in (*boxes, *_stubs(layout.scanner.lidar))]
     corners.append(_hub(stack.hub_radius, stack.shoulder, -stack.h))
+    if p.flag is not None:
+        corners.append(_arm(p.flag))
     if isinstance(layout.counterweight, Counterweight):
         corners.extend(_bar(layout.counterweight))
     bearings = layout.scanner.lidar.bearings_rad()
@@ -157,6 +160,17 @@ def _hub(radius: float, low: float, high: float) -> Array:
     return np.concatenate([np.column_stack([ring, np.full(HUB_SIDES, z)]) for z in (low, high)])
 
 
+def _arm(flag: Flag) -> Array:
+    """Corners of the room of a homing flag over all that stands still."""
+    box: Box = ((0.0, -VANE_HALF, flag.base), (flag.radius + VANE, VANE_HALF, flag.base + ARM_HIGH))
+    return _turned(box_corners(box), flag.azimuth)
+
+
+def _turned(corners: Array, azimuth: float) -> Array:
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return np.asarray(corners @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T)
+
+
 def _bar(bar: Counterweight) -> list[Array]:
     """Corners of the room of a counterweight on its ear, and of the heads of its screws wherever it slides."""
     ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
@@ -164,5 +178,4 @@ def _bar(bar: Counterweight) -> list[Array]:
     wide = BAR_SCREW.head_diameter / 2
     boxes: list[Box] = [((0.0, -half, ear.low), (max(bar.end + LONGER, ear.end), half, above))]
     boxes += [((first - wide, -wide, below), (last + wide, wide, ear.low)) for first, last in ear.slots]
-    c, s = math.cos(ear.azimuth), math.sin(ear.azimuth)
-    return [box_corners(box) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T for box in boxes]
+    return [_turned(box_corners(box), ear.azimuth) for box in boxes]

@@ -156,7 +156,7 @@ def is_reachable(hole, head, piercing):
     return not piercing.between(start - 0.05 * direction, start + DRIVER * direction)
 
 
-FOOT, COVER = Modules(tripod_foot=True), Modules(ring_cover=True)
+FOOT, COVER, FLAG = Modules(tripod_foot=True), Modules(ring_cover=True), Modules(homing_flag=True)
 SETTINGS = {
     "tilted, with a bearing": scanner_at(GROUND_AHEAD),
     "tilted, nuts": scanner_at((0, 35, -20, -70), printer="fdm-0.4-nut"),
@@ -170,6 +170,8 @@ SETTINGS = {
     ),
     "a cover on a cage": scanner_at(GROUND_AHEAD, modules=COVER),
     "a cover on a fork": scanner_at(UPRIGHT, modules=COVER),
+    "a switch on a cage": scanner_at(GROUND_AHEAD, modules=FLAG),
+    "a switch on a fork": scanner_at(UPRIGHT, modules=FLAG),
     "a tripod": scanner_at(GROUND_AHEAD, modules=FOOT),
     "a belt on a tripod, nuts M5": replace(
         scanner_at(ROLLING, slip_ring=CAPSULE, printer="fdm-0.4-nut", modules=FOOT),

@@ -18,9 +18,12 @@ from cad.files.bom import items_of
 from cad.layout.all_joints import joints_of
 from cad.layout.deck import FOOT_THICKNESS
 from cad.layout.layout import config_hash, layout_of
+from cad.layout.modules.homing_flag import bracket_of, passes_at_deg, vane_half_deg
 from cad.layout.modules.ring_cover import cover_of
 from cad.layout.names import LIDAR
 from cad.parts.all_parts import parts_of
+from design.electrics.rules import broken_rules
+from design.electrics.wiring import network_of
 from design.errors import BuildError
 from design.left_out import LeftOut
 from design.scanner import NO_MODULES, Modules
@@ -48,7 +51,7 @@ def test_what_is_not_asked_for_is_told_as_left_out_and_changes_nothing_that_is_m
     assert without.modules == NO_MODULES
     specs = [layout_of(scanner) for scanner in (asked, without)]
     assert config_hash(asked) != config_hash(without)
-    assert specs[0].linkage == specs[1].linkage and specs[0].stack == specs[1].stack
+    assert replace(specs[0].linkage, flag=None) == specs[1].linkage and specs[0].stack == specs[1].stack
 
 
 def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod, parts_of):
@@ -164,6 +167,86 @@ def test_without_a_cover_nothing_is_drilled_for_it(covered, parts_of):
     assert left.why == "the task does not ask for it by modules.ring_cover"
     missing = plain.made[onto].Volume() - covered.made[onto].Volume()
     assert missing == pytest.approx(2 * math.pi * 1.25**2 * 5.0, rel=0.02)
+
+
+@pytest.fixture(scope="module", params=[GROUND_AHEAD, UPRIGHT])
+def homed(request, parts_of):
+    return parts_of(scanner_for(request.param, Modules(homing_flag=True)))
+
+
+def test_the_flag_darkens_the_switch_where_the_step_says_and_nowhere_else(homed):
+    layout = homed.layout
+    bracket, flag = bracket_of(layout.scanner, layout.stack), layout.linkage.flag
+    switch = homed.mesh("switch_body")
+    turn = np.array(
+        [[np.cos(bracket.azimuth), -np.sin(bracket.azimuth)], [np.sin(bracket.azimuth), np.cos(bracket.azimuth)]]
+    )
+    fork = switch.vertices[:, :2] @ turn  # along the radius, and across it
+    reach = np.abs(fork[:, 0] - bracket.radius)
+    assert reach[reach < 7.5].min() == pytest.approx(layout.scanner.switch.slot_mm / 2)
+    linkage = homed.mesh("alignment_linkage")
+    body = trimesh.Trimesh(linkage.vertices, linkage.faces)
+    light = bracket.seat + layout.scanner.switch.beam_height_mm
+    angles = np.radians(np.arange(-180.0, 180.0, 2.5))
+    middle = bracket.azimuth - angles  # of the slot, to the linkage
+    out = np.stack([np.cos(middle), np.sin(middle), np.zeros(len(middle))], axis=1)
+    points = bracket.radius * out + [0.0, 0.0, light]
+    dark = np.degrees(angles[body.contains(points)])
+    told = passes_at_deg(bracket, flag)
+    off = (dark - told + 180) % 360 - 180
+    assert len(dark) >= 3 and np.abs(off).max() <= vane_half_deg(flag) + 0.1 and np.abs(off).min() < 1.3
+    (words,) = [step.words for name, step in steps_of(homed) if name == "homing_bracket"]
+    assert f"in the light at {told:.1f} deg" in words
+
+
+def test_the_flag_meets_nothing_and_its_bracket_comes_before_the_linkage(homed):
+    assert {check.severity for check in clearance_checks(homed)} == {"pass"}
+    names = [name for name, _ in steps_of(homed)]
+    onto = "bearing_cage" if homed.layout.stack.bearing else "slip_ring_adapter"
+    assert names.index(onto) < names.index("homing_bracket") < names.index("alignment_linkage")
+    said = [check for check in retention_checks(homed.layout.scanner, homed) if "homing_bracket" in check.message]
+    assert len(said) == 4 and {check.severity for check in said} == {"pass"}
+
+
+def test_the_switch_is_bought_and_wired(homed):
+    rows = [item for item in bought(homed) if item.number == "EE-SX672"]
+    assert [(row.quantity, row.supplier) for row in rows] == [(1, "Omron")]
+    assert [item.quantity for item in bought(homed) if "EE-1001" in item.part] == [1]
+    network = network_of(homed.layout.scanner, homed.layout.drive.switch)
+    assert broken_rules(network) == []
+    ends = {wire.end[1]: wire.net for wire in network.wires if wire.end[0] == "switch of the flag"}
+    assert ends == {"+": "5 V", "-": "0 V", "OUT": "home"}
+
+
+def test_without_a_flag_the_hub_is_round_and_nothing_is_drilled(homed, parts_of):
+    plain = parts_of(replace(homed.layout.scanner, modules=NO_MODULES, switch=None))
+    (left,) = [left for left in left_out_of(plain) if left.what == "homing_flag"]
+    assert left.why == "the task does not ask for it by modules.homing_flag"
+    assert "homing_flag" not in [left.what for left in left_out_of(homed)]
+    assert "homing_bracket" not in plain.parts and "switch_body" not in plain.bodies
+    onto = "bearing_cage" if homed.layout.stack.bearing else "slip_ring_adapter"
+    missing = plain.made[onto].Volume() - homed.made[onto].Volume()
+    assert missing == pytest.approx(2 * math.pi * 1.25**2 * 5.0, rel=0.02)
+    assert homed.mesh("alignment_linkage").vertices[:, 2].min() < plain.layout.stack.shoulder - 5.0
+
+
+@pytest.mark.parametrize(
+    ("asked", "ring", "angles", "why"),
+    [
+        ({}, "SRC022A-6", GROUND_AHEAD, "the tower around the capsule has no place for its bracket"),
+        ({"ring_cover": True}, RING, GROUND_AHEAD, "the ring cover stands where its bracket would"),
+        ({}, None, UPRIGHT, "neither ring nor bearing needs anything beside the shaft"),
+    ],
+)
+def test_a_flag_without_a_place_for_its_switch_is_left_out_with_the_reason(asked, ring, angles, why):
+    layout = layout_of(scanner_for(angles, Modules(homing_flag=True, **asked), ring))
+    left = bracket_of(layout.scanner, layout.stack)
+    assert isinstance(left, LeftOut) and left.why.startswith(why)
+    assert (
+        layout.linkage.flag is None
+        and layout.drive.switch is None
+        and "homing_bracket" not in [spec.name for spec in parts_of(layout)]
+    )
 
 
 def on_bed_of(scanner, bed_mm):
