@@ -20,6 +20,7 @@ from cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
 from cad.layout.names import BASE_MOUNT
 from cad.screws import SCREWS, Screw
 from design.arrays import Array
+from design.catalogue.products import Printer
 from design.deck_holes import Circle, Rectangle
 from design.errors import BuildError
 from design.scanner import Scanner
@@ -28,7 +29,9 @@ FOOT_THICKNESS = 6.0
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
 UNDER_MOUNT_HEAD = 5.0  # of the mount, to what it holds
-BACK_MARGIN = 5.0  # of the back plate around the rear holes
+BACK_MARGIN = 5.0  # of the back plate around the rear holes, at least
+RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
+RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
 USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
 PAD_HALF = 26.0  # of the strut on the foot
 HOLE_MARGIN = 10.0  # of the foot around a hole
@@ -71,7 +74,8 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     along = R[0]
     holes = mounted.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
-    half = (max(xs) + BACK_MARGIN, (max(ys) - min(ys)) / 2 + BACK_MARGIN)
+    margin = max(BACK_MARGIN, mounted.screw.head_room + rail_wall(scanner.printer) + RAIL_INSET)
+    half = (max(xs) + margin, (max(ys) - min(ys)) / 2 + margin)
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
     tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
     bare = scanner.deck is None and tripod is None
@@ -96,6 +100,11 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         tripod=tripod,
         foot=_foot(pattern, screw),
     )
+
+
+def rail_wall(printer: Printer) -> float:
+    """What is left of a rail around the heads of its screws."""
+    return max(RAIL_WALL, printer.min_wall_mm)
 
 
 def _height_of_back(

@@ -16,7 +16,16 @@ import numpy as np
 
 from cad import outlines, solids
 from cad.layout.belt.stack import BeltStack
-from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, UNDER_MOUNT_HEAD, Deck
+from cad.layout.deck import (
+    BACK_THICKNESS,
+    FOOT_THICKNESS,
+    PAD_HALF,
+    PLUG_GAP,
+    RAIL_INSET,
+    UNDER_MOUNT_HEAD,
+    Deck,
+    rail_wall,
+)
 from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
@@ -24,6 +33,7 @@ from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import passing_hole
 from cad.solids import building
+from design.catalogue.products import Printer
 
 OF_SERVO = (
     "servo.case_min_mm",
@@ -33,7 +43,6 @@ OF_SERVO = (
     "servo.case_rear_holes_z_mm",
 )
 RAIL_HALF_WIDTH = 4.0  # least
-RAIL_WALL = 1.3  # of a rail beside the heads of its screws
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
 
@@ -81,7 +90,7 @@ def base_mount(layout: Layout) -> cq.Solid:
         foot = solids.prism(outlines.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
         body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
     with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
-        rails = [_rail(deck, mounted, side) for side in (1.0, -1.0)]
+        rails = [_rail(deck, mounted, printer, side) for side in (1.0, -1.0)]
         feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
         cuts = []
@@ -112,10 +121,10 @@ def _strut(deck: Deck) -> cq.Shape:
     return whole.cut(solids.box((-400.0, -400.0, cz - 0.3), (400.0, 400.0, cz + 400.0)))
 
 
-def _rail(deck: Deck, mounted: Mounted, side: float) -> cq.Solid:
+def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Solid:
     x = side * mounted.holes[0][0]
     _, cy, cz = deck.back_centre
-    y = deck.back_half[1] - 0.8
-    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + RAIL_WALL)
+    y = deck.back_half[1] - RAIL_INSET
+    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + rail_wall(printer))
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

@@ -13,6 +13,7 @@ from cadquery import Vector
 from scanners import CAPSULE, scanner_at
 
 from cad.assembly.make import make_parts
+from cad.checks.printing import thin_walls
 from cad.checks.remarks import without_traps
 from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
@@ -508,3 +509,8 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     } <= said
     wide = replace(stack, flange=stack.flange.model_copy(update={"diameter_mm": 58.0}))
     assert tower_of(scanner, wide).foot.trap is None and tower_of(scanner, stack).foot.trap is not None
+
+
+def test_the_rails_of_the_mount_leave_the_least_wall_around_the_heads_of_their_screws(made):
+    mount, least = made.assembly.mesh("base_mount"), made.scanner.printer.min_wall_mm
+    assert thin_walls(mount, least).area_mm2 == 0
