@@ -290,6 +290,16 @@ def test_a_brown_out_forgets_the_count_and_not_the_angle(module):
     assert ask(module, packets.reading(1, AXIS + 215), later_ns)[1] == pytest.approx(before[1], abs=4)
 
 
+def test_with_too_little_voltage_it_is_off_and_begins_anew_with_enough(module):
+    ask(module, packets.writing(1, USER + 255, 1))
+    module.set_voltage(8.0, 0)
+    assert not module.listens(10 * SECOND_NS)
+    module.set_voltage(12.0, 10 * SECOND_NS)
+    assert module.listens(11 * SECOND_NS)
+    assert ask(module, packets.reading(1, INPUT + 8), 11 * SECOND_NS) == (100, 120)
+    assert ask(module, packets.reading(1, USER + 255), 11 * SECOND_NS) == (100, 0)
+
+
 # The driver
 
 
