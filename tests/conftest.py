@@ -1,5 +1,6 @@
 """What several test files share."""
 
+import gc
 import os
 import shutil
 import signal
@@ -44,6 +45,16 @@ def pytest_configure(config):
 
 def pytest_collection_modifyitems(items):
     quick_tests.mark(items)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    gc.disable()  # what is loaded here stays, and to look through it again and again takes a third of the time
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(autouse=True)
