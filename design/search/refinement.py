@@ -28,6 +28,7 @@ STEP = 2  # values that one step takes
 REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
 FINEST_DEG = 0.01
 STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
+NEARLY_DEG, INDIFFERENT = 0.25, 1e-4  # to an angle of the grid; of J: about its error, 0.01 % of the beams
 PAIRS = slice(0, 2), slice(2, 4)  # of the axis, and of the scan plane
 
 
@@ -62,21 +63,26 @@ def refined_setting(
     angles = angles_deg.copy()
     if not free.any() or not rounds:
         return angles
+
+    def J_of(setting: Setting, nodes: int) -> float:
+        designed = required.J(setting, nodes)
+        if not ranges.tolerance_deg or not np.isfinite(designed):
+            return designed
+        return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
+
     for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
         chart = _Chart(angles, free, limits, on_spheres=problem.sweep is None)
 
         def J(moved: Array, chart: _Chart = chart, nodes: int = nodes) -> float:
-            setting = chart.setting(moved)
-            designed = required.J(setting, nodes)
-            if not ranges.tolerance_deg or not np.isfinite(designed):
-                return designed
-            return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
+            return J_of(chart.setting(moved), nodes)
 
         corners, values = _first_simplex(J, chart, reach * ranges.step_deg)
         enough = FINE if len(rounds) > 1 else ROUGH
         most = replace(enough, values=enough.values * int(free.sum()) - len(values))
         angles = chart.setting(lowest_by_simplex(J, corners, values, chart.bounds, most))
-    return _rounded(angles, free, limits, rounds[-1][1], required, angles_deg)
+    finest = rounds[-1][1]
+    angles = _on_the_grid(angles, free, limits, ranges.step_deg, lambda setting: J_of(setting, finest))
+    return _rounded(angles, free, limits, finest, required, angles_deg)
 
 
 def allowed_setting(refined: Setting, leader: Setting, required: Requirements) -> tuple[Setting, Score | None]:
@@ -212,6 +218,19 @@ def _first_simplex(J: Callable[[Array], float], chart: _Chart, step: float) -> t
         allowed = [side for side in sides if low <= side[i] <= high] or [np.clip(sides[0], *chart.bounds.T)]
         corners.append(min(((side, J(side)) for side in allowed), key=lambda pair: pair[1]))
     return np.array([point for point, _ in corners]), np.array([value for _, value in corners])
+
+
+def _on_the_grid(
+    angles: Setting, free: Bool[ndarray, " 4"], limits: Array, step: float, J: Callable[[Setting], float]
+) -> Setting:
+    """An angle that is nearly one of the grid's is that one where J does not mind: 0 is built better than 0.01."""
+    most = J(angles) + INDIFFERENT
+    for i in np.flatnonzero(free):
+        rounder = angles.copy()
+        rounder[i] = np.clip(step * np.round(angles[i] / step), *limits[i])
+        if abs(rounder[i] - angles[i]) <= NEARLY_DEG and J(rounder) <= most:
+            angles = rounder
+    return angles
 
 
 def _rounded(

@@ -12,7 +12,7 @@ from scipy.optimize import minimize, rosen
 from design.frames import R_world_rot
 from design.objective.problem import problem_of
 from design.search.grid_classes import plane_key
-from design.search.refinement import Enough, _Chart, lowest_by_simplex
+from design.search.refinement import Enough, _Chart, _on_the_grid, lowest_by_simplex
 from design.search.search import search
 from design.task.task import load_task
 
@@ -78,3 +78,13 @@ def test_an_optimum_beside_a_pole_is_found_from_any_grid():
     for step in (20.0, 10.0):
         found = search(problem_of(replace(loaded, task=task)), task.angles.model_copy(update={"step_deg": step}))
         assert found.best[0].score.J < -6.189
+
+
+def test_an_angle_that_is_nearly_one_of_the_grid_is_that_one_unless_J_minds():
+    free = np.array([True, True, True, False])
+    limits = np.array([[-180.0, 180.0], [-90.0, 90.0], [-88.0, 90.0], [30.01, 30.01]])
+    asked = np.array([0.07, -54.9, -87.9, 30.01])
+    indifferent = _on_the_grid(asked, free, limits, 5.0, lambda _: 0.0)
+    assert indifferent.tolist() == [0.0, -55.0, -88.0, 30.01], "no further than the limits, and what is fixed stays"
+    minds = _on_the_grid(asked, free, limits, 5.0, lambda setting: 1e-2 * abs(setting[1] + 54.9))
+    assert minds.tolist() == [0.0, -54.9, -88.0, 30.01]
