@@ -86,7 +86,7 @@ ENTRIES = (
         (1.6, 0, 0.1),
         34,
         "The setting that J alone would take is blind in a cone of 0.58 deg in the middle of what counts; the "
-        "best one without a hole costs 0.087 % of the beams per ball (`scanwright optimise ground_ahead`). "
+        "best one without a hole costs 0.086 % of the beams per ball (`scanwright optimise ground_ahead`). "
         "Hanging and standing give the same J; the build takes the one whose parts hide less.",
     ),
     Entry(

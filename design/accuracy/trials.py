@@ -7,6 +7,7 @@ The rooms that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright
 from __future__ import annotations
 
 import csv
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from design.evaluation.picture_files import save_picture
 
 T = TypeVar("T")
 REPEATS = 3
-COLUMNS = 3  # of a picture
+ROW = 3  # diagrams in one row; more stand in a square
 MARKS = "osD^vP*X"
 RING: dict[str, Any] = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "black"}
 GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
@@ -98,7 +99,7 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[objec
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
     """A diagram for each choice: error against median seconds, both logarithmic, the chosen setting ringed."""
     choices = list(dict.fromkeys(trial.choice for trial in trials))
-    columns = min(len(choices), COLUMNS)
+    columns = len(choices) if len(choices) <= ROW else math.ceil(math.sqrt(len(choices)))
     rows = -(-len(choices) // columns)
     figure = Figure(figsize=(5.4 * columns, 5 * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
