@@ -107,10 +107,13 @@ def under_the_pointer(page, x, y):
     return np.array([corner.split() for corner in page.evaluate(RING)[1:-1].split("L")], float)
 
 
-def directions(camera, pixels):
-    """Unit vectors to where rays of a camera meet the far wall of the sphere, by what it tells the server."""
-    focal = camera.image_height / 2 / np.tan(camera.fov / 2)
-    middle = np.array([camera.image_width, camera.image_height]) / 2
+def directions(camera, pixels, width, height):
+    """Unit vectors to where rays of a camera meet the far wall of the sphere, by the pose that it tells the server.
+
+    The size of the view is the page's: what the camera tells of it may be from before the page was laid out.
+    """
+    focal = height / 2 / np.tan(camera.fov / 2)
+    middle = np.array([width, height]) / 2
     rays = np.column_stack([(pixels - middle) / focal, np.ones(len(pixels))])
     rays = rays @ viser.transforms.SO3(camera.wxyz).as_matrix().T
     return np.array([coloured_sphere.direction_hit(camera.position, ray, inside=True) for ray in rays])
@@ -165,7 +168,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     ring = under_the_pointer(page, 380, 210)
     until(lambda: len(studio.judge.loaded.task.weight) == 2, meanwhile=lambda: page.mouse.click(380, 210))
     (client,) = studio._server.get_clients().values()
-    edge = directions(client.camera, ring) @ np.array(studio.judge.loaded.task.weight[1].axis)
+    edge = directions(client.camera, ring, 900, 560) @ np.array(studio.judge.loaded.task.weight[1].axis)
     np.testing.assert_allclose(np.degrees(np.arccos(edge)), 12.0, atol=0.3)  # of what was painted there
     tab(page, "Angles")
     page.get_by_role("button", name="Optimise").click()
