@@ -13,30 +13,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Ints, Mask
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
 from design.density.spin import mean_count, zones
-from design.errors import TaskError
 from design.objective.named_objectives import Objective
 from design.objective.problem import Problem
 from design.search.constraints import AtMost, Constraint, NoHole, fan_reach
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
-from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
 from design.sphere.outline import reach_about
-from design.sphere.polar_rule import MANY_EDGES
+from design.sphere.polar_weights import weights_over_polar
 from design.sphere.regions import Field
 from design.task.task import Limits
 
 FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
 MOST_NODES = 1441  # for balls below half a degree
 BATCH = 64  # planes whose exact densities are computed before the bound is asked again
-DIRECTIONS = 20_000  # that stand for a map, where circles would be slower
-MISSED = 0.05  # share of the weight that circles may miss or count twice
 MARGIN = 0.15  # what the coarse J of the search may be off by: 0.134 was seen, for a ball of 0.5 deg
 BLIND_MARGIN = 0.02  # what a blind share told from nodes may be off by: the few best settings are asked exactly
 REPORT = 1000  # planes between two lines of progress
@@ -125,7 +120,7 @@ def coarse_landscape(
 
     def weights_of(field: Field) -> Array:
         if id(field) not in over:
-            over[id(field)] = _weights_over_polar(problem, field, axes.representatives, nodes, circles)
+            over[id(field)] = weights_over_polar(field, axes.representatives, nodes, circles, problem.grid_step_deg)
         return over[id(field)]
 
     weights = tuple(weights_of(moment.field) for moment in moments)
@@ -153,37 +148,63 @@ def coarse_landscape(
         kept = [constraint.of(these, every) for constraint in constraints]
         return lowest(problem.objective, ways, open_planes[:, these], axes.has[:, every], kept)
 
-    everything, scouts = slice(None), slice(None, None, max(1, len(axes.first) // SCOUTS))
-    bounds = by_plane(lowest_of(everything, scouts))
-    exact = np.zeros(g.shape[1], dtype=bool)
+    def look(batch: Ints) -> None:
+        g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
+        if limits.min_density is not None:
+            thin[batch] = least[batch] < limits.min_density
+
+    plain, kept, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), exact
+
+
+def settled(
+    lowest_of: Callable[[slice | Ints, slice], tuple[Lowest, Lowest]],
+    look: Callable[[Ints], None],
+    size: tuple[int, int],
+    batch_size: int,
+    margin: float,
+    progress: Progress,
+) -> tuple[Lowest, Lowest, int]:
+    """The lowest J of all settings and of those that keep the constraints, once no bound can beat it; exact planes.
+
+    Args:
+        lowest_of: both of some planes about some axes.
+        look: makes the g of some planes exact, where it was a bound from below.
+        size: numbers of planes and axes.
+        batch_size: planes that are made exact before the bounds are asked again.
+        margin: what J may be off by.
+        progress: is told every `REPORT` planes.
+    """
+    step = max(1, size[1] // SCOUTS)
+    everything, scouts = slice(None), slice(None, None, step)
+    mark = margin + (SCOUTED if step > 1 else 0.0)
+    bounds = _by_plane(lowest_of(everything, scouts))
+    exact = np.zeros(size[0], dtype=bool)
     best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
     while True:
-        for batch in _batches(bounds):
-            batch = batch[may_win(bounds[:, batch], best + SCOUTED + effort.margin) & ~exact[batch]]
+        for batch in _batches(bounds, batch_size):
+            batch = batch[_may_win(bounds[:, batch], best + mark) & ~exact[batch]]
             if not len(batch):
                 continue
-            if exact.sum() // REPORT > (exact.sum() - BATCH) // REPORT:
+            if exact.sum() // REPORT > (exact.sum() - batch_size) // REPORT:
                 progress(f"exact densities: {exact.sum()} of at most {len(exact):,} scan planes")
-            g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
+            look(batch)
             exact[batch] = True
-            if limits.min_density is not None:
-                thin[batch] = least[batch] < limits.min_density
-            best = np.minimum(best, by_plane(lowest_of(batch, scouts)).min(axis=1))
+            best = np.minimum(best, _by_plane(lowest_of(batch, scouts)).min(axis=1))
         progress(f"all axes of all {len(exact):,} scan planes")
         plain, kept = lowest_of(everything, everything)
-        bounds = by_plane((plain, kept))
+        bounds = _by_plane((plain, kept))
         best = np.where(exact, bounds, np.inf).min(axis=1)
-        if not np.any(may_win(bounds, best + effort.margin) & ~exact):
-            break
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())
+        if not np.any(_may_win(bounds, best + margin) & ~exact):
+            return plain, kept, int(exact.sum())
 
 
-def by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
+def _by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
     """Lowest J of each plane either way round: of all settings, and of those that keep the constraints."""
     return np.stack([side.by_plane.min(axis=0) for side in both])
 
 
-def may_win(bounds: Float[ndarray, "2 planes"], best: Float[ndarray, " 2"]) -> Mask:
+def _may_win(bounds: Float[ndarray, "2 planes"], best: Float[ndarray, " 2"]) -> Mask:
     """Planes whose bound is not above the best: that of all settings, or that of those that keep the constraints."""
     return (np.isfinite(bounds) & (bounds <= best[:, None])).any(axis=0)
 
@@ -195,12 +216,12 @@ def _within(weights: Array) -> Array:
     return there.astype(np.float32)
 
 
-def _batches(bounds: Float[ndarray, "2 planes"]) -> list[Ints]:
+def _batches(bounds: Float[ndarray, "2 planes"], size: int) -> list[Ints]:
     """Planes by how far their bounds are above the lowest: the first alone, as they set the mark for all others."""
     finite = np.isfinite(bounds)
     lowest_of_all = np.where(finite.any(axis=1), np.where(finite, bounds, np.inf).min(axis=1), 0.0)
     order = np.argsort((bounds - lowest_of_all[:, None]).min(axis=0), kind="stable")
-    return [order[:1], order[1:2], *(order[i : i + BATCH] for i in range(2, len(order), BATCH))]
+    return [order[:1], order[1:2], *(order[i : i + size] for i in range(2, len(order), size))]
 
 
 def _means(problem: Problem, polar: Array, planes_rad: Array) -> Array:
@@ -223,60 +244,3 @@ def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) ->
     parts = in_chunks(lambda chunk: [rows(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
     found = [row for part in parts for row in part]
     return np.stack([g for g, _ in found], axis=1), np.stack([least for _, least in found])
-
-
-def _weights_over_polar(
-    problem: Problem, field: Field, axes: Float[ndarray, "axes 3"], nodes: int, circles: int
-) -> Array:
-    """Share of a weight near each polar node about each axis, shape (axes, nodes); rows sum to 1."""
-    if problem.grid_step_deg:
-        grid = equal_angle_grid(problem.grid_step_deg)
-        rows = _histogram(Samples(grid, field.weight_at(grid)), axes, nodes)
-    elif field.edges > MANY_EDGES:
-        rows = _histogram(weighted_samples(field, DIRECTIONS), axes, nodes)
-    else:
-        polar = (np.arange(circles) + 0.5) * (np.pi / circles)
-        rows = _share_between_nodes(
-            field.on_circles_about(axes, polar, reach_about(field, axes)) * np.sin(polar), nodes
-        )
-        around = rows.sum(axis=1) * (2 * np.pi * np.pi / circles)
-        samples = weighted_samples(field, DIRECTIONS // 10)
-        # what is narrower than the step between circles they meet about some axes and miss about others
-        if np.abs(around / samples.weights.sum() - 1).max() > MISSED:
-            rows = _histogram(samples, axes, nodes)
-    total = rows.sum(axis=1, keepdims=True)
-    if not (total > 0).all():
-        raise TaskError(EMPTY)
-    return rows / total
-
-
-def _histogram(samples: Samples, axes: Float[ndarray, "axes 3"], nodes: int) -> Array:
-    """Weight of samples near each polar node about each axis, shape (axes, nodes)."""
-    parts = in_chunks(
-        lambda chunk: _polar_histogram(samples.directions, samples.weights, axes[chunk], nodes), len(axes), 4
-    )
-    return np.concatenate(parts)
-
-
-def _share_between_nodes(circles: Array, nodes: int) -> Array:
-    """Weights at circle middles, shape (axes, circles), shared linearly between the nodes on both sides."""
-    cells = circles.reshape(len(circles), nodes - 1, -1)
-    upper = (np.arange(cells.shape[2]) + 0.5) / cells.shape[2]
-    shared = np.zeros((len(circles), nodes))
-    shared[:, :-1] += cells @ (1 - upper)
-    shared[:, 1:] += cells @ upper
-    return shared
-
-
-@njit(cache=True, nogil=True)
-def _polar_histogram(directions: Array, weights: Array, axes: Array, nodes: int) -> Array:
-    """Weight by polar angle, each direction shared linearly between its two nodes."""
-    out = np.zeros((len(axes), nodes))
-    for a in range(len(axes)):
-        for i in range(len(directions)):
-            c = directions[i, 0] * axes[a, 0] + directions[i, 1] * axes[a, 1] + directions[i, 2] * axes[a, 2]
-            at = np.arccos(min(1.0, max(-1.0, c))) * ((nodes - 1) / np.pi)
-            k = min(int(at), nodes - 2)
-            out[a, k] += weights[i] * (k + 1 - at)
-            out[a, k + 1] += weights[i] * (at - k)
-    return out

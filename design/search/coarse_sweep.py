@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.arrays import Array
+from design.arrays import Array, Ints
 from design.concurrency.parallel import in_chunks
 from design.density.beams import beam_directions_rot
 from design.density.sweep import mean_count_swept, zones_swept
@@ -17,7 +17,7 @@ from design.errors import TaskError
 from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.objective.score import blind_to_sweep
-from design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, by_plane, may_win
+from design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, settled
 from design.search.constraints import AtMost, Constraint
 from design.search.grid_classes import Folded
 from design.search.plane_axis_product import Lowest, lowest, one_way
@@ -29,7 +29,7 @@ DIRECTIONS = 3000  # of the rotation frame, at least: one every 3.7 deg
 MOST_DIRECTIONS = 20_000
 IN_REGION = 600  # of them, if it takes no more than the most
 MOST_SETTINGS = 50_000_000
-REPORT = 200
+BATCH = 16  # planes whose exact densities are computed before the bound is asked again
 
 
 def swept_landscape(
@@ -74,27 +74,21 @@ def swept_landscape(
     if limits.min_density is not None:
         thin = (np.floor(mean + 1e-9) < limits.min_density).astype(np.float32)
         constraints.append(AtMost(thin, (shares > 0).astype(np.float32), 0.5, turns=False))
-    exact = np.zeros(len(beams), dtype=bool)
-    best = np.full(2, np.inf)  # of all settings, and of those that keep the constraints
 
-    def lowest_of(these: slice) -> tuple[Lowest, Lowest]:
-        ways = [one_way(m, of_g[these], w) for m, of_g, w in zip(problem.objective.moments, g, weights, strict=True)]
-        kept = [constraint.of(these, slice(None)) for constraint in constraints]
-        return lowest(problem.objective, ways, planes.has[:, these], axes.has, kept)
+    def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
+        moments = zip(problem.objective.moments, g, weights, strict=True)
+        ways = [one_way(moment, of_g[these], w[every]) for moment, of_g, w in moments]
+        kept = [constraint.of(these, every) for constraint in constraints]
+        return lowest(problem.objective, ways, planes.has[:, these], axes.has[:, every], kept)
 
-    bounds = by_plane(lowest_of(slice(None)))
-    for c in np.argsort(bounds[0], kind="stable"):
-        if not may_win(bounds[:, c : c + 1], best + effort.margin)[0]:
-            continue
-        if exact.sum() % REPORT == 0:
-            progress(f"exact densities: {exact.sum()} of at most {len(beams):,} scan planes")
-        g[:, c], least = _exact(problem, directions, beams[c])
-        exact[c] = True
-        if limits.min_density is not None:
-            thin[c] = least < limits.min_density
-        best = np.minimum(best, by_plane(lowest_of(slice(c, c + 1))).min(axis=1))
-    plain, kept = lowest_of(slice(None))
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), int(exact.sum())
+    def look(batch: Ints) -> None:
+        for c in batch:
+            g[:, c], least = _exact(problem, directions, beams[c])
+            if limits.min_density is not None:
+                thin[c] = least < limits.min_density
+
+    plain, kept, exact = settled(lowest_of, look, (len(beams), len(axes.first)), BATCH, effort.margin, progress)
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), exact
 
 
 def _mean(problem: Problem, directions: Array, beams: Array) -> Array:
