@@ -24,7 +24,8 @@ from design.objective.problem import Problem
 from design.sphere.polar_rule import breaks_of
 from design.task.task import LoadedTask
 
-ORDERS = 12, 20  # of the Gauss-Legendre pieces
+ORDERS = 12, 20, 40, 80, 160  # of the Gauss-Legendre pieces, as many as it takes
+ENOUGH = 1e-8  # difference of two orders
 DRAWN = 2**18  # directions, of each of eight scramblings
 EVEN = 1e-9  # of a line: nearer to a whole number of them there is no seam
 
@@ -65,7 +66,7 @@ def smooth_reference(problem: Problem, angles_rad: Setting) -> Reference:
     beams = Rotation.from_euler("YX", angles_rad[[3, 2]]).apply(in_laser)
     polar, azimuth = np.arctan2(np.hypot(beams[:, 0], beams[:, 1]), beams[:, 2]), np.arctan2(beams[:, 1], beams[:, 0])
     edges = np.concatenate([polar - problem.ball_rad, polar + problem.ball_rad])
-    J = []
+    J: list[float] = []
     for order in ORDERS:
         moments = []
         for moment in problem.objective.moments:
@@ -76,7 +77,9 @@ def smooth_reference(problem: Problem, angles_rad: Setting) -> Reference:
             g = mean_over_phases(t, polar, azimuth, problem.lines.count, problem.ball_rad, table)
             moments.append(float(weight @ g / weight.sum()))
         J.append(float(problem.objective.join(np.array(moments))))
-    return Reference(J[1], abs(J[1] - J[0]))
+        if len(J) > 1 and abs(J[-1] - J[-2]) <= ENOUGH:
+            break
+    return Reference(J[-1], abs(J[-1] - J[-2]))
 
 
 def smooth_pieces(breaks: Float[ndarray, " n"], order: int) -> tuple[Array, Array]:

@@ -10,11 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from design.accuracy.machine import this_machine
-from design.accuracy.reference import Reference
 from design.accuracy.search_trials import search_trials
 from design.accuracy.stress import StressRow, as_turning, stress_rows
 from design.accuracy.trials import GREYS, MARKS, RING, report_trials, write_table
-from design.accuracy.work_precision import Point, best_points, measure_methods
+from design.accuracy.work_precision import Measured, best_points, measure_methods
 from design.evaluation.picture_files import save_picture
 from design.motion import Shortest
 from design.objective.problem import problem_of
@@ -22,18 +21,18 @@ from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 
 
-def write_method_points(path: Path, points: list[Point], truth: Reference) -> None:
+def write_method_points(path: Path, measured: Measured) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
-    header = "method setting J J_error argmin_error_deg seconds_median seconds_min seconds_max peak_MB on_front"
+    header = "method setting J J_error J_error_median argmin_error_deg seconds_median seconds_min seconds_max peak_MB"
     rows = []
-    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
+    for point, front in zip(measured.points, best_points(measured.points, measured.floor), strict=True):
         seconds = point.seconds or (np.nan,)
-        numbers = [point.J, point.J_error, point.argmin_error_deg]
+        numbers = [point.J, point.J_error, point.J_error_median, point.argmin_error_deg]
         numbers += [point.median_s if point.seconds else np.nan, min(seconds), max(seconds), point.peak_mb]
         cells = ["" if np.isnan(n) else f"{n:.6g}" for n in numbers]
         marks = [str(front).lower(), str(point.chosen).lower()]
         rows.append([point.method, point.setting, *cells, *marks, point.failed])
-    write_table(path, [*header.split(), "chosen", "failed"], rows)
+    write_table(path, [*header.split(), "on_front", "chosen", "failed"], rows)
 
 
 def write_rows(path: Path, rows: list[StressRow]) -> None:
@@ -42,16 +41,17 @@ def write_rows(path: Path, rows: list[StressRow]) -> None:
     write_table(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
 
 
-def work_precision_picture(path: Path, points: list[Point], truth: Reference, title: str) -> None:
-    """Error against median seconds, both logarithmic, one curve per method, one point per setting."""
+def work_precision_picture(path: Path, measured: Measured, title: str) -> None:
+    """Worst error against median seconds, both logarithmic, one curve per method; a thin line down to the median."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axis = figure.subplots()
-    floor = max(truth.J_error, 1e-16)
+    floor, points = max(measured.floor, 1e-16), measured.points
     methods = list(dict.fromkeys(point.method for point in points))
     for i, method in enumerate(methods):
         mine = [p for p in points if p.method == method and p.seconds]
         seconds = [p.median_s for p in mine]
         error = [max(p.J_error, floor) for p in mine]
+        axis.vlines(seconds, [max(p.J_error_median, floor) for p in mine], error, color=GREYS[i % 8], linewidth=0.5)
         axis.plot(seconds, error, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
         for s, e, p in zip(seconds, error, mine, strict=True):
             axis.annotate(p.setting.split()[0], (s, e), textcoords="offset points", xytext=(4, 4), fontsize=6.5)
@@ -63,11 +63,15 @@ def work_precision_picture(path: Path, points: list[Point], truth: Reference, ti
             axis.plot([], [], " ", label=f"{method}: {failed}")
     axis.axhline(floor, color="#888888", linestyle=":", linewidth=1)
     axis.annotate("error of the reference", (1, floor), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel="error of J")
+    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=_whose_error(len(measured.truths)))
     axis.grid(which="major", color="#dddddd", linewidth=0.6)
     axis.legend(fontsize=8)
     axis.set_title(f"{title}\n{this_machine()}", fontsize=10)
     save_picture(figure, path)
+
+
+def _whose_error(settings: int) -> str:
+    return "error of J" if settings == 1 else f"error of J, the worst of {settings} settings (thin: to the median)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,15 +112,21 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
         TaskError: no direction has a weight, or no setting keeps the limits.
     """
     optimum = find_optimum(loaded, say)
-    truth, points = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, say)
+    measured = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, say)
+    points, truth = measured.points, measured.truths[0]
     folder.mkdir(parents=True, exist_ok=True)
-    write_method_points(folder / "work_precision.csv", points, truth)
-    work_precision_picture(folder / "work_precision.png", points, truth, f"{loaded.task.name}: {optimum.title}")
-    lines = [this_machine(), f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}"]
-    for point, front in zip(points, best_points(points, truth.J_error), strict=True):
+    write_method_points(folder / "work_precision.csv", measured)
+    work_precision_picture(folder / "work_precision.png", measured, f"{loaded.task.name}: {optimum.title}")
+    lines = [
+        this_machine(),
+        f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}; the worst and the median error of "
+        f"{len(measured.truths)} settings, this one and others of its ranges; times of this one",
+    ]
+    for point, front in zip(points, best_points(points, measured.floor), strict=True):
         seconds = f"{point.median_s:.4f} s" if point.seconds else point.failed
         mark = "=" if point.chosen else "*" if front else " "
-        lines.append(f"{mark} {point.method:24} {point.setting:16} error {point.J_error:.1e}  {seconds}")
+        error = f"{point.J_error:.1e} {point.J_error_median:.1e}"
+        lines.append(f"{mark} {point.method:24} {point.setting:16} error {error}  {seconds}")
     return [*lines, f"= chosen, * nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}"]
 
 

@@ -1,10 +1,13 @@
-"""Error against run time of every way to compute J at one setting: what the numerical defaults are chosen from."""
+"""Error against run time of every way to compute J: what the numerical defaults are chosen from.
+
+The time is that of the first setting. The error is the worst of several: at one setting a few nodes are often lucky.
+"""
 
 from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +18,15 @@ from design.accuracy.reference import Reference, is_smooth, reference
 from design.arrays import Array, Setting
 from design.errors import ScanwrightError
 from design.objective.problem import Problem
+from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
 
 REPEATS = 5
 SLOW_S = 2.0  # a point slower than this is timed once
 LOOK_DEG = 2.0  # how far around the setting a method's own minimum is looked for
 LOOKS = 9
+OTHERS, OTHERS_DRAWN = 7, 2  # settings beside the first; fewer where each reference is drawn at random
+SEED = 0
 
 Progress = Callable[[str], None]
 
@@ -32,8 +38,9 @@ class Point:
     Attributes:
         method: its name.
         setting: the knob and its value.
-        J: its answer.
-        J_error: distance from the reference.
+        J: its answer at the first setting.
+        J_error: distance from the reference, the worst of all settings.
+        J_error_median: the median of all settings.
         argmin_error_deg: distance of its minimum over beta_laser from that of the reference; NaN where not looked for.
         seconds: of the repeats, shortest to longest.
         peak_mb: highest memory that Python and NumPy asked for.
@@ -45,6 +52,7 @@ class Point:
     setting: str
     J: float
     J_error: float
+    J_error_median: float
     argmin_error_deg: float
     seconds: tuple[float, ...]
     peak_mb: float
@@ -65,29 +73,62 @@ class _Nearby:
     minimum_deg: float
 
 
-def measure_methods(
-    loaded: LoadedTask, problem: Problem, angles_rad: Setting, progress: Progress
-) -> tuple[Reference, list[Point]]:
-    """All methods at all their knobs on one setting, against the reference.
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What all methods gave.
+
+    Attributes:
+        truths: the reference at each setting, the first one's first.
+        points: one of each method and value of its knob.
+    """
+
+    truths: tuple[Reference, ...]
+    points: tuple[Point, ...]
+
+    @property
+    def floor(self) -> float:
+        """What the references may be off by, the worst of them: errors below it are not told apart."""
+        return max(truth.J_error for truth in self.truths)
+
+
+def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> Measured:
+    """All methods at all their knobs on one setting, and their errors on some others of the task as well.
 
     The minima of methods are compared where the reference is smooth: a drawn one jumps more than they are apart.
     """
-    progress("reference")
-    truth = reference(loaded, problem, angles_rad)
+    settings, truths = _settings(loaded, problem, first_rad, progress)
     nearby = None
     if is_smooth(problem):
         steps = LOOK_DEG * np.linspace(-1, 1, LOOKS)
-        J = [reference(loaded, problem, _turned(angles_rad, d)).J for d in steps]
+        J = [reference(loaded, problem, _turned(first_rad, d)).J for d in steps]
         nearby = _Nearby(steps, _minimum(steps, J))
     points = []
     for name, (method, knob, values) in methods_for(problem).items():
         for value in values:
             progress(f"{name}, {value} {knob}")
-            points.append(_point(problem, angles_rad, truth, nearby, name, method, knob, value))
-    return truth, points
+            points.append(_point(problem, settings, truths, nearby, name, method, knob, value))
+    return Measured(tuple(truths), tuple(points))
 
 
-def best_points(points: list[Point], reference_error: float) -> list[bool]:
+def _settings(
+    loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress
+) -> tuple[list[Setting], list[Reference]]:
+    """The first setting and some drawn from the ranges of the task, with their references; blind ones have none."""
+    low, high = np.radians([loaded.task.angles.limits(name) for name in NAMES]).T
+    others = OTHERS if is_smooth(problem) else OTHERS_DRAWN
+    drawn = np.random.default_rng(SEED).uniform(low, high, (others if (high > low).any() else 0, len(NAMES)))
+    settings: list[Setting] = []
+    truths: list[Reference] = []
+    for setting in (first_rad, *drawn):
+        progress(f"reference of setting {len(settings) + 1}")
+        truth = reference(loaded, problem, setting)
+        if np.isfinite(truth.J):
+            settings.append(setting)
+            truths.append(truth)
+    return settings, truths
+
+
+def best_points(points: Sequence[Point], reference_error: float) -> list[bool]:
     """Whether no other point is both faster and nearer; errors below the reference's own count as equal."""
     costs = np.array([[p.median_s, max(p.J_error, reference_error)] for p in points])
     answered = np.isfinite(costs[:, 1])
@@ -96,34 +137,36 @@ def best_points(points: list[Point], reference_error: float) -> list[bool]:
 
 def _point(
     problem: Problem,
-    angles_rad: Setting,
-    truth: Reference,
+    settings: list[Setting],
+    truths: list[Reference],
     nearby: _Nearby | None,
     name: str,
     method: Method,
     knob: str,
     value: int,
 ) -> Point:
-    setting = f"{value} {knob}"
+    setting, first_rad = f"{value} {knob}", settings[0]
     chosen = name in ("segments", "directions") and value == problem.nodes
     try:
-        J = method(problem, angles_rad, value)  # and warms up
+        J = [method(problem, angles, value) for angles in settings]  # and warms up
         tracemalloc.start()
-        method(problem, angles_rad, value)
+        method(problem, first_rad, value)
         peak = tracemalloc.get_traced_memory()[1] / 1e6
         tracemalloc.stop()
     except (ScanwrightError, MemoryError, np.linalg.LinAlgError) as error:
-        return Point(name, setting, np.nan, np.nan, np.nan, (), np.nan, failed=str(error))
+        return Point(name, setting, np.nan, np.nan, np.nan, np.nan, (), np.nan, failed=str(error))
     seconds: list[float] = []
     while len(seconds) < REPEATS and (not seconds or seconds[0] < SLOW_S):
         start = time.perf_counter()
-        method(problem, angles_rad, value)
+        method(problem, first_rad, value)
         seconds.append(time.perf_counter() - start)
     moved = np.nan
     if nearby is not None and seconds[0] < SLOW_S:
-        around = [method(problem, _turned(angles_rad, d), value) for d in nearby.steps_deg]
+        around = [method(problem, _turned(first_rad, d), value) for d in nearby.steps_deg]
         moved = abs(_minimum(nearby.steps_deg, around) - nearby.minimum_deg)
-    return Point(name, setting, J, abs(J - truth.J), moved, tuple(sorted(seconds)), peak, chosen)
+    off = np.abs(np.array(J) - [truth.J for truth in truths])
+    times = tuple(sorted(seconds))
+    return Point(name, setting, J[0], float(off.max()), float(np.median(off)), moved, times, peak, chosen)
 
 
 def _turned(angles_rad: Setting, degrees: float) -> Setting:

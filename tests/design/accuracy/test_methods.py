@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
+from design.accuracy import work_precision
 from design.accuracy.methods import METHODS, by_ball_count, by_ball_search
 from design.accuracy.reference import smooth_reference
-from design.accuracy.work_precision import Point, best_points
+from design.accuracy.work_precision import Point, best_points, measure_methods
 from design.density.beams import beam_directions_rot, polar_and_azimuth
 from design.density.spin import zones
 from design.errors import TaskError
@@ -64,8 +65,20 @@ def test_every_method_converges_to_the_reference(ground, name):
     assert method(ground, ANGLES, values[-1]) == pytest.approx(smooth_reference(ground, ANGLES).J, abs=within)
 
 
+def test_the_error_is_the_worst_of_several_settings(ground, monkeypatch):
+    monkeypatch.setattr("design.accuracy.methods.METHODS", {"segments": (METHODS["segments"][0], "nodes", (81,))})
+    monkeypatch.setattr(work_precision, "OTHERS", 2)
+    measured = measure_methods(load_task(Path("ground_ahead")), ground, ANGLES, lambda _: None)
+    (found,) = measured.points
+    assert [truth.J for truth in measured.truths[:1]] == [smooth_reference(ground, ANGLES).J]
+    assert len({truth.J for truth in measured.truths}) == 3
+    assert measured.floor < 1e-6
+    assert abs(found.J - measured.truths[0].J) <= found.J_error
+    assert found.J_error_median < found.J_error < 0.1
+
+
 def point(seconds, error):
-    return Point("m", "s", -1.0, error, 0.0, (seconds,), 1.0)
+    return Point("m", "s", -1.0, error, error, 0.0, (seconds,), 1.0)
 
 
 def test_the_front_keeps_what_nothing_beats():
