@@ -1,6 +1,6 @@
 """How many small faults the tests notice: mutants of the modules that carry the numbers, each under its own tests.
 
-    python -m benchmarks.mutants [--count 200] [--seed 1] [--only NAME] [--part 1/4]
+    python -m benchmarks.mutants [--count 200] [--first 0] [--seed 1] [--only NAME] [--part 1/4]
 
 A mutant is the program with one operator, comparison or number changed, at random, and as many in each module. It
 is made in a copy of the checkout; only the tests of its module run, until the first that fails. One that takes three
@@ -176,12 +176,13 @@ def main() -> None:
     """Make them, run them, count them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="go on behind those of an earlier run")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=MODULES, action="append", help="modules, all if none is named")
     parser.add_argument("--part", default="1/1", help="a slice of the sample, as 1/4")
     asked = parser.parse_args()
     part, parts = (int(number) for number in asked.part.split("/"))
-    mutants = sample(asked.only or list(MODULES), asked.count, asked.seed)[part - 1 :: parts]
+    mutants = sample(asked.only or list(MODULES), asked.count, asked.seed)[asked.first + part - 1 :: parts]
     print(f"seed {asked.seed}, part {asked.part}: {len(mutants)} mutants", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         copied = Path(folder) / "checkout"
