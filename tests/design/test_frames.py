@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from design.frames import R_rot_laser, R_world_rot, Rx, Ry, Rz, apply, rigid, rotvec_to_matrix
+from design.frames import R_rot_laser, R_world_rot, Rx, Ry, Rz, apply, rigid, roll_pitch_yaw, rotvec_to_matrix
 
 angle = st.floats(-7, 7) | st.floats(-1e-7, 1e-7) | st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, -np.pi])
 rotvec = st.tuples(angle, angle, angle)
@@ -50,6 +50,14 @@ def test_the_order_of_the_factors_is_that_of_the_paper(a, b, c):
     # scipy: upper case is intrinsic, written from the left
     close(R_world_rot(a, b, c), Rotation.from_euler("XYZ", [a, b, c]).as_matrix())
     close(R_rot_laser(a, b, c), Rotation.from_euler("ZYX", [c, b, a]).as_matrix())
+    close(R_world_rot(a, b), R_world_rot(a, b, 0))
+    close(R_rot_laser(a, b), R_rot_laser(a, b, 0))
+
+
+@given(angle, angle, angle)
+def test_roll_pitch_and_yaw_turn_about_fixed_axes(a, b, c):
+    R = Rotation.from_euler("xyz", [a, b, c]).as_matrix()  # lower case is about axes that stay
+    close(Rotation.from_euler("xyz", roll_pitch_yaw(R)).as_matrix(), R, atol=2e-9)
 
 
 @given(st.floats(-7, 7))

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from firmware_io.servo.bus.registers import RPM
 from firmware_io.servo.dynamixel.tables import TABLES
 
+RPM = math.radians(360) / 60
 STEP_12_BIT = 2 * math.pi / 4096
 MX = {  # mx/mx-28 and mx/mx-64
     "return_delay_ns": (5, 1, 2000, "none"),
