@@ -31,3 +31,18 @@ def test_in_a_thread_none_bottoms_and_two_diameters_hold_where_there_is_room(nam
     assert length in fit or not fit
     enough = [n for n in fit if n >= grip_mm + 2 * screw.nominal]
     assert length == (enough[0] if enough else max(fit, default=LENGTHS[name][0]))
+
+
+@given(st.sampled_from(sorted(LENGTHS)), st.floats(1, 8), st.floats(1, 6))
+def test_in_a_trap_a_screw_comes_through_its_nut_and_the_next_shorter_one_does_not(name, grip_mm, depth_mm):
+    screw = SCREWS[name]
+    length, through = shank_mm(screw, grip_mm, "trap", depth_mm), grip_mm + depth_mm + screw.nut_height
+    shorter = max((n for n in LENGTHS[name] if n < length), default=0)
+    assert length >= min(through - 0.1, LENGTHS[name][-1]) and shorter < through
+
+
+@given(st.sampled_from(sorted(LENGTHS)), st.floats(1, 8))
+def test_a_grub_screw_reaches_what_it_clamps_and_the_next_shorter_one_does_not(name, grip_mm):
+    length = shank_mm(SCREWS[name], grip_mm, "grub", 0.0)
+    shorter = max((n for n in LENGTHS[name] if n < length), default=0)
+    assert length >= grip_mm - 0.1 and shorter < grip_mm
