@@ -493,7 +493,7 @@ def test_two_programs_cannot_share_a_port():
 FAULTS = [
     ("overload", "overload at {volts} V, 30 degC: free what brakes the axis"),
     ("overheat", r"overheating at {volts} V, \d+5 degC: let it cool down"),
-    ("stall", r"stall: moved 0\.\d deg where"),
+    ("stall", r"stall: moved \d+\.\d deg where"),
     ("brown_out", r"restarted by itself, {volts} V now: look at its supply"),
     ("low", r"voltage at \d.\d V, 30 degC: look at its supply"),
 ]
