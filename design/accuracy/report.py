@@ -13,7 +13,7 @@ from design.accuracy.machine import this_machine
 from design.accuracy.search_trials import search_trials
 from design.accuracy.stress import StressRow, as_turning, stress_rows
 from design.accuracy.trials import GREYS, MARKS, RING, report_trials, write_table
-from design.accuracy.work_precision import Measured, best_points, measure_methods
+from design.accuracy.work_precision import MethodsMeasured, best_points, measure_methods
 from design.evaluation.picture_files import save_picture
 from design.motion import Shortest
 from design.objective.problem import problem_of
@@ -21,7 +21,7 @@ from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 
 
-def write_method_points(path: Path, measured: Measured) -> None:
+def write_method_points(path: Path, measured: MethodsMeasured) -> None:
     """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
     header = "method setting J J_error J_error_median argmin_error_deg seconds_median seconds_min seconds_max peak_MB"
     rows = []
@@ -41,7 +41,7 @@ def write_rows(path: Path, rows: list[StressRow]) -> None:
     write_table(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
 
 
-def work_precision_picture(path: Path, measured: Measured, title: str) -> None:
+def work_precision_picture(path: Path, measured: MethodsMeasured, title: str) -> None:
     """Worst error against median seconds, both logarithmic, one curve per method; a thin line down to the median."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axis = figure.subplots()

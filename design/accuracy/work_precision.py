@@ -74,7 +74,7 @@ class _Nearby:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MethodsMeasured:
     """What all methods gave.
 
     Attributes:
@@ -91,7 +91,7 @@ class Measured:
         return max(truth.J_error for truth in self.truths)
 
 
-def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> Measured:
+def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> MethodsMeasured:
     """All methods at all their knobs on one setting, and their errors on some others of the task as well.
 
     The minima of methods are compared where the reference is smooth: a drawn one jumps more than they are apart.
@@ -107,7 +107,7 @@ def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, pr
         for value in values:
             progress(f"{name}, {value} {knob}")
             points.append(_point(problem, settings, truths, nearby, name, method, knob, value))
-    return Measured(tuple(truths), tuple(points))
+    return MethodsMeasured(tuple(truths), tuple(points))
 
 
 def _settings(
