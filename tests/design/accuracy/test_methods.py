@@ -68,6 +68,7 @@ def test_every_method_converges_to_the_reference(ground, name):
 def test_the_error_is_the_worst_of_several_settings(ground, monkeypatch):
     monkeypatch.setattr("design.accuracy.methods.METHODS", {"segments": (METHODS["segments"][0], "nodes", (81,))})
     monkeypatch.setattr(work_precision, "OTHERS", 2)
+    monkeypatch.setattr("design.accuracy.reference.ORDERS", (12, 20, 40))
     measured = measure_methods(load_task(Path("ground_ahead")), ground, ANGLES, lambda _: None)
     (found,) = measured.points
     assert [truth.J for truth in measured.truths[:1]] == [smooth_reference(ground, ANGLES).J]
@@ -100,6 +101,7 @@ def test_the_stress_command_writes_its_table(tmp_path, monkeypatch, capsys):
 def test_the_report_on_a_fixed_setting(tmp_path, monkeypatch, capsys):
     few = {name: (*METHODS[name][:2], METHODS[name][2][:2]) for name in ("segments", "mean count", "rings")}
     monkeypatch.setattr("design.accuracy.methods.METHODS", few)
+    monkeypatch.setattr("design.accuracy.reference.ORDERS", (12, 20))
     monkeypatch.setattr(sys, "argv", ["scanwright", "accuracy", "rolling", "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as stop:
         scanwright_command()
