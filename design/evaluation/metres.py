@@ -6,7 +6,7 @@ Every beam of a simulated scan is followed to the plane of a region; what is sai
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from design.arrays import Array, Ints, Setting, Vector
-from design.density.beams import scan_at
+from design.density.beams import polar_and_azimuth, scan_at
+from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.sphere.rectangle import edge_normals
 from design.sphere.regions import Field
@@ -25,10 +26,12 @@ AT_M = 3.0  # from the optical centre, where a gap is told
 RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
 CELLS = 64  # along each side of a region, to begin with
 MOST_CELLS = 200_000
+NO_SPOTS = np.empty((0, 4))
 Nearest = Callable[[Array, list[int]], tuple[Array, Ints]]
 """Distances from points (n, 3) to those points of a scan that are so many-th nearest, and which they are."""
 
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+SPOT = 0.8  # of the widest gap: narrower ones off the axis are told apart from it
 SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and never too narrow
 
 
@@ -42,6 +45,7 @@ class PlaneFigures:
         points_per_m2: in the mean over the part of it that no mask hides.
         at_m: distance from the optical centre of what `gap_cm` is said of: `AT_M`, or the nearest to it in the region.
         gap_cm: diameter of the widest disc on the plane, its middle there, that no beam hits.
+        gap_off_axis_cm: the same without the spots around the axis that the fan goes around.
         twice_cm: diameter of the smallest disc on the plane that is hit at least twice wherever it lies in the region.
     """
 
@@ -50,21 +54,25 @@ class PlaneFigures:
     points_per_m2: float
     at_m: float
     gap_cm: float
+    gap_off_axis_cm: float
     twice_cm: float
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON; None where no beam ends there."""
         told = asdict(self)
-        return told if self.points else told | dict.fromkeys(("at_m", "gap_cm", "twice_cm"))
+        return told if self.points else told | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
 
     def words(self) -> str:
         """The same in a line."""
         if not self.points:
             return f"{self.region}: no beam of a full scan ends there"
-        return (
-            f"{self.region}: {_round(self.points_per_m2)} points per m2, gaps of {_round(self.gap_cm)} cm at "
-            f"{self.at_m:.2g} m; what is {_round(self.twice_cm)} cm wide is hit twice wherever it lies"
-        )
+        gaps = f"gaps of {_round(self.gap_cm)} cm at {self.at_m:.2g} m"
+        if self.gap_off_axis_cm < SPOT * self.gap_cm:
+            gaps = (
+                f"gaps of {_round(self.gap_off_axis_cm)} cm at {self.at_m:.2g} m, {_round(self.gap_cm)} around the axis"
+            )
+        twice = f"what is {_round(self.twice_cm)} cm wide is hit twice wherever it lies"
+        return f"{self.region}: {_round(self.points_per_m2)} points per m2, {gaps}; {twice}"
 
 
 def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
@@ -83,11 +91,23 @@ def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tupl
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
     beams = beams[~problem.field.masked_at(beams)]
-    return tuple(on_plane(region, beams, problem) for region in regions)
+    spots = _spots(problem, angles_rad)
+    return tuple(on_plane(region, beams, problem, spots) for region in regions)
 
 
-def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem) -> PlaneFigures:
-    """What beams, unit vectors (n, 3) of the world, leave on one region."""
+def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:
+    """Cones around both ends of the axis that the fan goes around, as direction and cosine; a sweep has none."""
+    if problem.sweep is not None:
+        return np.empty((0, 4))
+    axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
+    return np.array([[*axis, np.cos(polar.min())], [*-axis, np.cos(np.pi - polar.max())]])
+
+
+def on_plane(
+    region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem, spots: Float[ndarray, "spots 4"]
+) -> PlaneFigures:
+    """What beams, unit vectors (n, 3) of the world, leave on one region; `spots` are cones that hold none of them."""
     corners = np.array(region.corners_m())
     sides = corners[1] - corners[0], corners[3] - corners[0]
     normal = np.cross(*sides)
@@ -97,34 +117,37 @@ def on_plane(region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem
     ends = beams[facing] * (away_m / (beams[facing] @ normal))[:, None]
     inside = (beams[facing] @ edge_normals(corners).T >= 0).all(axis=1)
 
-    plane = _Plane(corners[0], sides[0], sides[1], problem.field)
+    plane = _Plane(corners[0], sides[0], sides[1], problem.field, NO_SPOTS)
     away = np.linalg.norm(plane.points(_grid(CELLS)), axis=1)
     seen = ~plane.hidden(_grid(CELLS))
     if not inside.any() or not seen.any():
-        return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf)
+        return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf, np.inf)
     area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
     nearest = cKDTree(ends).query  # what lies just beyond an edge ends a gap too
+    there = at_m * (1 - RING), at_m * (1 + RING)
     return PlaneFigures(
         region.words(),
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),
         at_m,
-        200 * plane.widest(nearest, 1, (at_m * (1 - RING), at_m * (1 + RING))),
+        200 * plane.widest(nearest, 1, there),
+        200 * replace(plane, spots=spots).widest(nearest, 1, there),
         200 * plane.widest(nearest, 2, (0.0, np.inf)),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Plane:
-    """A rectangle: one corner, the sides from there, and what may hide it."""
+    """A rectangle: one corner, the sides from there, and what may hide it: masks, and cones that are not to count."""
 
     corner: Vector
     along: Vector
     across: Vector
     field: Field
+    spots: Float[ndarray, "spots 4"]
 
     def points(self, shares: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Points of the rectangle [m] at shares of its sides, 0 .. 1."""
@@ -158,9 +181,11 @@ class _Plane:
             shares = (shares[near][:, None] + half * QUARTERS).reshape(-1, 2)
 
     def hidden(self, shares: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
-        """Whether a mask hides points, which are given as shares of the sides."""
+        """Whether a mask or a spot hides points, which are given as shares of the sides."""
         points = self.points(shares)
-        return self.field.masked_at(points / np.linalg.norm(points, axis=1)[:, None])
+        directions = points / np.linalg.norm(points, axis=1)[:, None]
+        in_spot = (directions @ self.spots[:, :3].T >= self.spots[:, 3]).any(axis=1)
+        return self.field.masked_at(directions) | in_spot
 
 
 def _grid(cells: int) -> Float[ndarray, "n 2"]:

@@ -1,5 +1,6 @@
 """What a scan leaves on planes, against a slow loop over lines and beams, and against discs tried one by one."""
 
+import re
 from math import cos, hypot, pi, radians, sin
 
 import numpy as np
@@ -99,6 +100,28 @@ def test_gaps_are_those_of_discs_tried_one_by_one(beams):
         assert told_cm / 100 <= (2 * tried_m + 2 * step) * (1 + SLACK)
 
 
+def test_the_spot_around_the_axis_is_told_apart_from_the_gaps_elsewhere():
+    """An axis to a place 3 m away, which the fan goes around by 2 deg, and lines that are much closer than that."""
+    task = load_task(
+        {
+            "name": "t",
+            "sensor": "UST-10LX",
+            "servo": "XM430-W350",
+            "slip_ring": "UH1256-02-0610-06S",
+            "motion": {"period_s": 20},
+            "weight": [{"shape": "wall", "distance_m": 3.0, "width_m": 2.0, "height_m": 1.0, "top_m": 2.0}],
+        }
+    )
+    (wall,) = on_planes(task, problem_of(task), np.radians((0.0, 90.0, 88.0, 0.0)))
+    spot_cm = 2 * 300 * np.tan(np.radians(2.0))
+    assert spot_cm <= wall.gap_cm <= 1.1 * spot_cm
+    assert wall.gap_off_axis_cm < spot_cm / 2
+    assert re.search(r"gaps of \S+ cm at 3 m, 2\d around the axis; what is", wall.words())
+    (through,) = on_planes(task, problem_of(task), np.radians((0.0, 90.0, 90.0, 0.0)))
+    assert through.gap_off_axis_cm == pytest.approx(through.gap_cm, rel=2 * SLACK)
+    assert "around the axis" not in through.words()
+
+
 def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams):
     behind = {"shape": "band", "phi_deg": [0, 180]}
     task = loaded(GROUND, mask=[behind])
@@ -110,9 +133,9 @@ def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams)
     tried_m = emptiest(left, 2, [(x, y) for x in np.arange(1, 4.01, 0.05) for y in np.arange(-1, 0, 0.05)])
     assert 2 * tried_m <= half.twice_cm / 100 * (1 + 1e-9) <= (2 * tried_m + 0.1) * (1 + SLACK) * (1 + 1e-9)
     region = task.task.weight[0]
-    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)))
+    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)), np.empty((0, 4)))
     assert none.facts() == {"region": "ground 1 to 4 m ahead", "points": 0, "points_per_m2": 0.0} | dict.fromkeys(
-        ("at_m", "gap_cm", "twice_cm")
+        ("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm")
     )
     assert none.words() == "ground 1 to 4 m ahead: no beam of a full scan ends there"
     assert on_planes(loaded({"shape": "all"}), problem_of(loaded({"shape": "all"})), np.zeros(4)) == ()
