@@ -184,7 +184,7 @@ ENTRIES = (
         (0, 0, 0.1),
         40,
         "The axis points straight down, and the gain is the scan plane's again. The toolbox on the pad is found "
-        "in 4 s; what is smaller than 28 cm may lie between two lines.",
+        "in 4 s; straight below, where the axis points, what is smaller than 28 cm may go unseen.",
     ),
 )
 
