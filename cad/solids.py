@@ -123,15 +123,17 @@ def hull(points: Array) -> cq.Solid:
     points = np.unique(np.round(points, 9), axis=0)
     found = ConvexHull(points)
     order = np.lexsort(np.round(found.equations, 7).T)
-    planes: list[Array] = []
-    faces: list[cq.Face] = []
+    # triangles of one nearly flat polygon may have planes that differ a little and corners that do not: one face
+    plane_of: dict[frozenset[int], Array] = {}
     for plane in found.equations[order]:
-        if any(np.abs(plane - seen).max() < 1e-6 for seen in planes):
+        flat = np.abs(points @ plane[:3] + plane[3]) < 1e-6
+        plane_of.setdefault(frozenset(np.flatnonzero(flat).tolist()), plane)
+    faces: list[cq.Face] = []
+    for on_it, plane in plane_of.items():
+        if any(on_it < more for more in plane_of):
             continue
-        planes.append(plane)
-        corners = points[np.abs(points @ plane[:3] + plane[3]) < 1e-6]
-        wire = cq.Wire.makePolygon([vector(p) for p in _around(corners, plane[:3])], close=True)
-        faces.append(cq.Face.makeFromWires(wire))
+        corners = _around(points[sorted(on_it)], plane[:3])
+        faces.append(cq.Face.makeFromWires(cq.Wire.makePolygon([vector(p) for p in corners], close=True)))
     solid = cq.Solid.makeSolid(cq.Shell.makeShell(faces))
     if solid.Volume() < 0:
         solid = cq.Solid(solid.wrapped.Reversed())
