@@ -10,6 +10,7 @@ import numpy as np
 from cad.assembly.assembly import Assembly
 from cad.geometry import inertia
 from cad.geometry.inertia import Inertial
+from cad.layout.cables.leads import SAMPLE
 from cad.layout.drive import Mass, Stack
 from cad.layout.loads import Weight, weight_of
 from design.arrays import Array
@@ -19,7 +20,7 @@ from design.scanner import Scanner
 def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
 
-    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns.
+    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns. Leads are lines.
     """
     lidar, masses = scanner.lidar, assembly.layout.drive.masses
     own = {
@@ -30,6 +31,7 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     standing += [_share(mass, 1 - mass.turning) for mass in masses]
     turning = [own[name] for name in assembly.turning_parts()]
     turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
+    turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.leads if lead.path]
     x, y, z = lidar.body_mm
     base = -lidar.optical_height_mm
     laser = inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))

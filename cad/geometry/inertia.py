@@ -41,6 +41,17 @@ def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> 
     return Inertial(mass, (low + high) / 2, mass / 12 * np.diag([y + z, z + x, x + y]))
 
 
+def of_line(mass_g: float, points_mm: Array) -> Inertial:
+    """Of a thin line of even mass through points (n, 3) no further apart than its bends ask for."""
+    points = points_mm / 1000
+    middles, lengths = (points[1:] + points[:-1]) / 2, np.linalg.norm(np.diff(points, axis=0), axis=1)
+    masses = mass_g / 1000 * lengths / lengths.sum()
+    centre = masses @ middles / masses.sum()
+    d = middles - centre
+    inertia = np.einsum("n,nk,nk->", masses, d, d) * np.eye(3) - np.einsum("n,ni,nj->ij", masses, d, d)
+    return Inertial(mass_g / 1000, centre, inertia)
+
+
 def together(bodies: Iterable[Inertial]) -> Inertial:
     """Several bodies as one (Steiner)."""
     bodies = list(bodies)

@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 from scanners import GROUND_AHEAD, ROLLING, scanner_at
 
 from cad.assembly.make import make_parts
+from cad.assembly.masses import link_bodies, rotor_moment, rotor_of
 from cad.assembly.shadow import shadow_of, triangles_of
 from cad.files.manual.instructions import instructions_text
 from cad.files.manual.scenes import scenes_of
+from cad.geometry.inertia import of_line, of_solid
 from cad.layout.all_joints import joints_of
 from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
 from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
+from cad.layout.cables.leads import SAMPLE
 from cad.layout.layout import drive_of, layout_of
 from cad.layout.linkage import Ear, linkage_of
 from design.left_out import LeftOut
@@ -25,7 +28,7 @@ from design.motion import Sweep
 from scanwright.studio.view.scanner_bodies import make_bodies
 
 SHIPPED = [GROUND_AHEAD, ROLLING]
-STEEL, PLASTIC, ALUMINIUM = 7.85e-3, 1.24e-3, 2.7e-3  # g/mm3
+STEEL, PLASTIC, ALUMINIUM, WIRES = 7.85e-3, 1.24e-3, 2.7e-3, 1.5e-3  # g/mm3
 
 
 def scanner_for(*angles, sensor="UTM-30LX", servo="MX-64R"):
@@ -61,6 +64,23 @@ def test_the_rotor_is_balanced_by_its_meshes(made):
     )
     assert torque_nm(scanner, np.linalg.norm(without)) > 10 * RUBS_NM
     assert torque_nm(scanner, np.linalg.norm(moment)) < RUBS_NM
+
+
+def test_leads_weigh_what_their_wires_do(made):
+    scanner, assembly = made
+    wires = meshes(assembly, [name for name in assembly.bought if name.startswith("rotor_lead")]).values()
+    assert len(wires) == 2
+    mass = WIRES * sum(mesh.volume for mesh in wires)
+    moment = WIRES * sum(mesh.volume * mesh.center_mass[:2] for mesh in wires)
+    bare = replace(assembly, leads=())
+    with_leads, without = (rotor_of(scanner, link_bodies(scanner, each)) for each in (assembly, bare))
+    # the shrink tube over a joint is no wire
+    assert 1000 * (with_leads.mass_kg - without.mass_kg) == pytest.approx(mass, rel=0.06) and mass > 3
+    np.testing.assert_allclose(rotor_moment(scanner, assembly) - rotor_moment(scanner, bare), moment, atol=8)
+    lead, solid = assembly.leads[0], assembly.bought["rotor_lead_1"]
+    line, tube = of_line(lead.mass_g, lead.path.points(SAMPLE)), of_solid(solid, 1000 * WIRES)
+    np.testing.assert_allclose(line.inertia_kg_m2, tube.inertia_kg_m2, atol=0.06 * np.abs(tube.inertia_kg_m2).max())
+    np.testing.assert_allclose(line.centre_m, tube.centre_m, atol=3e-3)
 
 
 @pytest.mark.parametrize(
