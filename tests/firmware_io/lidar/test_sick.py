@@ -70,15 +70,20 @@ def test_first_beams_get_their_true_times(stamps_end):
     true_ns = []
 
     def timed(time_ns, bearing_rad):
+        range_m, level = look(time_ns, bearing_rad)
+        range_m[0] = 1 + len(true_ns) / 100  # which scan it is
         true_ns.append(int(time_ns[0]))
-        return look(time_ns, bearing_rad)
+        return range_m, level
 
     state = {"rate_error": 5e-5, "clock_us": (1 << 32) - 300_000, "stamps_end": stamps_end}
     with twin(sight=timed, **state) as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
-        told_ns = [lidar.read().scan.stamp_ns for _ in range(40)]  # its clock wraps meanwhile
-        late_ns = [min((told - true for true in true_ns), key=abs) for told in told_ns[20:]]
-    assert np.median(np.abs(late_ns)) < 1_500_000
+        read = [lidar.read() for _ in range(40)]  # its clock wraps meanwhile
+    meant_ns = [true_ns[round(100 * (float(each.scan.range_m[0]) - 1))] for each in read]
+    late_ns = [each.scan.stamp_ns - meant for each, meant in zip(read, meant_ns, strict=True)]
+    took_ns = [each.arrival_ns - meant for each, meant in zip(read, meant_ns, strict=True)]
+    busy_ns = max(0, min(took_ns) - int(1e9 * read[0].scan.scan_time_s))  # that held up even the quickest of all
+    assert np.median(np.abs(late_ns[20:])) < 1_500_000 + busy_ns
 
 
 def test_damage_is_counted_and_never_handed_out():
@@ -197,9 +202,10 @@ def test_a_sensor_of_unknown_name_wants_its_model():
 def test_skipped_turns_are_not_missing():
     with twin() as sensor, open_sick(sensor.address) as lidar:
         lidar.start(skip=1)
-        first, second = lidar.read().scan, lidar.read().scan
-        assert first.scan_time_s == pytest.approx(0.04)
-        assert (second.stamp_ns - first.stamp_ns) / 1e9 == pytest.approx(0.04, rel=0.5)
+        scans = [lidar.read().scan for _ in range(16)]  # a busy computer moves single ones
+        assert scans[0].scan_time_s == pytest.approx(0.04)
+        assert (scans[-1].stamp_ns - scans[0].stamp_ns) / 15e9 == pytest.approx(0.04, rel=0.4)
+        assert lidar.dropped == 0
 
 
 def test_what_speaks_no_cola_is_told():
