@@ -95,11 +95,15 @@ def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
 
 
-def slot(width: float, first: float, last: float, y: float, z_low: float, z_high: float) -> cq.Shape:
-    """Slot parallel to z with round ends, whose middles are at `first` and `last` along x."""
-    radius = width / 2
-    ends = [upright(radius, z_low, z_high, x, y) for x in (first, last)]
-    return box((first, y - radius, z_low), (last, y + radius, z_high)).fuse(*ends)
+def slot(radius: float, first: Sequence[float], last: Sequence[float], z_low: float, z_high: float) -> cq.Shape:
+    """Slot parallel to z between the middles (2,) of its round ends; a cylinder where they are one."""
+    start, end = np.asarray(first, dtype=float), np.asarray(last, dtype=float)
+    length = float(np.linalg.norm(end - start))
+    if length == 0:
+        return upright(radius, z_low, z_high, *start.tolist())
+    aside = radius / length * np.array([start[1] - end[1], end[0] - start[0]])
+    between = prism([start - aside, end - aside, end + aside, start + aside], z_low, z_high)
+    return between.fuse(*(upright(radius, z_low, z_high, *middle.tolist()) for middle in (start, end)))
 
 
 def lathe(profile: ArrayLike) -> cq.Solid:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cadquery as cq
 import numpy as np
 
-from cad.drawings.patterns import Pattern, on_axis, patterns_of, with_threads
+from cad.drawings.patterns import Pattern, on_axis, patterns_of, slots_of, with_threads
 from cad.geometry.holes import Round, rounds_of
 from cad.layout.fits import OnSheet, ToleratedDiameter
 from cad.layout.joints import Joint
@@ -28,8 +28,7 @@ class Part:
 
     Attributes:
         solid: rotation frame, moved so that the axis it is measured from is x = y = 0.
-        patterns: its holes beside the axis.
-        slots: width and length of equal ones, and their middles.
+        patterns: its holes beside the axis, then its slots.
         axial: its cylinders about the axis that it is measured from.
         datum: height of the lowest point.
         lidar_axis: z of the lidar that it carries; None for other parts.
@@ -38,7 +37,6 @@ class Part:
 
     solid: cq.Solid
     patterns: list[Pattern]
-    slots: list[tuple[tuple[float, float], list[Array]]]
     axial: list[Round]
     datum: float
     lidar_axis: Array | None
@@ -59,13 +57,9 @@ def part_of(name: str, solid: cq.Solid, lidar_axis: Array | None, said: OnSheet,
     axial = [item for item in rounds if on_axis(item)]
     fits = tuple(fit for fit in said.fits if any(is_of(fit, item) for item in axial))
     datum = float(solid.BoundingBox().zmin)
-    slots = [
-        (joint.slot_mm, [np.array(axis.start) + away for axis in joint.axes])
-        for joint in joints
-        if joint.part == name and joint.slot_mm
-    ]
     patterns = with_threads(patterns_of(rounds), [joint for joint in joints if joint.holder == name], away)
-    return Part(solid, patterns, slots, axial, datum, lidar_axis, fits)
+    patterns += slots_of([joint for joint in joints if joint.part == name], away)
+    return Part(solid, patterns, axial, datum, lidar_axis, fits)
 
 
 def is_of(fit: ToleratedDiameter, item: Round) -> bool:

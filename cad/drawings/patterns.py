@@ -17,19 +17,21 @@ IN_LINE = 0.01  # mm between the axes of two holes, or of a hole and its screw
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Equal parallel holes.
+    """Equal parallel holes, or slots.
 
     Attributes:
-        holes: all of one diameter, direction and height along it.
+        holes: all of one diameter, direction and height along it; of slots their width, in their middles.
         circle: diameter of the circle that they share at equal steps; 0 if none.
         heads: diameter of the recesses of their screws' heads; 0 if none.
         holds: the thread in them, in words; empty if none.
+        slot: length of slots; 0 if none.
     """
 
     holes: tuple[Round, ...]
     circle: float
     heads: float = 0.0
     holds: str = ""
+    slot: float = 0.0
 
     @property
     def direction(self) -> Array:
@@ -48,7 +50,8 @@ class Pattern:
         circle = f" ON Ø{number(self.circle)}" if self.circle else ""
         heads = f", Ø{number(self.heads)} FOR HEADS" if self.heads else ""
         holds = f", {self.holds}" if self.holds else ""
-        return f"{counted(len(self.holes))}Ø{number(hole.diameter)} {depth}{circle}{heads}{holds}"
+        size = f"SLOT {number(hole.diameter)} x {number(self.slot)}" if self.slot else f"Ø{number(hole.diameter)}"
+        return f"{counted(len(self.holes))}{size} {depth}{circle}{heads}{holds}"
 
 
 def number(value: float) -> str:
@@ -71,6 +74,22 @@ def patterns_of(rounds: list[Round]) -> list[Pattern]:
         key = (hole.diameter, *np.round(direction, 3).tolist(), height, hole.through)
         groups.setdefault(key, []).append(hole)
     return _with_heads([Pattern(tuple(holes), _circle(holes)) for _, holes in sorted(groups.items())])
+
+
+def slots_of(joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
+    """The slots of a part's joints, which hold no thread; `moved` is what the part was moved by."""
+    found = []
+    for joint in joints:
+        if joint.slot_mm is None:
+            continue
+        width, length = joint.slot_mm
+        rounds = []
+        for axis in joint.axes:
+            start, along = np.array(axis.start) + moved, np.array(axis.along)
+            ends = [_triple(end) for end in (start, start + joint.grip_mm * along)]
+            rounds.append(Round(width, _triple(along), ends[0], ends[1], True, True))
+        found.append(Pattern(tuple(rounds), 0.0, slot=length))
+    return found
 
 
 def _drilled(holes: list[Round]) -> list[Round]:
@@ -163,6 +182,11 @@ def along_pattern(pattern: Pattern, towards: Array) -> Array:
     level = np.cross([0.0, 0.0, 1.0], towards)
     turned = [side, np.cross(towards, side), -side, -np.cross(towards, side)]
     return max(turned, key=lambda v: round(float(v @ level), 6))
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 6) + 0.0 for v in values)
+    return x, y, z
 
 
 def _circle(holes: list[Round]) -> float:

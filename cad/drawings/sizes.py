@@ -10,7 +10,7 @@ import numpy as np
 from cad import solids
 from cad.drawings.dimensions import Callout, angle_between, callouts_right, centre_mark, ordinates
 from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from cad.drawings.patterns import Pattern, counted, number
+from cad.drawings.patterns import Pattern, number
 from cad.drawings.pen import Layer, Pen, Point
 from cad.drawings.project import Arc
 from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
@@ -132,15 +132,12 @@ def _holes(sizes: Sizes, view: View, part: Part) -> None:
             continue
         flat = [view.flat(hole.low) for hole in pattern.holes]
         radius = pattern.holes[0].diameter / 2
+        half = max(pattern.slot / 2, radius)
         if pattern.circle:
             sizes.circles.append((view.flat(pattern.centre), pattern.circle / 2))
-        last = _crossed(sizes, flat, radius, placed=not pattern.circle)
+        last = _crossed(sizes, flat, half, placed=not pattern.circle)
         diagonal = radius * math.sqrt(0.5)
         sizes.callouts.append(Callout((last[0] + diagonal, last[1] + diagonal), pattern.words(), last))
-    for (width, length), middles in part.slots if parallel(Z, view.towards) else ():
-        x, y = _crossed(sizes, [view.flat(middle) for middle in middles], length / 2, placed=True)
-        words = f"{counted(len(middles))}SLOT {number(width)} x {number(length)} THRU"
-        sizes.callouts.append(Callout((x + width / 2, y), words))
 
 
 def _crossed(sizes: Sizes, middles: list[Point], half: float, *, placed: bool) -> Point:

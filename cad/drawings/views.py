@@ -61,7 +61,7 @@ Point3 = tuple[float, float, float]
 def views_of(part: Part) -> list[View]:
     """All views of a part: front, top, left, isometric, then the others."""
     inclined = [pattern for pattern in part.patterns if has_view(pattern)]
-    upright = [p for p in part.patterns if len(p.holes) >= 2 and parallel(p.direction, Z)]
+    upright = [p for p in part.patterns if len(p.holes) >= 2 and parallel(p.direction, Z) and not p.slot]
     tilt = _level(outwards_of(inclined[0], part)) if inclined else np.array([1.0, 0.0, 0.0])
     along = _along(part, upright) if upright else tilt
     away = np.cross(Z, along)

@@ -76,7 +76,8 @@ def _of_lidar(layout: Layout) -> Iterator[Joint]:
         part, grip = names.SUB_PLATE, SUB_PLATE_THICKNESS
     deep = lidar_thread_mm(layout.scanner.lidar)
     axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), R)
-    yield Joint(part, names.LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep)
+    slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
+    yield Joint(part, names.LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep, slot_mm=slot)
     if p.ears is not None:
         thread = p.ear_thread
         deep = PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth)

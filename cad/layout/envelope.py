@@ -22,6 +22,8 @@ from design.task.equivalent_settings import BOUNDS, advice
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
 SUB_PLATE_THICKNESS = 4.0
+SLOT_TRAVEL = 2.0  # to either side of where a screw of the lidar is said to sit, and nobody has verified it
+SLOT_WALL = 2.0  # that such a slot leaves at the edge of the plate, around a normal hole
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0
 EAR_SCREW = SCREWS["M3"]
@@ -85,9 +87,38 @@ def leaning_least(R: Array) -> Axis:
     return "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
 
 
+def screw_travel_mm(lidar: Lidar) -> float:
+    """How far a screw of the lidar may sit from its place, along the line through the optical axis; 0 for round holes.
+
+    Slots along such lines take another pitch, and still hold the lidar in the middle.
+    """
+    if "mount_holes_mm" not in lidar.unverified():
+        return 0.0
+    hole = SCREWS[lidar.mount_screw].nominal + 0.4
+    rooms = [
+        (half - abs(at) - hole / 2 - SLOT_WALL) * math.hypot(*place) / abs(at)
+        for place in lidar.mount_holes_mm
+        for half, at in zip((lidar.body_mm[0] / 2, lidar.body_mm[1] / 2), place, strict=True)
+        if abs(at) > 1e-6
+    ]
+    return max(0.0, min(SLOT_TRAVEL, *rooms))
+
+
+def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """First and last place of a screw in its slot, seen from the optical axis."""
+    x, y = place
+    share = travel / math.hypot(x, y)
+    return (x - share * x, y - share * y), (x + share * x, y + share * y)
+
+
 def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
     """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
-    return [i for i, hole in enumerate(lidar.mount_holes_mm) if not _driver_passes(lidar, stack, hole)]
+    travel = screw_travel_mm(lidar)
+    return [
+        i
+        for i, place in enumerate(lidar.mount_holes_mm)
+        if not all(_driver_passes(lidar, stack, end) for end in slot_ends(place, travel))
+    ]
 
 
 def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:

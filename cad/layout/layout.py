@@ -12,6 +12,7 @@ from cad.layout.belt.drive import belt_drive
 from cad.layout.deck import Deck, deck_of
 from cad.layout.direct.drive import direct_drive
 from cad.layout.drive import DriveLayout, Stack
+from cad.layout.envelope import screw_travel_mm
 from cad.layout.linkage import AlignmentLinkage, linkage_of
 from cad.layout.modules.homing_flag import bracket_of, flag_of
 from design.left_out import LeftOut
@@ -82,7 +83,7 @@ def config_hash(scanner: Scanner) -> str:
     others: list[dict[str, Any] | None] = [
         product.model_dump() for product in drive.products if product != drive.stack.bearing
     ]
-    content = {
+    content: dict[str, Any] = {
         "task": angles.task,
         "angles": angles.angles_deg.model_dump(),
         "delta": angles.delta_rotvec_rot_deg,
@@ -93,6 +94,8 @@ def config_hash(scanner: Scanner) -> str:
         ]
         + others,
     }
+    if (travel := screw_travel_mm(scanner.lidar)) > 0:
+        content["screw_travel_mm"] = travel  # slots, where nobody has verified the lidar's holes
     if isinstance(angles.motion, Sweep):
         content["sweep"] = angles.motion.limits_deg  # one that keeps the gears on a flank needs no counterweight
     if scanner.modules != NO_MODULES:

@@ -18,6 +18,8 @@ from cad.layout.envelope import (
     box_corners,
     ear_screws,
     envelope_of,
+    screw_travel_mm,
+    slot_ends,
 )
 from cad.layout.joints import round_wall_mm
 from cad.layout.modules.homing_flag import Flag
@@ -68,6 +70,7 @@ class AlignmentLinkage:
     screw: Screw
     screw_hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
+    screw_travel: float  # of the screws to either side, where slots take them
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
@@ -87,14 +90,16 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
     screw = SCREWS[lidar.mount_screw]
     hole = passing_hole(screw, printer)
     half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
-    edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in lidar.mount_holes_mm) - hole / 2
+    travel = screw_travel_mm(lidar)
+    outermost = [slot_ends(place, travel)[1] for place in lidar.mount_holes_mm]
+    edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in outermost) - hole / 2
     if edge < printer.min_wall_mm:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm "
             f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
-    corner = min(half_x + half_y - abs(x) - abs(y) for x, y in lidar.mount_holes_mm)
+    corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
     return AlignmentLinkage(
@@ -114,6 +119,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         screw=screw,
         screw_hole=hole,
         holes=lidar.mount_holes_mm,
+        screw_travel=travel,
         fit=printer.fit_clearance_mm,
         cross_hole=passing_hole(CROSS_SCREW, printer),
         cross_azimuths=_cross_azimuths(stack.R()[:, 2]),

@@ -20,7 +20,7 @@ import cadquery as cq
 from cad import outlines, solids
 from cad.geometry.mesh import checked_mesh
 from cad.layout.belt.stack import BeltStack
-from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS
+from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, slot_ends
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.linkage import AlignmentLinkage, neck_corners
@@ -182,21 +182,24 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
     return plate.fuse(solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, p.top)))
 
 
-def _drivers(p: AlignmentLinkage) -> list[cq.Solid]:
+def _drivers(p: AlignmentLinkage) -> list[cq.Shape]:
     """Heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
-    return [solids.upright(p.screw.head_room, low - 150.0, low, *hole) for hole in p.holes]
+    return _for_screws(p, p.screw.head_room, low - 150.0, low)
 
 
-def _holes(p: AlignmentLinkage) -> list[cq.Solid]:
+def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> list[cq.Shape]:
+    """Cuts for the base screws: round ones, or as long as their slots."""
+    return [solids.slot(radius, *slot_ends(place, p.screw_travel), low, high) for place in p.holes]
+
+
+def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
     """Of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
-        low = p.top - PLATE_THICKNESS - 2.0
-        return [solids.upright(p.screw_hole / 2, low, p.top + 1.0, *hole) for hole in p.holes]
-    pocket = p.top - p.screw.head_height - 0.5
-    pockets = [solids.upright(p.screw.head_room, pocket, p.top + 1.0, *hole) for hole in p.holes]
+        return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
+    pockets = _for_screws(p, p.screw.head_room, p.top - p.screw.head_height - 0.5, p.top + 1.0)
     low = p.top - PLATE_THICKNESS - 1.0
     traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]

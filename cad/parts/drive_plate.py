@@ -68,6 +68,6 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
             cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, high + 1.0, x, y))
         for x in (-stack.slot_x, stack.slot_x):
             for _, y in stack.arms_y:
-                cuts.append(solids.slot(p.slot, x - TRAVEL, x + TRAVEL, y, low - 1.0, high + 1.0))
+                cuts.append(solids.slot(p.slot / 2, (x - TRAVEL, y), (x + TRAVEL, y), low - 1.0, high + 1.0))
         plate = checked(body.cut(*cuts).clean())
     return plate.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))

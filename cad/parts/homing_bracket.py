@@ -82,11 +82,8 @@ def homing_bracket(p: HomingBracket) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.radial(p.hole / 2, 0.0, z) for z in p.heights]
         for side in (1.0, -1.0):
             middle = p.radius + side * p.switch.hole_pitch_mm / 2
-            cuts.append(
-                solids.slot(
-                    p.switch_hole, middle - SLIDE, middle + SLIDE, 0.0, p.seat - SHELF - BEYOND, p.seat + BEYOND
-                )
-            )
+            ends = (middle - SLIDE, 0.0), (middle + SLIDE, 0.0)
+            cuts.append(solids.slot(p.switch_hole / 2, *ends, p.seat - SHELF - BEYOND, p.seat + BEYOND))
         return checked(body.cut(*cuts).clean().moved(solids.about_axis(p.azimuth)))
 
 

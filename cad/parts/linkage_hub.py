@@ -47,8 +47,8 @@ def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
     """Slots with round ends, along the radius."""
     if p.ear is None:
         return []
-    ear, width = p.ear, p.ear.slot_width
-    slots = [solids.slot(width, first, last, 0.0, ear.low - 1.0, ear.high + 1.0) for first, last in ear.slots]
+    ear, half = p.ear, p.ear.slot_width / 2
+    slots = [solids.slot(half, (a, 0.0), (b, 0.0), ear.low - 1.0, ear.high + 1.0) for a, b in ear.slots]
     return [slot.moved(solids.about_axis(ear.azimuth)) for slot in slots]
 
 

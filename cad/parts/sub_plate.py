@@ -14,7 +14,15 @@ import numpy as np
 
 from cad import outlines, solids
 from cad.layout.drive import Stack
-from cad.layout.envelope import EAR_REACH, EAR_SCREW, SUB_PLATE_THICKNESS, ear_corner, ear_screws
+from cad.layout.envelope import (
+    EAR_REACH,
+    EAR_SCREW,
+    SUB_PLATE_THICKNESS,
+    ear_corner,
+    ear_screws,
+    screw_travel_mm,
+    slot_ends,
+)
 from cad.layout.hub import Axis
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
@@ -62,7 +70,8 @@ def sub_plate(scanner: Scanner, stack: Stack, axis: Axis) -> cq.Solid:
     with building(SUB_PLATE, "plate and holes", "ears along", axis) as checked:
         body: cq.Shape = solids.prism(outlines.octagon(half_x, half_y, CHAMFER), low, high)
         body = body.fuse(solids.prism(outlines.octagon(*ear_corner(lidar, axis), CHAMFER), low, high))
-        cuts = [solids.upright(hole, low - 1.0, high + 1.0, *at) for at in lidar.mount_holes_mm]
+        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.mount_holes_mm]
+        cuts = [solids.slot(hole, *each, low - 1.0, high + 1.0) for each in ends]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
         marks = plate_marks(half_x + (EAR_REACH if axis == "x" else 0.0))
         cuts += [solids.prism(outline, low - 1.0, high + 1.0) for outline in marks]

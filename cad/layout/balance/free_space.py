@@ -10,7 +10,7 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from cad.layout.envelope import PLATE_THICKNESS, Box
+from cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
 from cad.layout.linkage import AlignmentLinkage
 from design.arrays import Array, Mask
 
@@ -41,8 +41,20 @@ def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
     below = points[:, 2] < p.top - PLATE_THICKNESS
     if p.ears is not None:
         return np.zeros_like(below)
-    near = [np.hypot(points[:, 0] - x, points[:, 1] - y) < p.screw.head_room for x, y in p.holes]
-    return np.asarray(below & np.any(near, axis=0))
+    return below & at_screws(points, p)
+
+
+def at_screws(points: Array, p: AlignmentLinkage) -> Mask:
+    """Points over or under the heads of the lidar's screws and their drivers, wherever these sit in their slots."""
+    near = [_from_slot(points, *slot_ends(place, p.screw_travel)) < p.screw.head_room for place in p.holes]
+    return np.asarray(np.any(near, axis=0))
+
+
+def _from_slot(points: Array, first: tuple[float, float], last: tuple[float, float]) -> Array:
+    """Distances from the line between the middles of a slot's ends, seen along it."""
+    flat, way = points[:, :2] - first, np.subtract(last, first)
+    share = np.clip(flat @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+    return np.asarray(np.hypot(*(flat - share[:, None] * way).T))
 
 
 def in_hull(points: Array, corners: Array, gap: float) -> Mask:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from cad.layout.balance.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
 from cad.layout.envelope import PLATE_THICKNESS
 from cad.layout.linkage import AlignmentLinkage, neck_corners
 from cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
@@ -42,7 +42,9 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:
     solid &= ~in_fan(seen, p, 0.0) & ~behind_screws(seen, p)
     solid |= (around < stack.hub_radius) & (cells[:, 2] > stack.shoulder) & (cells[:, 2] < -stack.h)
     solid &= ~room & ~((around < stack.shaft_diameter / 2) & (cells[:, 2] < stack.spigot_top))
-    solid |= on_plate & (z > p.top) & (z < p.seat)  # the sub-plate
+    if p.ears is not None:
+        solid &= ~((z > p.top - p.screw.head_height) & (z < p.top) & at_screws(seen, p))  # pockets for heads
+        solid |= on_plate & (z > p.top) & (z < p.seat)  # the sub-plate
     printed = CELL**3 * scanner.printer.density_g_cm3 / 1000 * cells[solid, :2].sum(axis=0)
     return printed + lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * R[:2, 2]
 

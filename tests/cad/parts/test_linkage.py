@@ -17,7 +17,7 @@ from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
 from cad.layout.direct.sizing import direct_stack
 from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_radius
-from cad.layout.layout import drive_of, layout_of
+from cad.layout.layout import config_hash, drive_of, layout_of
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
 from cad.parts.base_mount import base_mount
@@ -25,7 +25,7 @@ from cad.parts.sub_plate import sub_plate
 from cad.solids import box, building
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import SlipRing
+from design.catalogue.products import Provenance, SlipRing
 from design.errors import BuildError
 from design.scanner import scanner_of
 
@@ -203,3 +203,38 @@ def test_the_mount_offset_needs_no_kernel():
     imports = "import sys, cad.files.part_files, cad.layout.layout"
     code = f"{imports}; assert not {{'cadquery', 'OCP', 'trimesh'}} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(("name", "at"), [("UST-10LX", (5, 0)), ("RPLIDAR A1", (60, 60)), ("URG-04LX", (-80, 75))])
+def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, at):
+    scanner = scanner_for(*at, lidar=name)
+    p, lidar = layout_of(scanner).linkage, scanner.lidar
+    assert p.screw_travel > 1.5
+    part, low = (alignment_linkage(p), p.seat - 9.0)
+    if p.ears is not None:
+        part, low = sub_plate(scanner, p.stack, p.stack.sub_plate), p.seat - 4.5
+    mesh = checked_mesh(part, "part")
+    body = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
+    T = np.column_stack([p.stack.R(), np.zeros(3)])
+
+    def bites(travel, x=0.0, y=0.0):
+        """Volume that the shanks of a lidar's screws take from the part, its pitch another, or itself moved."""
+        met = 0.0
+        for place in np.array(lidar.mount_holes_mm):
+            at = place * (1 + travel / np.hypot(*place)) + [x, y]
+            shank = manifold3d.Manifold.cylinder(9.0, p.screw.nominal / 2 * 0.99, circular_segments=48)
+            met += (shank.translate((*at, low)).transform(T) ^ body).volume()
+        return met
+
+    assert max(bites(travel) for travel in (-p.screw_travel, 0.0, p.screw_travel)) < 1e-3
+    assert bites(p.screw_travel + 0.6) > 1 and bites(-p.screw_travel - 0.6) > 1
+    assert min(bites(0.0, x=0.5), bites(1.0, y=-0.5)) > 1
+
+
+def test_a_lidar_whose_holes_somebody_verified_gets_round_ones():
+    measured = scanner_for(5, 0, lidar="UST-10LX")
+    lidar = measured.lidar.model_copy()
+    lidar._provenance = lidar.provenance() | {"mount_holes_mm": Provenance(source="calliper", verified=True)}
+    verified = replace(measured, lidar=lidar)
+    assert (layout_of(measured).linkage.screw_travel > 0, layout_of(verified).linkage.screw_travel) == (True, 0)
+    assert config_hash(measured) != config_hash(verified)
