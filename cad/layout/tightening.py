@@ -86,7 +86,7 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         return None
     screw, hole = joint.screw, joint.screw.nominal + 0.4
     proof = PROOF_MPA * stress_area_mm2(screw)
-    head = math.pi / 4 * (screw.head_diameter**2 - hole**2)
+    head = _under_head_mm2(joint, hole)
     in_nut = joint.fixing in ("nut", "trap", "deck")
     engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
     if in_nut and joint.stands_out_mm is not None:
@@ -117,6 +117,16 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         push_by=push_by,
         loosens=_loosens(joint, under, into),
     )
+
+
+def _under_head_mm2(joint: Joint, hole: float) -> float:
+    """What a head bears on: less the hole, or the strip of a slot that is longer than the head."""
+    head = joint.screw.head_diameter
+    whole = math.pi / 4 * head**2
+    if joint.slot_mm is None:
+        return whole - math.pi / 4 * hole**2
+    width = joint.slot_mm[0]
+    return whole - width / 2 * math.sqrt(head**2 - width**2) - head**2 / 2 * math.asin(width / head)
 
 
 def stress_area_mm2(screw: Screw) -> float:

@@ -73,13 +73,17 @@ def linkage_spec(layout: Layout) -> PartSpec:
         step = Step("Linkage on the cup", CUP_WORDS, SEATED_ON_CUP)
     if isinstance(stack, BeltStack):
         step = Step("Linkage on the shaft, and the belt set", BELT_WORDS, SEATED)
+    shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
+    if p.screw_travel > 0:
+        slots = f"the slots of {ALIGNMENT_LINKAGE}, where a screw may sit {p.screw_travel:.2g} mm nearer or farther"
+        shapes["lidar.mount_holes_mm"] = slots
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
         turns=True,
         make=partial(alignment_linkage, p),
         step=step,
         shaped_by=OF_LIDAR,
-        shapes={"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"},
+        shapes=shapes,
         angles="laser",
         seat=p.top,
     )

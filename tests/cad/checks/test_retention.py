@@ -132,6 +132,10 @@ def test_torque_and_strength_against_hand_calculation():
     assert hold.engaged_mm == pytest.approx(12 - 8.4) and hold.pull_n == pytest.approx(40 * head)
     assert hold.push_n == pytest.approx(3 * 8.4 * 40) and "plastic" in hold.push_by
     assert hold_of(replace(joint, fixing="grub"), PRINTED, ALUMINIUM) is None
+    x, y = np.meshgrid(*2 * [np.linspace(-2.75, 2.75, 1101)])
+    beside = np.count_nonzero((np.hypot(x, y) < 2.75) & (np.abs(y) > 1.7)) * 0.005**2
+    slid = hold_of(replace(joint, slot_mm=(3.4, 7.4)), PRINTED, ALUMINIUM)
+    assert slid.preload_n == pytest.approx(25 * beside, rel=2e-3) and beside < head / 2
 
 
 @pytest.mark.parametrize("profile", ["fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"])
