@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.geometry.holes import Round
+from cad.geometry.holes import Round, triple
 from cad.layout.joints import Joint
 from design.arrays import Array
 
@@ -86,8 +86,8 @@ def slots_of(joints: Sequence[Joint], moved: tuple[float, float, float]) -> list
         rounds = []
         for axis in joint.axes:
             start, along = np.array(axis.start) + moved, np.array(axis.along)
-            ends = [_triple(end) for end in (start, start + joint.grip_mm * along)]
-            rounds.append(Round(width, _triple(along), ends[0], ends[1], True, True))
+            ends = [triple(end) for end in (start, start + joint.grip_mm * along)]
+            rounds.append(Round(width, triple(along), ends[0], ends[1], True, True))
         found.append(Pattern(tuple(rounds), 0.0, slot=length))
     return found
 
@@ -182,11 +182,6 @@ def along_pattern(pattern: Pattern, towards: Array) -> Array:
     level = np.cross([0.0, 0.0, 1.0], towards)
     turned = [side, np.cross(towards, side), -side, -np.cross(towards, side)]
     return max(turned, key=lambda v: round(float(v @ level), 6))
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    x, y, z = (round(float(v), 6) + 0.0 for v in values)
-    return x, y, z
 
 
 def _circle(holes: list[Round]) -> float:

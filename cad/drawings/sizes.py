@@ -137,7 +137,9 @@ def _holes(sizes: Sizes, view: View, part: Part) -> None:
             sizes.circles.append((view.flat(pattern.centre), pattern.circle / 2))
         last = _crossed(sizes, flat, half, placed=not pattern.circle)
         diagonal = radius * math.sqrt(0.5)
-        sizes.callouts.append(Callout((last[0] + diagonal, last[1] + diagonal), pattern.words(), last))
+        sizes.callouts.append(
+            Callout((last[0] + diagonal, last[1] + diagonal), pattern.words(), None if pattern.slot else last)
+        )
 
 
 def _crossed(sizes: Sizes, middles: list[Point], half: float, *, placed: bool) -> Point:

@@ -89,8 +89,8 @@ def rounds_of(solid: cq.Solid) -> list[Round]:
                 continue
             beyond = foot + (low - 0.05) * direction, foot + (high + 0.05) * direction
             through = hole and not piercing.between(*beyond)
-            ends = _triple(foot + low * direction), _triple(foot + high * direction)
-            found.append(Round(key[1], _triple(direction), *ends, hole, through))
+            ends = triple(foot + low * direction), triple(foot + high * direction)
+            found.append(Round(key[1], triple(direction), *ends, hole, through))
     return found
 
 
@@ -117,6 +117,7 @@ def _positive(direction: Array) -> Array:
     return direction if direction[largest] > 0 else -direction
 
 
-def _triple(values: Array) -> tuple[float, float, float]:
+def triple(values: Array) -> tuple[float, float, float]:
+    """A vector as records hold it, to a millionth and without -0."""
     x, y, z = (round(float(v), 6) + 0.0 for v in values)
     return x, y, z

@@ -90,9 +90,10 @@ def leaning_least(R: Array) -> Axis:
 def screw_travel_mm(lidar: Lidar) -> float:
     """How far a screw of the lidar may sit from its place, along the line through the optical axis; 0 for round holes.
 
-    Slots along such lines take another pitch, and still hold the lidar in the middle.
+    Slots along such lines take another pitch, and still hold the lidar in the middle, unless all are one line.
     """
-    if "mount_holes_mm" not in lidar.unverified():
+    lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.mount_holes_mm}
+    if "mount_holes_mm" not in lidar.unverified() or len(lines) == 1:
         return 0.0
     hole = SCREWS[lidar.mount_screw].nominal + 0.4
     rooms = [
@@ -107,7 +108,8 @@ def screw_travel_mm(lidar: Lidar) -> float:
 def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """First and last place of a screw in its slot, seen from the optical axis."""
     x, y = place
-    share = travel / math.hypot(x, y)
+    away = math.hypot(x, y)
+    share = travel / away if away > travel else 0.0  # a screw under the optical axis has no line to it
     return (x - share * x, y - share * y), (x + share * x, y + share * y)
 
 

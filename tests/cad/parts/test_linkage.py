@@ -16,7 +16,7 @@ from cad.checks.printing import thin_walls
 from cad.geometry.mesh import checked_mesh
 from cad.layout.deck import deck_of
 from cad.layout.direct.sizing import direct_stack
-from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_radius
+from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_radius, screw_travel_mm, slot_ends
 from cad.layout.layout import config_hash, drive_of, layout_of
 from cad.layout.linkage import linkage_of
 from cad.parts.alignment_linkage import alignment_linkage
@@ -238,3 +238,13 @@ def test_a_lidar_whose_holes_somebody_verified_gets_round_ones():
     verified = replace(measured, lidar=lidar)
     assert (layout_of(measured).linkage.screw_travel > 0, layout_of(verified).linkage.screw_travel) == (True, 0)
     assert config_hash(measured) != config_hash(verified)
+
+
+def test_slots_need_lines_that_cross():
+    lidar = scanner_for(5, 0, lidar="UST-10LX").lidar
+    centred = lidar.model_copy(update={"mount_holes_mm": ((0.0, 0.0), (20.0, 20.0), (-20.0, 20.0))})
+    in_line = lidar.model_copy(update={"mount_holes_mm": ((0.0, 15.0), (0.0, -15.0), (0.0, 8.0))})
+    assert screw_travel_mm(centred) > 1.5 and screw_travel_mm(in_line) == 0
+    assert slot_ends((0.0, 0.0), 1.8) == ((0.0, 0.0), (0.0, 0.0))
+    for at in ((3.0, 4.0), (20.0, -20.0)):
+        assert slot_ends(at, 0.0) == (at, at)
