@@ -11,6 +11,7 @@ import pytest
 import scanwright as sw
 from design.errors import RecordingError, TaskError
 from scanwright import api
+from scanwright.api import tasks
 
 TASK = {
     "name": "ahead",
@@ -41,8 +42,7 @@ def test_loading_a_task_loads_neither_kernel_nor_compiler_nor_pictures():
 
 
 def test_every_public_name_is_a_documented_function_and_no_other_is_there():
-    own = {name for name, value in vars(api).items() if isfunction(value) and value.__module__ == api.__name__}
-    assert set(sw.__all__) == {name for name in own if not name.startswith("_")} | {"load_angles", "load_task"}
+    assert set(sw.__all__) == {name for name, value in vars(api).items() if isfunction(value)}
     for name in sw.__all__:
         assert getattr(sw, name) is getattr(api, name)
         assert callable(getattr(sw, name))
@@ -53,7 +53,8 @@ def test_every_public_name_is_a_documented_function_and_no_other_is_there():
 
 
 def test_the_examples_of_the_docstrings_run():
-    assert doctest.testmod(api).failed == 0
+    tried = doctest.testmod(tasks)
+    assert (tried.failed, tried.attempted > 5) == (0, True)
 
 
 def test_a_notebook_goes_from_a_table_to_arrays_without_a_file(tmp_path, monkeypatch):

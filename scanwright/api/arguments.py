@@ -1,0 +1,31 @@
+"""What the functions take in more than one form: a task, an angle set, and somebody who listens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from design.angles import AngleSet, load_angles
+from design.task.task import LoadedTask, load_task
+
+TaskLike = LoadedTask | str | Path | Mapping[str, Any]
+"""A loaded task, the name of a shipped one, a file, or a table with the keys of a task file."""
+AnglesLike = AngleSet | str | Path
+"""An angle set, or the file of one."""
+Say = Callable[[str], None]
+"""Is told what is being done, a line at a time."""
+
+
+def quiet(_line: str) -> None:
+    """Progress that nobody asked for."""
+
+
+def as_task(task: TaskLike) -> LoadedTask:
+    """The task, loaded if it is not yet; raises as `load_task`."""
+    return task if isinstance(task, LoadedTask) else load_task(task)
+
+
+def as_angle_set(angles: AnglesLike) -> AngleSet:
+    """The angle set, read if it is a file; raises as `load_angles`."""
+    return angles if isinstance(angles, AngleSet) else load_angles(Path(angles))

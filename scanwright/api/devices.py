@@ -1,0 +1,139 @@
+"""Lidar and servo, real or imagined, and the scans that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.api.recordings import assemble
+
+if TYPE_CHECKING:
+    from firmware_io.assembly.assemble import AssembleSummary
+    from firmware_io.lidar.lidar import LidarDriver
+    from firmware_io.recording.arrays import RecordingArrays
+    from firmware_io.scan.scan_summary import ScanSummary
+    from firmware_io.servo.servo import ServoDriver
+
+
+def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:
+    """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
+
+    Args:
+        port: such as "/dev/serial/by-id/...".
+        model: what it must be; None for any that is known.
+        servo_id: its number on the bus; None if it is alone there.
+
+    Raises:
+        DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
+    """
+    from firmware_io.servo.servo import open_servo
+
+    return open_servo(port, model, servo_id)
+
+
+def open_lidar(address: str, model: str | None = None) -> LidarDriver:
+    """Open a lidar at a serial port or HOST:PORT, whatever it is doing. Use it with `with`.
+
+    Args:
+        address: where it is.
+        model: name in the catalogue, for sensors that do not tell theirs; None asks one family after the other.
+
+    Raises:
+        DeviceError: no such port, it is in use, or what answers is no sensor that is known.
+    """
+    from firmware_io.lidar.families import open_lidar
+
+    return open_lidar(address, model)
+
+
+@dataclass(frozen=True, slots=True)
+class Scanned:
+    """A scan: what was recorded, and the cloud of it."""
+
+    recorded: ScanSummary
+    assembled: AssembleSummary
+
+
+def scan(
+    folder: str | Path,
+    *,
+    turns: int = 1,
+    lidar: str | None = None,
+    servo: str | None = None,
+    servo_id: int | None = None,
+    recording: str | Path | None = None,
+    intensity: bool = False,
+    cluster: int = 1,
+    every: int = 1,
+    stamp_at: Literal["step_0", "rear"] = "step_0",
+    say: Say = quiet,
+) -> Scanned:
+    """Turn the scanner of a build folder, record, and assemble the cloud beside the recording.
+
+    Args:
+        folder: its `angles.json` is all that is needed.
+        turns: full scans.
+        lidar: serial port or HOST:PORT; None for the emulated or the plugged-in one, as for `servo`.
+        servo: serial port.
+        servo_id: number of the servo, where several share its bus.
+        recording: file to write, `.mcap`; None for one in the folder, named by date and time.
+        intensity: ask the sensor for intensities too.
+        cluster: steps that share one range, the least of theirs.
+        every: one scan of so many is taken.
+        stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
+        say: is told what is being done.
+
+    Raises:
+        ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
+            stopped then, and what was recorded is whole.
+    """
+    from firmware_io.scan.acquire import acquire
+    from firmware_io.scan.plan import plan_scan
+
+    named = None if recording is None else Path(recording)
+    plan = plan_scan(
+        Path(folder),
+        turns=turns,
+        lidar=lidar,
+        servo=servo,
+        servo_id=servo_id,
+        recording=named,
+        intensity=intensity,
+        cluster=cluster,
+        every=every,
+        stamp_at=stamp_at,
+    )
+    recorded = acquire(plan, say)
+    return Scanned(recorded, assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")))
+
+
+def simulate(
+    angles: AnglesLike,
+    scene: str | Path | None = None,
+    *,
+    turns: int = 1,
+    noise_mm: float | None = None,
+    seed: int = 0,
+) -> RecordingArrays:
+    """Record a scene without devices, faster than time: the servo obeys to the letter, ranges have their noise.
+
+    Args:
+        angles: angle set of the scanner, with its motion.
+        scene: mesh in metres, STL, PLY, OBJ, DAE or GLB, the scanner's world frame at its origin; None for a furnished
+            room.
+        turns: full scans.
+        noise_mm: range noise; None for the data sheet's.
+        seed: of the noise.
+
+    Raises:
+        SceneError: the mesh cannot be used.
+        TaskError: the sensor is not in the catalogue.
+        DeviceError: the angle set does not say how the servo moves.
+    """
+    from firmware_io.twins.scanner import room
+    from firmware_io.twins.simulated import simulated_recording
+
+    place = room(None if scene is None else Path(scene))
+    return simulated_recording(as_angle_set(angles), place, turns=turns, sigma_mm=noise_mm, seed=seed)

@@ -1,0 +1,69 @@
+"""From angles to parts, and whether they hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cad.kernel import require_kernel
+from design.angles import load_angles
+from design.task.task import load_task
+from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
+from scanwright.pipeline.build import Build, build_task
+
+if TYPE_CHECKING:
+    from cad.assembly.assembly import Assembly
+    from cad.checks.check import Check
+
+
+def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
+    """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
+
+    Nothing is done where the folder already holds the build of this very task.
+
+    Raises:
+        InstallError: the CAD kernel is not installed.
+        TaskError: as for `optimise`.
+        BuildError: no setting can be built, or the folder cannot be written.
+    """
+    require_kernel("build")
+    loaded = as_task(task)
+    return build_task(loaded, Path(out) / loaded.task.name, say)
+
+
+def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assembly:
+    """Make the parts of a scanner in memory, in the rotation frame [mm], without labels.
+
+    Args:
+        task: whose printer and deck the parts are for.
+        angles: angle set of the scanner, such as `optimise(task).angle_set()`.
+        say: is told what is being done.
+
+    Returns:
+        Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
+
+    Raises:
+        InstallError: the CAD kernel is not installed.
+        BuildError: a part cannot be made.
+    """
+    require_kernel("the making of parts")
+    from cad.assembly.make import make_parts
+
+    say("making the parts")
+    return make_parts(as_task(task).scanner(as_angle_set(angles)))
+
+
+def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
+    """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
+
+    Raises:
+        InstallError: the CAD kernel is not installed.
+        TaskError: the folder has no angle set or no task.
+        BuildError: a part cannot be made.
+    """
+    require_kernel("check")
+    folder = Path(folder)
+    scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
+    from cad.checks.run import check_scanner
+
+    return check_scanner(scanner, say)

@@ -1,0 +1,112 @@
+"""From a task to the mounting angles, and what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from scanwright.api.arguments import Say, TaskLike, as_task, quiet
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from design.evaluation.comparison import ComparisonRow
+    from design.evaluation.evaluation import Evaluation
+    from design.search.optimum import Optimum
+
+
+def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
+    """Search all mounting angles of a task.
+
+    Args:
+        task: what the scanner shall see.
+        say: is told what is being done.
+
+    Returns:
+        The best families of settings, `optimum.search.best`, the best one first; `optimum.angle_set()` is what parts
+        and frame chain are made from.
+
+    Raises:
+        TaskError: the task is malformed, no direction has a weight, or no setting keeps its limits.
+
+    Example:
+        >>> import scanwright as sw
+        >>> optimum = sw.optimise("ceiling")
+        >>> alpha_rot, beta_rot, alpha_laser, beta_laser = optimum.search.best[0].angles_deg
+        >>> alpha_rot, beta_rot  # this task fixes them: it hangs upside down
+        (180.0, 0.0)
+    """
+    from design.search.optimum import find_optimum
+
+    return find_optimum(as_task(task), say)
+
+
+def evaluate(
+    task: TaskLike,
+    angles_deg: Sequence[float],
+    *,
+    pole: str | None = None,
+    lever: str | None = None,
+    say: Say = quiet,
+) -> Evaluation:
+    """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
+
+    Args:
+        task: what the scanner shall see.
+        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser.
+        pole: "WIDTH_MM,HEIGHT_MM,RANGE_M" of a thin upright pole, to tell the chance that it is hit.
+        lever: "X_MM,Y_MM,RANGE_M": the optical centre off the axis, as seen at a range.
+        say: is told what is being done.
+
+    Raises:
+        TaskError: the task is malformed, these are not four angles, or no direction has a weight.
+
+    Example:
+        >>> import scanwright as sw
+        >>> rolling = sw.evaluate("uniform", (0, 90, 0, -90))
+        >>> abs(rolling.score.J - rolling.ball.J) < rolling.score.J_error + rolling.ball.J_error
+        True
+    """
+    from design.evaluation import evaluation
+
+    loaded = as_task(task)
+    problem = evaluation.problem_to_judge(loaded, lever)
+    return evaluation.evaluate(loaded, problem, evaluation.setting_rad(angles_deg), pole, say)
+
+
+def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:
+    """Put the optimum of a task beside the usual mounts, the scanner for little money, and ready-made ones.
+
+    Raises:
+        TaskError: as for `optimise`.
+    """
+    from design.evaluation.comparison import compare
+    from design.search.optimum import find_optimum
+
+    optimum = find_optimum(as_task(task), say)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
+
+
+def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:
+    """Draw how many beams of a full scan fall within the ball around each direction, a map for each setting.
+
+    Args:
+        task: what the scanner shall see: its region and its masks are drawn in.
+        settings_deg: title of a map -> its (alpha_rot, beta_rot, alpha_laser, beta_laser).
+
+    Raises:
+        TaskError: the task is malformed, a setting is not four angles, or no direction has a weight.
+
+    Example:
+        >>> import scanwright as sw
+        >>> figure = sw.draw_density("ceiling", {"rolling": (0, 90, 0, -90)})
+        >>> figure.get_size_inches().tolist()
+        [8.0, 4.0]
+    """
+    from design.evaluation.density_picture import density_figure
+    from design.evaluation.evaluation import setting_rad
+    from design.objective.problem import problem_of
+
+    loaded = as_task(task)
+    settings = {name: setting_rad(angles) for name, angles in settings_deg.items()}
+    return density_figure(problem_of(loaded), settings, loaded.task.name)
