@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import tomllib
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +14,10 @@ from cad.layout.layout import drive_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import Catalogue
 from design.catalogue.products import Lidar, Servo, SlipRing
-from design.errors import BuildError, ScanwrightError, TaskError, suggest
+from design.errors import BuildError, ScanwrightError, TaskError
 from design.scanner import scanner_of
 from design.task.task import load_task
+from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
 
 GRAVITY_M_S2 = 9.81
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
@@ -51,7 +50,7 @@ class Answers:
         lidar: by its name in the catalogue.
         servo: the same.
         height_m: of the scanner's optical centre over the ground.
-        see: what it must see, each as `SEEN` says.
+        see: what it must see, each as `scanwright.pipeline.wishes.SEEN` says.
         scan_s: time of one full scan.
         robot: what of it the scanner must look past: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
         ahead_m: where on the robot it stands, ahead of the middle of the box or of the origin of the mesh.
@@ -65,17 +64,6 @@ class Answers:
     scan_s: float
     robot: str = "none"
     ahead_m: float = 0.0
-
-
-SEEN: dict[str, tuple[str, tuple[float, ...]]] = {
-    "ground": ("ground:FROM:TO:WIDTH, in metres ahead", (0.5, 5.0, 4.0)),
-    "ceiling": ("ceiling:HEIGHT over the ground", (2.5,)),
-    "wall": ("wall:DISTANCE:WIDTH ahead", (3.0, 4.0)),
-    "around": ("around:UP:DOWN, in degrees from level", (30.0, 30.0)),
-    "all": ("all, every direction", ()),
-    "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
-}
-"""What can be asked for: how it is written, and its numbers where they are left out."""
 
 
 def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:
@@ -92,9 +80,9 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     """
     lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
     _require_strength(lidar, servo)
-    wishes = [_wish(each) for each in answers.see]
+    wishes = [parse_wish(each) for each in answers.see]
     if not wishes:
-        raise TaskError(f"--see: nothing is to be seen: {_known()}")
+        raise TaskError(f"--see: nothing is to be seen: {known_wishes()}")
     things = [numbers for word, numbers in wishes if word == "thing"]
     regions = [(word, numbers) for word, numbers in wishes if word != "thing"] or [("all", ())]
     blocks = [
@@ -114,8 +102,8 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         "alpha_laser_deg = [-90, 90]",
         "beta_laser_deg = [-90, 90]",
         "",
-        *_density(things),
-        *(line for word, numbers in regions for line in _region(word, numbers, answers)),
+        *density_lines(things),
+        *(line for word, numbers in regions for line in region_lines(word, numbers, answers.height_m)),
         *_mask(answers, path.parent),
     ]
     return "\n".join(blocks) + "\n"
@@ -130,24 +118,6 @@ def _require_strength(lidar: Lidar, servo: Servo) -> None:
             f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "
             f"a level axis, need {needed:.2g} N m, and the servo gives {servo.lasting_torque_nm:.2g} N m all day"
         )
-
-
-def _wish(text: str) -> tuple[str, tuple[float, ...]]:
-    word, *given = text.split(":")
-    if word not in SEEN:
-        raise TaskError(f"--see {text}: not a thing to see{suggest(word, SEEN)}; {_known()}")
-    how, usual = SEEN[word]
-    try:
-        numbers = [float(each) for each in given]
-    except ValueError as error:
-        raise TaskError(f"--see {text}: numbers after the colons: {how}") from error
-    if len(numbers) > len(usual) or not all(math.isfinite(each) for each in numbers):
-        raise TaskError(f"--see {text}: {len(usual)} numbers at most, and finite: {how}")
-    return word, (*numbers, *usual[len(numbers) :])
-
-
-def _known() -> str:
-    return "; ".join(how for how, _ in SEEN.values())
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
@@ -193,80 +163,6 @@ def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
         "limits_deg = [-90, 90]",
         f"period_s = {answers.scan_s:g}    # out and back is one full scan: longer is denser",
     ]
-
-
-def _density(things: Sequence[tuple[float, ...]]) -> list[str]:
-    if not things:
-        return []
-    size_m, distance_m = min(things, key=lambda each: each[0] / each[1] if each[1] > 0 else 0.0)
-    if not (size_m > 0 and distance_m > 0):
-        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: a size and a distance above 0")
-    radius_deg = math.degrees(math.atan2(size_m / 2, distance_m))
-    return [
-        f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
-        f"ball_radius_deg = {radius_deg:.2g}",
-        "",
-        "# [limits]  # take the # away to be refused an answer by which it may be hit less than twice",
-        "# min_density = 2",
-        "",
-    ]
-
-
-def _region(word: str, numbers: tuple[float, ...], answers: Answers) -> list[str]:
-    write = REGIONS[word]
-    return ["[[weight]]", *write(numbers, answers), ""]
-
-
-def _ground(numbers: tuple[float, ...], answers: Answers) -> list[str]:
-    return [
-        'shape = "ground"      # what matters, all of it alike: value = 2 makes a region count twice',
-        f"from_m = {numbers[0]:g}",
-        f"to_m = {numbers[1]:g}",
-        f"width_m = {numbers[2]:g}",
-        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
-        "heading_deg = 0       # 0 is ahead, 90 to the left",
-    ]
-
-
-def _ceiling(numbers: tuple[float, ...], answers: Answers) -> list[str]:
-    return [
-        'shape = "ceiling"',
-        f"ceiling_m = {numbers[0]:g}       # over the ground",
-        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
-        "from_m = -2           # behind",
-        "to_m = 2              # ahead",
-        "width_m = 4",
-    ]
-
-
-def _wall(numbers: tuple[float, ...], answers: Answers) -> list[str]:
-    return [
-        'shape = "wall"',
-        f"distance_m = {numbers[0]:g}",
-        f"width_m = {numbers[1]:g}",
-        f"height_m = {answers.height_m:g}        # of the scanner over the ground",
-        "bottom_m = 0          # of the wall, over the ground",
-        "top_m = 2.5",
-        "heading_deg = 0       # 0 is ahead, 90 to the left",
-    ]
-
-
-def _around(numbers: tuple[float, ...], _: Answers) -> list[str]:
-    up, down = numbers
-    return ['shape = "band"', f"theta_deg = [{90 - up:g}, {90 + down:g}]  # 0 is up, 90 level, 180 down"]
-
-
-def _all(_numbers: tuple[float, ...], _: Answers) -> list[str]:
-    return ['shape = "all"']
-
-
-REGIONS: dict[str, Callable[[tuple[float, ...], Answers], list[str]]] = {
-    "ground": _ground,
-    "ceiling": _ceiling,
-    "wall": _wall,
-    "around": _around,
-    "all": _all,
-}
 
 
 def _mask(answers: Answers, folder: Path) -> list[str]:

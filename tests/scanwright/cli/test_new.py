@@ -14,7 +14,8 @@ from design.catalogue.products import Lidar, Servo
 from design.errors import TaskError
 from design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from design.task.task import load_task
-from scanwright.pipeline.new_task import ANGLES, SEEN, Answers, task_text, write_task_file
+from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
+from scanwright.pipeline.wishes import SEEN
 
 PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
 PRODUCTS = load_catalogue()
