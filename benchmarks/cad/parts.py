@@ -1,96 +1,151 @@
 """How many scanners of random angles build and pass every check, and what their parts come to.
 
-    python -m benchmarks.cad.parts [SETTINGS] [SENSOR] [SERVO]
+    python -m benchmarks.cad.parts [SETTINGS] [SENSOR SERVO RING]
 
 Angle pairs of the lidar are `default_rng(1).uniform(-90, 90, (300, 2))`, those of the prototype study; every one gets
-a random place of the axis. For each setting: all parts and all checks of `scanwright check`; a failed check counts with
-its kind, a setting that cannot be built with its reason. Masses are of printed parts, filled; a part or a check that
-only some settings have is counted over these. Ctrl-C ends a run early and tells what it has measured.
+a random place of the axis, and without products in its turn one of six combinations of them. For each setting: all
+parts and all checks of `scanwright check`; a failed check counts with its kind, a setting that cannot be built with its
+reason. A part or a check that only some settings have is counted over these. Where PrusaSlicer is installed, the parts
+of one setting of each ten are sliced. Ctrl-C ends a run early and tells what it has measured.
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
+import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 
+from benchmarks.cad import slicer
+from cad.assembly.assembly import Assembly
 from cad.assembly.make import make_parts
 from cad.assembly.masses import link_bodies
+from cad.assembly.print_settings import slicer_settings
 from cad.checks.check import Check
 from cad.checks.run import run_checks
+from cad.files.threemf import threemf_bytes
 from cad.geometry.inertia import of_solid
+from cad.geometry.print_pose import on_bed
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.errors import BuildError
 from design.scanner import Scanner, scanner_of
 
-RING = "UH1256-02-0610-06S"
-TOLD = ("beams_hidden", "beams_linkage", "tilt_moment", "shaft_slope", "deflection", "deflection_turning")
+Products = tuple[str, str, str]
+BORE, BORE_TOO, CAPSULE = "UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"
+COMBINATIONS: tuple[Products, ...] = (
+    ("UTM-30LX", "MX-64R", BORE),
+    ("UST-10LX", "XM430-W350", BORE_TOO),
+    ("URG-04LX", "AX-12A", BORE),
+    ("LD19", "XL430-W250", BORE),
+    ("UTM-30LX", "XM540-W270", CAPSULE),
+    ("UST-10LX", "MX-28", CAPSULE),
+)
+SLICED = 10  # one setting of so many
+WORST = {  # what a table holds of all checks of one kind
+    "wall": max,
+    "islands": max,
+    "retention": min,
+    "lead_bend": min,
+    "lead_length": max,
+    "beams_hidden": max,
+    "beams_linkage": max,
+    "tilt_moment": max,
+    "shaft_slope": max,
+    "deflection": max,
+    "deflection_turning": max,
+    "mount_lean": max,
+    "clearance": min,
+}
 
 
-def main(count: int = 300, sensor: str = "UTM-30LX", servo: str = "MX-64R") -> None:
+def main(count: int = 300, *products: str) -> None:
     """Build, check, and print the table."""
-    catalogue = load_catalogue()
-    lasers = np.random.default_rng(1).uniform(-90, 90, (300, 2))
-    axes = np.random.default_rng(2).uniform((-180, -90), (180, 90), (300, 2))
-    rows: list[dict[str, float]] = []
+    combinations: tuple[Products, ...] = ((products[0], products[1], products[2]),) if products else COMBINATIONS
+    rows: list[tuple[Products, dict[str, float]]] = []
     failed: Counter[str] = Counter()
     warned: Counter[str] = Counter()
-    refused: list[str] = []
-    passed = 0
+    built: Counter[Products] = Counter()
+    passed: Counter[Products] = Counter()
+    refused: Counter[Products] = Counter()
     with suppress(KeyboardInterrupt):
-        for setting in np.column_stack([axes, lasers])[:count]:
-            alpha_rot, beta_rot, alpha, beta = (round(float(angle), 2) for angle in setting)
-            angles = AngleSet(
-                task="benchmark",
-                angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
-                sensor=sensor,
-                servo=servo,
-                slip_ring=RING,
-            )
-            start = time.perf_counter()
+        for number, scanner in enumerate(_scanners(combinations, count)):
+            which, start = combinations[number % len(combinations)], time.process_time()
+            setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
             try:
-                values, checks = _measured(scanner_of(angles, "fdm-0.4", catalogue))
+                assembly = make_parts(scanner)
+                checks, _ = run_checks(scanner, assembly, lambda _: None)
             except BuildError as error:
-                refused.append(f"{alpha_rot, beta_rot, alpha, beta}: {error}")
-                print("refused", refused[-1])
+                refused[which] += 1
+                print(f"refused {setting}: {error}", flush=True)
                 continue
-            values["seconds"] = time.perf_counter() - start
-            rows.append(values)
+            values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}
+            if (number // len(combinations)) % SLICED == 0 and shutil.which(slicer.PROGRAM):
+                values |= _sliced(scanner, assembly)
+            rows.append((which, values))
             faults = [check for check in checks if check.severity == "error"]
-            passed += not faults
+            built[which] += 1
+            passed[which] += not faults
             failed.update({check.kind for check in faults})
             warned.update({check.kind for check in checks if check.severity == "warning"})
             for check in faults:
-                print(f"failed {alpha_rot, beta_rot, alpha, beta}: {check.message}")
-    done = len(rows) + len(refused)
-    print(f"{sensor} on {servo}: {done} settings, {len(rows)} built, {passed} pass every check, {len(refused)} refused")
+                print(f"failed {setting}: {check.message}", flush=True)
+    for which in combinations:
+        done = built[which] + refused[which]
+        print(
+            f"{' '.join(which)}: {done} settings, {built[which]} built, {passed[which]} pass, {refused[which]} refused"
+        )
+    print(f"{len(rows) + refused.total()} settings, {len(rows)} built, {passed.total()} pass every check")
     print("  failed: ", ", ".join(f"{kind} {n}" for kind, n in failed.most_common()) or "none")
     print("  warned: ", ", ".join(f"{kind} {n}" for kind, n in warned.most_common()) or "none")
-    for name in dict.fromkeys(name for row in rows for name in row):
-        low, middle, high, top = np.quantile([row[name] for row in rows if name in row], [0, 0.5, 0.95, 1])
-        print(f"  {name:<20} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
+    for name in dict.fromkeys(name for _, row in rows for name in row):
+        found = [row[name] for _, row in rows if name in row]
+        low, middle, high, top = np.quantile(found, [0, 0.5, 0.95, 1])
+        print(f"  {name:<22} of {len(found):<3} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
 
 
-def _measured(scanner: Scanner) -> tuple[dict[str, float], list[Check]]:
-    """What the parts of one scanner come to, and their checks.
+def _scanners(combinations: tuple[Products, ...], count: int) -> Iterator[Scanner]:
+    """One of each setting, with the combinations in turn."""
+    catalogue = load_catalogue()
+    lasers = np.random.default_rng(1).uniform(-90, 90, (300, 2))
+    axes = np.random.default_rng(2).uniform((-180, -90), (180, 90), (300, 2))
+    for number, setting in enumerate(np.column_stack([axes, lasers])[:count]):
+        sensor, servo, ring = combinations[number % len(combinations)]
+        alpha_rot, beta_rot, alpha, beta = (round(float(angle), 2) for angle in setting)
+        angles = AngleSet(
+            task="benchmark",
+            angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
+            sensor=sensor,
+            servo=servo,
+            slip_ring=ring,
+        )
+        yield scanner_of(angles, "fdm-0.4", catalogue)
 
-    Raises:
-        BuildError: a part cannot be made.
-    """
-    assembly = make_parts(scanner)
-    checks, _ = run_checks(scanner, assembly, lambda _: None)
-    found = {check.kind: check.value for check in checks if check.value is not None}
+
+def _values(scanner: Scanner, assembly: Assembly, checks: list[Check]) -> dict[str, float]:
+    """What the parts of one scanner come to, and the worst of its checks of each kind."""
     density = scanner.printer.density_g_cm3
     printed = {
         f"{name}_g": 1000 * of_solid(solid, density).mass_kg
         for name, solid in assembly.made.items()
         if not assembly.parts[name].metal
     }
-    values = {
+    found = {
+        kind: worst(check.value for check in checks if check.kind == kind and check.value is not None)
+        for kind, worst in WORST.items()
+        if any(check.kind == kind and check.value is not None for check in checks)
+    }
+    # how much of what the horn may bear it does bear
+    horn = [
+        check.value / check.limit for check in checks if check.kind == "tilt_moment" and check.value and check.limit
+    ]
+    return {
         "h_mm": assembly.layout.stack.h,
         **printed,
         "printed_g": sum(printed.values()),
@@ -98,11 +153,25 @@ def _measured(scanner: Scanner) -> tuple[dict[str, float], list[Check]]:
         "bearing": float(assembly.layout.stack.bearing is not None),
         "sub_plate": float(assembly.layout.stack.sub_plate is not None),
         "counterweight": float("counterweight" in assembly.made),
-        "imbalance_nm": found["flanks"],
-        "thin_wall_mm2": max((check.value or 0.0 for check in checks if check.kind == "wall"), default=0.0),
-        "islands": max((check.value or 0.0 for check in checks if check.kind == "islands"), default=0.0),
+        "leads": float(len(assembly.leads)),
+        "leads_laid": float(sum(lead.path is not None for lead in assembly.leads)),
+        **({"horn_share": max(horn)} if horn else {}),
+        **found,
     }
-    return values | {kind: found[kind] for kind in TOLD if kind in found}, checks
+
+
+def _sliced(scanner: Scanner, assembly: Assembly) -> dict[str, float]:
+    """Hours of printing, of the longest part and of all of them, without labels."""
+    hours = {}
+    for name, part in assembly.parts.items():
+        if part.metal or name not in assembly.made:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / f"{name}.3mf"
+            mesh = on_bed(assembly.mesh(name), assembly.print_pose(name))
+            file.write_bytes(threemf_bytes({name: mesh}, name, "", slicer_settings(scanner.printer)))
+            hours[f"{name}_h"] = slicer.sliced(file).time_s / 3600
+    return {**hours, "longest_h": max(hours.values()), "printed_h": sum(hours.values())}
 
 
 if __name__ == "__main__":

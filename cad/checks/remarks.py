@@ -8,6 +8,7 @@ from cad.checks.mechanics import load_checks
 from cad.findings import PartFinding
 from cad.geometry.inertia import Inertial
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.ties import hub_tie_of, plate_ties_of
 from cad.layout.direct.cage import share_weight
 from cad.layout.direct.misalignment import SHARE, worst_moment_nm
 from cad.layout.direct.stack import DirectStack
@@ -70,6 +71,8 @@ def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     bracket = bracket_of(layout.scanner, layout.stack)
     if isinstance(bracket, LeftOut):
         out.append(bracket)
+    ties = hub_tie_of(layout.scanner, layout.linkage), plate_ties_of(layout.scanner.lidar, layout.linkage)
+    out += [tie for tie in ties if isinstance(tie, LeftOut)]
     if layout.deck.tripod is None:
         out.append(unasked(TRIPOD_FOOT))
     if layout.deck.flat:

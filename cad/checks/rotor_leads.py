@@ -1,4 +1,4 @@
-"""The leads between lidar and ring: that each has a way, keeps its bend radius, and has room for its joint. mm.
+"""The leads between lidar and ring: that each has a way, keeps its bend radius, has room for its joint, is tied. mm.
 
 What they touch, and the beams that they hide, is checked with all other bodies: they are bodies of the assembly.
 """
@@ -6,23 +6,27 @@ What they touch, and the beams that they hide, is checked with all other bodies:
 from __future__ import annotations
 
 from cad.assembly.assembly import Assembly
-from cad.checks.check import Check, at_least, note
-from cad.layout.cables.leads import JOINT, RotorLead
+from cad.checks.check import Check, at_least, note, tidy
+from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
+from cad.layout.cables.tie_seat import TieSeat
 from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 
 
 def lead_checks(assembly: Assembly) -> list[Check]:
-    """Three values of every lead; one word where there are none to check."""
+    """Four values of every lead; one word where there are none to check."""
     ring = assembly.layout.scanner.slip_ring
     if not assembly.leads:
         what = "no ring: the cables of the lidar need a loose loop for the sweep"
         if ring is not None:
             what = f"lead_diameter_mm of {ring.name} is not in the catalogue, nor how its leads bend: no way was laid"
         return [Check("leads", "note", None, None, "", ROTOR_LEADS, f"{ROTOR_LEADS}: {what}")]
-    return [check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}")]
+    seat = assembly.layout.linkage.hub_tie
+    return [
+        check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}", seat)
+    ]
 
 
-def _checks(lead: RotorLead, where: str) -> list[Check]:
+def _checks(lead: RotorLead, where: str, seat: TieSeat | None) -> list[Check]:
     if lead.path is None:
         what = (
             f"{where}: from the outlet at y = {lead.y:g} mm no way to the ring bends by {lead.radius:g} mm or more and "
@@ -30,6 +34,10 @@ def _checks(lead: RotorLead, where: str) -> list[Check]:
         )
         return [Check("lead_bend", "warning", None, lead.radius, "mm", where, what)]
     joint = lead.path.joint_piece()
+    tied = None if seat is None else tied_mm(lead, seat)
+    what = f"{where}: no tongue of the hub holds it: tie it to what is near"
+    if tied is not None:
+        what = f"{where}: runs {tied:.1f} mm below the tongue of the hub that it is tied to"
     return [
         at_least("lead_bend", lead.path.least_radius(), lead.radius, "mm", where, "least bend radius of its middle"),
         at_least(
@@ -37,5 +45,14 @@ def _checks(lead: RotorLead, where: str) -> list[Check]:
         ),
         note(
             "lead_length", lead.path.length(), "mm", where, "from the ring's rotor to the jacket of the lidar's cable"
+        ),
+        Check(
+            "lead_tie",
+            "note" if tied is None else "pass",
+            None if tied is None else tidy(tied),
+            None,
+            "mm",
+            where,
+            what,
         ),
     ]

@@ -204,7 +204,7 @@ def _wiring(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomI
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
         ties = 2 * len(scanner.lidar.cable_y_mm)
-        note = "on both sides of each joint; price unknown"
+        note = "at the tongues of hub and plate, and to spare; price unknown"
         yield BomItem("wiring", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from cad.layout.balance.counterweight import Counterweight, counterweight_of
 from cad.layout.belt.drive import belt_drive
+from cad.layout.cables.ties import hub_tie_of, plate_ties_of
 from cad.layout.deck import Deck, deck_of
 from cad.layout.direct.drive import direct_drive
 from cad.layout.drive import DriveLayout, Stack
@@ -44,17 +45,22 @@ def layout_of(scanner: Scanner) -> Layout:
     """
     drive = drive_of(scanner)
     deck, linkage = deck_of(scanner, drive), linkage_of(scanner, drive.stack)
+    ties = plate_ties_of(scanner.lidar, linkage)
+    linkage = replace(linkage, plate_ties=() if isinstance(ties, LeftOut) else ties)
     bar = counterweight_of(scanner, deck, linkage)
     if isinstance(bar, Counterweight):
         linkage = replace(linkage, ear=bar.ear)
+    tie = hub_tie_of(scanner, linkage)
+    linkage = replace(linkage, hub_tie=None if isinstance(tie, LeftOut) else tie)
     linkage = replace(linkage, flag=flag_of(bracket_of(scanner, drive.stack), drive.stack, _taken(linkage)))
     return Layout(scanner, drive, deck, linkage, bar)
 
 
 def _taken(linkage: AlignmentLinkage) -> tuple[float, ...]:
-    """Azimuths at which the hub has screws, the way of the wires and the ear of a bar."""
+    """Azimuths at which the hub has screws, the way of the wires, the ear of a bar and a tongue for a tie."""
     taken = (*linkage.cross_azimuths, sum(linkage.cross_azimuths) / 2)
-    return taken if linkage.ear is None else (*taken, linkage.ear.azimuth)
+    taken = taken if linkage.ear is None else (*taken, linkage.ear.azimuth)
+    return taken if linkage.hub_tie is None else (*taken, linkage.hub_tie.azimuth)
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad import outlines
+from cad.layout.cables.tie_seat import TieSeat
 from cad.layout.drive import Stack
 from cad.layout.envelope import (
     BODY_GAP,
@@ -77,6 +78,8 @@ class AlignmentLinkage:
     cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
     ear: Ear | None = None
     flag: Flag | None = None
+    hub_tie: TieSeat | None = None  # rotation frame
+    plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 
 
 def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:

@@ -4,9 +4,9 @@ Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the 
 at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all that must stay
 free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT),
 a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the shaft, the wires
-of the ring's rotor leave its sleeve through a channel of the hub. Under a sub-plate (`sub_plate.py`) the plate lies
-lower, with nuts for its ears and pockets for the heads of its screws. Where a counterweight balances the rotor, an ear
-of the hub carries it.
+of the ring's rotor leave its sleeve through a channel of the hub. Tongues of hub and plate have slots for the ties of
+leads and cables. Under a sub-plate (`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the
+heads of its screws. Where a counterweight balances the rotor, an ear of the hub carries it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cad.layout.layout import Layout
 from cad.layout.linkage import AlignmentLinkage, neck_corners
 from cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAFT
 from cad.parts.fins import FAR, fins_beside
-from cad.parts.linkage_hub import hub, hub_cuts
+from cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
 from cad.parts.part_spec import PartSpec, Step
 from cad.parts.sub_plate import plate_marks
 from cad.screws import Trap
@@ -134,7 +134,7 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
         corners = neck_corners(p, attempt)
         beside = [*fan, *fins_beside(p.top, p.body, p.cables, corners @ p.stack.R())]
-        marked = [*_holes(p), *_plate_marks(p)]
+        marked = [*_holes(p), *_plate_marks(p), *(slot for tie in p.plate_ties for slot in tie_slots(tie))]
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
@@ -177,9 +177,11 @@ def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
 
 
 def _plate(p: AlignmentLinkage) -> cq.Shape:
-    """The plate, and under a sub-plate its ears."""
+    """The plate with the tongues behind it, and under a sub-plate its ears."""
     low = p.top - PLATE_THICKNESS
     plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
+    if p.plate_ties:
+        plate = plate.fuse(*(tongue(tie) for tie in p.plate_ties))
     if p.ears is None:
         return plate
     (x0, y0, _), (x1, y1, _) = p.ears

@@ -24,10 +24,16 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
     bar = layout.counterweight
     if isinstance(bar, LeftOut):
         return None
+    tie = layout.linkage.hub_tie
+    first = (
+        ""
+        if tie is None or not tie.grooved
+        else "First lay a cable tie into the groove beside the hub: it waits for the leads. "
+    )
     words = (
-        "Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in the middle "
-        f"of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their heads. "
-        "Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots to "
+        f"{first}Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
+        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
+        "heads. Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots to "
         "where `scanwright scan` prints the least ripple."
     )
     return PartSpec(

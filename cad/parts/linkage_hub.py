@@ -1,4 +1,4 @@
-"""The hub of the alignment linkage: seat of the shaft, way of the wires, ear of the bar.
+"""The hub of the alignment linkage: seat of the shaft, way of the wires, ear of the bar; tongues for cable ties.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
 """
@@ -11,12 +11,14 @@ import cadquery as cq
 import numpy as np
 
 from cad import outlines, solids
+from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 from cad.layout.direct.loads import JOURNAL_WALL
 from cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
 from cad.parts.homing_bracket import flag_on_hub
 
 WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
+IN_HUB = 0.5  # where that height ends, before the slots of a tongue
 EAR_CORNER = 0.3  # of its half width
 
 
@@ -26,14 +28,40 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
     hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
     if p.ear is not None:
         hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
+    if p.hub_tie is not None:
+        hub = hub.fuse(tongue(p.hub_tie))
     if p.flag is not None:
         hub = hub.fuse(*flag_on_hub(p))
     return hub
 
 
 def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
-    """What is cut from it: cross screws, way of the wires, index groove, bore, slots of the ear."""
-    return [*_crossed(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p)]
+    """What is cut from it: cross screws, way of the wires, index groove, bore, slots of ear and tongue."""
+    ties = [] if p.hub_tie is None else tie_slots(p.hub_tie)
+    return [*_crossed(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p), *ties]
+
+
+def tongue(seat: TieSeat) -> cq.Shape:
+    """The tongue of a cable tie, in the frame of its seat."""
+    low = (seat.inner, seat.aside - seat.half_width, seat.low)
+    return solids.box(low, (seat.end, seat.aside + seat.half_width, seat.high)).moved(solids.about_axis(seat.azimuth))
+
+
+def tie_slots(seat: TieSeat) -> list[cq.Shape]:
+    """Its two slots, and the groove that joins them."""
+    beyond = 1.0
+    cuts = [
+        solids.box(
+            (seat.first, seat.aside + min(side * seat.half, side * (seat.half + SLOT_ACROSS)), seat.low - beyond),
+            (seat.last, seat.aside + max(side * seat.half, side * (seat.half + SLOT_ACROSS)), seat.high + beyond),
+        )
+        for side in (1.0, -1.0)
+    ]
+    if seat.grooved:
+        out = seat.half + SLOT_ACROSS
+        low = (seat.first, seat.aside - out, seat.high - GROOVE)
+        cuts.append(solids.box(low, (seat.last, seat.aside + out, seat.high + beyond)))
+    return [cut.moved(solids.about_axis(seat.azimuth)) for cut in cuts]
 
 
 def _ear(ear: Ear, start: float) -> cq.Shape:
@@ -58,9 +86,12 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    low = (inner, -WIRES_HALF_WIDTH, stack.shoulder - 1.0)
-    channel = solids.box(low, (stack.hub_radius + 20.0, WIRES_HALF_WIDTH, stack.shoulder + WIRES_ABOVE))
-    return [channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p)))]
+    low, out = (inner, -WIRES_HALF_WIDTH, stack.shoulder - 1.0), stack.hub_radius + 20.0
+    ends = [(out, stack.shoulder + WIRES_ABOVE)]
+    if p.hub_tie is not None:  # lower where the leads are tied
+        ends = [(stack.hub_radius - IN_HUB, stack.shoulder + WIRES_ABOVE), (out, p.hub_tie.low)]
+    channels = [solids.box(low, (end, WIRES_HALF_WIDTH, high)) for end, high in ends]
+    return [each.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p))) for each in channels]
 
 
 def _free_side(p: AlignmentLinkage) -> float:

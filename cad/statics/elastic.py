@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from cad.statics.voxels import Grid
-from design.arrays import Array
+from design.arrays import Array, Mask
 
 OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
 HOLD = 20.0  # stiffness per area of what holds a surface, of modulus by edge: softens by some 1e-3
@@ -45,10 +45,14 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Points in a body: the cell of each (row of `Model.cells`) and its shape functions, shape (p,) and (p, 20)."""
+    """Points in a body: the cell of each (row of `Model.cells`) and its shape functions, shape (p,) and (p, 20).
+
+    `known` says which of all points that were asked for these are: those in no cell are left out.
+    """
 
     cell: NDArray[np.intp]
     shapes: Array
+    known: Mask
 
 
 def model_of(grid: Grid, body: Array) -> Model:
@@ -72,7 +76,7 @@ def places(model: Model, points: Array) -> Places:
     corner = np.clip(np.ceil(at - 1e-9).astype(np.intp) - 1, 0, np.array(grid.shape) - 1)
     cell = number[tuple(corner.T)]
     known = cell >= 0
-    return Places(cell[known], _shapes_and_slopes((at - corner)[known])[0])
+    return Places(cell[known], _shapes_and_slopes((at - corner)[known])[0], known)
 
 
 def solve(model: Model, modulus: float, poisson: float, held: Places, held_mm2: float, loads: Array) -> Array:

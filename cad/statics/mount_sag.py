@@ -77,6 +77,7 @@ def _on_grid(
     seats = _discs(np.array(mounted.holes), mounted.ears - INSIDE, carried.seat_mm, mounted.screw.nominal / 2)
     seats = (seats - centre) @ R
     at = elastic.places(model, seats)
+    seats = seats[at.known]  # a foot narrower than the ring bears on what it has
     down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY
     lever = R.T @ (carried.centre_m * 1000 - centre)
     loads = elastic.weight(model, density * 1e-6 * down)

@@ -182,6 +182,9 @@ def _fault(scanner: Scanner, linkage: AlignmentLinkage, deck: Deck, neck: Array,
     boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
     if any(in_box(held, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
         return "would meet the lidar or its cables"
+    tongues = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in linkage.plate_ties]
+    if any(in_box(points, (low, high), GAP).any() for low, high in tongues for points in (held, put_in)):
+        return "would meet a tongue of the plate"
     both = np.concatenate([held, put_in])
     if in_fan(both, linkage, GAP).any():
         return "would stand in the fan"

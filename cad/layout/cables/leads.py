@@ -17,6 +17,7 @@ import numpy as np
 from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import RotorRoom, room_of
+from cad.layout.cables.tie_seat import TieSeat
 from cad.layout.cables.way import Ending, short_way
 from cad.layout.direct.loads import JOURNAL_WALL
 from cad.layout.direct.stack import DirectStack
@@ -27,6 +28,7 @@ from design.catalogue.products import SlipRing
 SAMPLE = 1.5  # mm between the points that stand for a lead that is laid
 BESIDE = 0.25  # between two leads, and a lead and its channel's wall
 ABOVE_CAGE = 1.9  # height of a lead over the lower face of the hub where it leaves through the hub's channel
+BELOW_HUB = 0.85  # between the lower face of the hub's tongue and a lead that leaves under it
 WINDOW_BELOW = 8.3  # the hub's lower end: middle of the windows of a hollow shaft
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 HELD = 1.0  # beyond the face that a lead leaves by, and its own radius
@@ -78,6 +80,17 @@ def leads_of(layout: Layout) -> tuple[RotorLead, ...]:
     return found
 
 
+def tied_mm(lead: RotorLead, seat: TieSeat) -> float | None:
+    """Room between a lead and the tongue of the hub that it leaves under; None where it leaves elsewhere."""
+    if lead.path is None:
+        return None
+    points = lead.path.points(SAMPLE / 3)
+    out = seat.direction()
+    along, across = points @ out, points @ [-out[1], out[0], 0.0] - seat.aside
+    under = (along > seat.first) & (along < seat.last) & (np.abs(across) < seat.half) & (points[:, 2] < seat.low)
+    return float(seat.low - points[under, 2].max() - lead.diameter / 2) if under.any() else None
+
+
 def _ways(leads: Sequence[RotorLead]) -> int:
     return sum(lead.path is not None for lead in leads)
 
@@ -89,13 +102,15 @@ def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence
     hub, outlets = layout.stack.hub_radius, layout.scanner.lidar.cable_y_mm
     leads: dict[int, RotorLead] = {}
     for i in order:
-        exits = _exits(layout, ring, places[i], len(outlets))
-        starts = [Ending(np.array(corners), out, OUT, radius, 0.0) for corners, out in exits]
-        starts = [_from_hub(start, hub, half) for start in starts if room.beside_others(start.corners).all()]
-        outlet = _outlet(layout, outlets[i], half)
-        path = short_way(room, starts, outlet, half, radius, hub)
-        if path is None:  # rather in the fan, where its shadow counts, than not at all
-            path = short_way(replace(room, bearings_rad=None), starts, outlet, half, radius, hub)
+        outlet, path = _outlet(layout, outlets[i], half), None
+        # tied if it can be; rather in the fan, where its shadow counts, than not at all
+        ways = product((room, replace(room, bearings_rad=None)), _exits(layout, ring, places[i], len(outlets)))
+        for within, (seat, exits) in ways:
+            starts = [Ending(np.array(corners), out, OUT, radius, 0.0) for corners, out in exits]
+            starts = [_from_hub(start, hub, half, seat) for start in starts if room.beside_others(start.corners).all()]
+            path = short_way(within, starts, outlet, half, radius, hub)
+            if path is not None:
+                break
         leads[i] = RotorLead(outlets[i], 2 * half, radius, path)
         if path is not None:
             room = _with(room, path, 2 * half + BESIDE / 2)
@@ -116,16 +131,32 @@ def _outlet(layout: Layout, y: float, half: float) -> Ending:
     return Ending(start[None], -layout.stack.R()[:, 0], BACK, 0.0, half + HELD)
 
 
-def _from_hub(start: Ending, hub: float, half: float) -> Ending:
-    """The same end with its lengths counted from beside the hub."""
+def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> Ending:
+    """The same end with its lengths counted from beside the hub; straight as far as it lies under a tongue."""
     inside = hub - float(np.hypot(*start.corners[-1, :2]))
-    return replace(start, lengths=tuple(inside + out for out in OUT), held=inside + half + HELD)
+    start = replace(start, lengths=tuple(inside + out for out in OUT), held=inside + half + HELD)
+    if seat is None:
+        return start
+    held = start.held + seat.end - hub
+    return replace(start, held=held, used=held - HELD)
 
 
-def _exits(layout: Layout, ring: SlipRing, number: int, count: int) -> Iterator[tuple[Array, Array]]:
+def _exits(
+    layout: Layout, ring: SlipRing, number: int, count: int
+) -> Iterator[tuple[TieSeat | None, list[tuple[Array, Array]]]]:
+    """Where a lead may be tied, and then the exits there: the best place first."""
+    seat = layout.linkage.hub_tie
+    if isinstance(layout.stack, BeltStack) or layout.stack.bearing is not None:
+        yield seat, list(_held_exits(layout, ring, number, count))
+        return
+    if seat is not None:
+        yield seat, [_tied_exit(layout.stack, ring, seat, number, count)]
+    yield None, list(_open_exits(layout.stack, ring))
+
+
+def _held_exits(layout: Layout, ring: SlipRing, number: int, count: int) -> Iterator[tuple[Array, Array]]:
     """Corners from the ring's rotor to where the lead turns outwards, and the direction in which it does."""
-    stack, half, radius = layout.stack, ring.lead_diameter_mm or 0.0, ring.lead_bend_radius_mm or 0.0
-    half /= 2
+    stack, half = layout.stack, (ring.lead_diameter_mm or 0.0) / 2
     if isinstance(stack, BeltStack):
         # up the bore and out by its two windows
         assert ring.rotor is not None
@@ -134,12 +165,24 @@ def _exits(layout: Layout, ring: SlipRing, number: int, count: int) -> Iterator[
             low, side = stack.ring_top + ring.rotor.length_mm, sign * (half + BESIDE)
             yield np.array([[side, 0.0, low], [side, 0.0, middle]]), np.array([sign, 0.0, 0.0])
         return
-    if stack.bearing is not None:
-        aside = (2 * half + BESIDE) * (number - (count - 1) / 2)
-        inner = stack.shaft_diameter / 2 + JOURNAL_WALL + half + BESIDE
-        points = np.array([[inner, aside, stack.ring_top], [inner, aside, stack.shoulder + ABOVE_CAGE]])
-        yield _turned(points, sum(layout.linkage.cross_azimuths) / 2)
-        return
+    aside = (2 * half + BESIDE) * (number - (count - 1) / 2)
+    inner = stack.shaft_diameter / 2 + JOURNAL_WALL + half + BESIDE
+    points = np.array([[inner, aside, stack.ring_top], [inner, aside, stack.shoulder + ABOVE_CAGE]])
+    yield _turned(points, sum(layout.linkage.cross_azimuths) / 2)
+
+
+def _tied_exit(stack: DirectStack, ring: SlipRing, seat: TieSeat, number: int, count: int) -> tuple[Array, Array]:
+    """Beside the others under the tongue of an open hub, as near to it as a lead can bend."""
+    half, radius = (ring.lead_diameter_mm or 0.0) / 2, ring.lead_bend_radius_mm or 0.0
+    aside = (2 * half + BESIDE) * (number - (count - 1) / 2)
+    inner, low = _on_rotor(stack, half), stack.ring_top
+    high = max(low + radius, seat.low - BELOW_HUB - half)
+    return _turned(np.array([[inner, aside, low], [inner, aside, high]]), seat.azimuth)
+
+
+def _open_exits(stack: DirectStack, ring: SlipRing) -> Iterator[tuple[Array, Array]]:
+    """All around the axis, between ring and hub."""
+    half, radius = (ring.lead_diameter_mm or 0.0) / 2, ring.lead_bend_radius_mm or 0.0
     for azimuth in np.radians(np.arange(0.0, 360.0, ASIDE)).tolist():
         inner = _on_rotor(stack, half)
         points = np.array([[inner, 0.0, stack.ring_top], [inner, 0.0, stack.ring_top + radius]])

@@ -115,6 +115,9 @@ def room_of(layout: Layout) -> RotorRoom:
     boxes = [envelope.body, envelope.plate, envelope.under]
     corners = [box_corners(box) @ R.T for box in (*boxes, *_stubs(layout.scanner.lidar))]
     corners.append(_hub(stack.hub_radius, stack.shoulder, -stack.h))
+    corners += [tie.corners(tie.inner) @ R.T for tie in p.plate_ties]
+    if p.hub_tie is not None:
+        corners.append(p.hub_tie.corners(stack.hub_radius))
     if p.flag is not None:
         corners.append(_arm(p.flag))
     if isinstance(layout.counterweight, Counterweight):

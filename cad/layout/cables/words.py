@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import JOINT, RotorLead
+from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
 from cad.layout.layout import Layout
 
 SPARE = 15.0  # mm more than its way, so that a joint can be made once again
@@ -21,8 +21,9 @@ def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
         "bare wires behind it go on as one bundle with the leads of the ring, the way that the picture shows.",
         *(_one(layout, lead) for lead in laid),
         f"Crimp the wires of each bundle side by side on its longest straight piece, with {JOINT:g} mm of shrink tube "
-        "over all of them; the wiring diagram tells which belong together. A cable tie around bundle and neck on each "
-        "side of the joint takes the pull off it.",
+        "over all of them; the wiring diagram tells which belong together. "
+        f"The {SPARE:g} mm that are left go back along the joint, under the same tube.",
+        *_ties(layout, laid),
     ]
     missing = [lead for lead in leads if lead.path is None]
     said += [
@@ -30,6 +31,27 @@ def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
         for lead in missing
     ]
     return " ".join(said)
+
+
+def _ties(layout: Layout, laid: Sequence[RotorLead]) -> list[str]:
+    """How they are tied."""
+    seat, said = layout.linkage.hub_tie, []
+    if seat is not None and laid and all(tied_mm(lead, seat) is not None for lead in laid):
+        way = "in the groove of the tongue, under the bar" if seat.grooved else "over the tongue"
+        said.append(
+            "Pull a cable tie through the two slots of the hub's tongue, "
+            f"{way}, and close it around what leaves the ring below: a pull on it ends there."
+        )
+    elif isinstance(layout.stack, BeltStack) and laid:
+        said.append("Close a cable tie around shaft and bundles, just below the hub: a pull on them ends there.")
+    elif laid:
+        said.append("A cable tie around bundle and neck takes the pull off the ring.")
+    if layout.linkage.plate_ties:
+        said.append(
+            "Another through the two slots of each tongue behind the plate, crossed between tongue and cable, holds "
+            "the jacket of the lidar's cable."
+        )
+    return said
 
 
 def _one(layout: Layout, lead: RotorLead) -> str:

@@ -18,9 +18,12 @@ from cad.statics.mount_sag import Carried, mount_sag
 HALF, HIGH, MODULUS, DENSITY = 12.0, 120.0, 2000.0, 1.2  # mm, MPa, g/cm3
 
 
-@pytest.mark.parametrize("arm_m", [0.0, 0.05])
-def test_a_post_bends_as_a_beam_does(arm_m):
-    """Slope at the end of a cantilever: load F across it at its end, moment F arm, and its own weight q."""
+@pytest.mark.parametrize(("arm_m", "seat_mm"), [(0.0, HALF), (0.05, HALF), (0.0, HALF + 9.0)])
+def test_a_post_bends_as_a_beam_does(arm_m, seat_mm):
+    """Slope at the end of a cantilever: load F across it at its end, moment F arm, and its own weight q.
+
+    What lies on it may be wider than the post.
+    """
     mesh = mesh_of(box((-HALF, -HALF, 0.0), (HALF, HALF, HIGH)))
     deck = SimpleNamespace(
         rotation=lambda: np.eye(3), centre=(0.0, 0.0, 0.0), deck_holes=((0.0, 0.0),), screw=SCREWS["M2"]
@@ -28,7 +31,7 @@ def test_a_post_bends_as_a_beam_does(arm_m):
     mounted = SimpleNamespace(holes=((0.0, 0.0),), ears=HIGH, screw=SCREWS["M2"])
     mass_kg = 0.5
     centre = np.array([0.0, 0.0, HIGH / 1000 + arm_m])
-    load = Carried(mass_kg, centre, np.array([1.0, 0.0, 0.0]), HALF, HALF)
+    load = Carried(mass_kg, centre, np.array([1.0, 0.0, 0.0]), seat_mm, HALF)
     rotation = sum(mount_sag(mesh, deck, mounted, load, MODULUS, DENSITY))
     inertia = (2 * HALF) ** 4 / 12
     force = mass_kg * STANDARD_GRAVITY

@@ -1,0 +1,69 @@
+"""A seat of a cable tie: a tongue with a slot on either side of what is tied to it. Millimetres."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.arrays import Array
+
+SLOT_ALONG, SLOT_ACROSS = 3.2, 1.8  # for a tie 2.5 wide and 1.1 thick
+SLOT_WALL = 2.0  # outside a slot
+GROOVE = 1.6  # depth of the tie's way where something lies on the tongue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TieSeat:
+    """A tongue along a direction square to z, which what is tied follows.
+
+    Attributes:
+        azimuth: of the direction [rad].
+        aside: distance of its middle line from the z axis, counter-clockwise from the direction.
+        inner: where it begins, inside of what carries it.
+        first: where the slots begin.
+        low: its lower face.
+        high: its upper face.
+        half: of the room between the slots.
+        grooved: whether a groove of its upper face takes the tie.
+    """
+
+    azimuth: float
+    aside: float = 0.0
+    inner: float
+    first: float
+    low: float
+    high: float
+    half: float
+    grooved: bool = False
+
+    @property
+    def last(self) -> float:
+        """Where the slots end."""
+        return self.first + SLOT_ALONG
+
+    @property
+    def end(self) -> float:
+        """Where it ends."""
+        return self.last + SLOT_WALL
+
+    @property
+    def half_width(self) -> float:
+        """Of the whole tongue."""
+        return self.half + SLOT_ACROSS + SLOT_WALL
+
+    def direction(self) -> Array:
+        """Outwards, shape (3,)."""
+        return np.array([math.cos(self.azimuth), math.sin(self.azimuth), 0.0])
+
+    def points(self, along: Array, across: Array, z: Array) -> Array:
+        """Points at all of some places along, across and over it, shape (n, 3)."""
+        x, y, height = (each.ravel() for each in np.meshgrid(along, across + self.aside, z, indexing="ij"))
+        out = self.direction()
+        return x[:, None] * out + y[:, None] * [-out[1], out[0], 0.0] + height[:, None] * [0.0, 0.0, 1.0]
+
+    def corners(self, inner: float) -> Array:
+        """Of the tongue from a place outwards, shape (8, 3)."""
+        across = np.array([-self.half_width, self.half_width])
+        return self.points(np.array([inner, self.end]), across, np.array([self.low, self.high]))

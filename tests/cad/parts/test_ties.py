@@ -1,0 +1,66 @@
+"""Tongues for cable ties: their slots are open, a tie goes around them, and where there is none it says so."""
+
+import cadquery as cq
+import numpy as np
+import pytest
+from scanners import CAPSULE, GROUND_AHEAD, scanner_at
+
+from cad.checks.remarks import left_out_of
+from cad.layout.cables.leads import tied_mm
+from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
+from cad.layout.names import ALIGNMENT_LINKAGE, HUB_TIE
+
+TIE = (2.5, 1.1)  # width and thickness
+
+
+@pytest.fixture(scope="module", params=[(0, 0, 90, 0), GROUND_AHEAD], ids=["open hub", "under a bar"])
+def tied(request, parts_of):
+    return parts_of(scanner_at(request.param))
+
+
+def filled(assembly, points):
+    solid = assembly.made[ALIGNMENT_LINKAGE]
+    return np.array([solid.isInside(cq.Vector(*point)) for point in points.tolist()])
+
+
+def loop(seat):
+    """Of a tie around the tongue: in both slots and over it, shape (n, 3)."""
+    middle = (seat.first + seat.last) / 2
+    along = middle + np.array([-TIE[0] / 2, 0.0, TIE[0] / 2])
+    sides = seat.half + SLOT_ACROSS / 2 + np.array([-TIE[1] / 2, TIE[1] / 2])
+    over = seat.high - GROOVE if seat.grooved else seat.high
+    heights = np.linspace(seat.low - 1.0, over + TIE[1], 12)
+    slots = [seat.points(along, sign * sides, heights) for sign in (1, -1)]
+    top = seat.points(along, np.linspace(-seat.half, seat.half, 9), over + np.array([0.1, TIE[1]]))
+    return np.concatenate([*slots, top])
+
+
+def seats_of(assembly):
+    p = assembly.layout.linkage
+    return [(p.hub_tie, np.eye(3)), *((seat, p.stack.R().T) for seat in p.plate_ties)]
+
+
+def test_a_tie_goes_around_every_tongue(tied):
+    for seat, turn in seats_of(tied):
+        assert not filled(tied, loop(seat) @ turn).any()
+        across = np.linspace(-seat.half + 0.2, seat.half - 0.2, 7)
+        inside = seat.points(
+            np.array([seat.first + 0.2, seat.last]), across, np.array([seat.low + 0.2, seat.low + 1.5])
+        )
+        assert filled(tied, inside @ turn).all()
+
+
+def test_the_leads_leave_the_ring_under_the_tongue_near_enough_to_be_pulled_up(tied):
+    seat = tied.layout.linkage.hub_tie
+    assert [0.3 < tied_mm(lead, seat) < 1.0 for lead in tied.leads] == [True, True]
+
+
+def test_the_bar_of_a_counterweight_lies_on_the_ear_and_not_on_the_tie(parts_of):
+    seat = parts_of(scanner_at(GROUND_AHEAD)).layout.linkage.hub_tie
+    assert seat.grooved and seat.high - GROOVE + TIE[1] < seat.high
+
+
+def test_what_has_no_tongue_is_told(parts_of):
+    assembly = parts_of(scanner_at((0, 19, 84, 41), sensor="URG-04LX", slip_ring=CAPSULE))
+    (told,) = [entry for entry in left_out_of(assembly) if entry.what == HUB_TIE]
+    assert assembly.layout.linkage.hub_tie is None and "hollow shaft" in told.why
