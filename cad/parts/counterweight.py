@@ -33,8 +33,8 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
     words = (
         f"{first}Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
         f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
-        "heads. Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots to "
-        "where `scanwright scan` prints the least ripple."
+        "heads. Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots "
+        "to where `scanwright scan` prints the least ripple."
     )
     return PartSpec(
         name=COUNTERWEIGHT,
