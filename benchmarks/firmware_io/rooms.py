@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from firmware_io.recording.recording import RecordingWriter
@@ -209,8 +210,7 @@ def simulate(room: Room, setup: Setup, truth: Truth, seed: int = 0, unrest: Unre
     origin, direction = _rays(setup, truth, motion, beams)
     origin = origin + np.multiply.outer(beams.time_s, unrest.velocity_m_s)
     range_m, _ = cast(room, origin, direction)
-    for _ in range(unrest.walkers):
-        range_m = np.minimum(range_m, _walker(rng, room, setup, beams.time_s, origin, direction))
+    range_m = np.minimum(range_m, _walkers(rng, room, setup, unrest, beams.time_s, origin, direction))
     range_m = range_m - truth.bias_m + rng.normal(0.0, setup.noise_m, range_m.size)
     range_m[range_m > room.range_max_m] = np.inf
     per_scan = range_m.reshape(-1, setup.beams).astype(np.float32)
@@ -236,6 +236,26 @@ def simulate(room: Room, setup: Setup, truth: Truth, seed: int = 0, unrest: Unre
         logged = np.radians(setup.step_deg) * np.rint(logged / np.radians(setup.step_deg))
     log_ns = START_NS + np.rint((log_s + truth.lag_s) * 1e9).astype(np.int64)
     return Simulated(scans, JointLog(log_ns, logged))
+
+
+def walked(room: Room, setup: Setup, truth: Truth, seed: int, unrest: Unrest) -> tuple[int, int]:
+    """How many beams of `simulate` met somebody, and near how many of these another look went on behind them.
+
+    Near: within 1 deg. Another look: over 0.6 s away. Behind: by more than 0.25 m.
+    """
+    motion = _Motion.of(setup.sweeps)
+    beams = _beams(setup, motion)
+    origin, direction = _rays(setup, truth, motion, beams)
+    range_m, _ = cast(room, origin, direction)
+    person_m = _walkers(np.random.default_rng(seed), room, setup, unrest, beams.time_s, origin, direction)
+    met = np.flatnonzero(person_m < range_m)
+    on_m = np.where(person_m < range_m, -np.inf, range_m)
+    near = cKDTree(direction).query_ball_point(direction[met], np.radians(1.0))
+    behind = [
+        bool(np.any((np.abs(beams.time_s[those] - beams.time_s[k]) > 0.6) & (on_m[those] > person_m[k] + 0.25)))
+        for k, those in zip(met.tolist(), near, strict=True)
+    ]
+    return met.size, sum(behind)
 
 
 def bound(room: Room, setup: Setup, truth: Truth, names: tuple[str, ...]) -> Floats:
@@ -295,6 +315,20 @@ def cast(room: Room, origin: Floats, direction: Floats) -> tuple[Floats, NDArray
         nearer = range_m < best
         best, face = np.where(nearer, range_m, best), np.where(nearer, 6 * k + its, face)
     return best, face
+
+
+def _walkers(
+    rng: np.random.Generator,
+    room: Room,
+    setup: Setup,
+    unrest: Unrest,
+    time_s: Floats,
+    origin: Floats,
+    direction: Floats,
+) -> Floats:
+    """Range to the nearest of those who walk, shape (n,)."""
+    people = [_walker(rng, room, setup, time_s, origin, direction) for _ in range(unrest.walkers)]
+    return np.min([*people, np.full(time_s.size, np.inf)], axis=0)
 
 
 def _walker(

@@ -24,7 +24,7 @@ from firmware_io.calibration.observable import Choice, check_fan, choose_observa
 from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, moved_by_last, reduced, step, sums
 from firmware_io.calibration.surfaces import group, without_misfits
 from firmware_io.calibration.tiles import FlatTiles, flat_tiles
-from firmware_io.calibration.unrest import Drift, drifts
+from firmware_io.calibration.unrest.drift import Drift, drifts
 
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))

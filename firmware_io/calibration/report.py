@@ -15,11 +15,12 @@ from firmware_io.calibration.entropy import Witness
 from firmware_io.calibration.estimate import Estimate
 from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
-from firmware_io.calibration.tiles import fan_side
-from firmware_io.calibration.unrest import contradicted_share
-from firmware_io.calibration.unrest import warnings as unrest
+from firmware_io.calibration.unrest.drift import Drift
+from firmware_io.calibration.unrest.second_looks import SecondLooks, second_looks
 
 _WALLS = 3
+_FEW = 3  # beams that a slim thing may leave where others went through
+_RESIDUAL = 1.5  # times the noise within small patches
 _LESS_CRISP = "the entropy says that the cloud has become less crisp: do not trust this calibration"
 
 
@@ -73,7 +74,7 @@ def calibration_report(
     applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
     fits = {"before": start, "after": found.x, "as_assembled": applied}
     fit = {name: agreement(found, mount, x) for name, x in fits.items()}
-    contradicted = contradicted_share(mount, found.x, beams, fan_side(beams, mount))
+    looks = second_looks(mount, found.x, beams, found.tiles.noise_m)
     return {
         "schema": "scanwright/calibration/1",
         "beams": int(beams.range_m.size),
@@ -100,7 +101,7 @@ def calibration_report(
         "held": [{"names": list(held.names), "words": held.words, "why": held.why} for held in found.choice.held],
         "notes": [
             *found.choice.notes,
-            *unrest(found.drifts, contradicted, fit["after"].residual_m, found.tiles.noise_m),
+            *_unrest(found.drifts, looks, fit["after"].residual_m, found.tiles.noise_m),
             *([_LESS_CRISP] if witness.less_crisp else []),
         ],
         "drift": [
@@ -112,7 +113,11 @@ def calibration_report(
             }
             for drift in found.drifts
         ],
-        "contradicted_share": contradicted,
+        "second_looks": {
+            "asked": looks.asked,
+            "compared": looks.compared,
+            "seen_through": looks.seen_through,
+        },
         "range_noise_mm": found.noise_m * 1e3,
         "wall_bulge_mm": found.bulge_m * 1e3,
         "residual_mm": {name: one.residual_m * 1e3 for name, one in fit.items()},
@@ -130,6 +135,29 @@ def calibration_report(
             },
         },
     }
+
+
+def _unrest(found: tuple[Drift, ...], looks: SecondLooks, residual_m: float, noise_m: float) -> list[str]:
+    """What a person should know of it, one line each."""
+    said = []
+    for drift in found:
+        if drift.sure:
+            mm_s, deg_s = 1e3 * np.linalg.norm(drift.velocity_m_s), np.degrees(np.linalg.norm(drift.turn_rad_s))
+            said.append(
+                f"the platform moved during recording {drift.recording + 1}, by about {mm_s:.2g} mm/s and "
+                f"{deg_s:.2g} deg/s: do not trust this calibration; scan again with the scanner held still"
+            )
+    if looks.seen_through > _FEW:
+        said.append(
+            f"{looks.seen_through:,} of {looks.compared:,} beams ended where another look, at another time, went "
+            "through: somebody walked, or something was moved"
+        )
+    if residual_m > _RESIDUAL * noise_m:
+        said.append(
+            f"the ranges are off by {1e3 * residual_m:.1f} mm, their noise is {1e3 * noise_m:.1f} mm: something moved, "
+            "or the scanner has an error that no parameter here stands for"
+        )
+    return said
 
 
 def lines(record: dict[str, Any]) -> Iterator[str]:
@@ -162,6 +190,11 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         f"{entropy['before']:.3f} -> {entropy['after']:.3f}, changed by {fallen:+.3f} +- {entropy['change_sd']:.3f}"
     )
     yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
+    looks = record["second_looks"]
+    yield (
+        f"looked at twice   {looks['compared'] / max(looks['asked'], 1):.0%} of the beams: "
+        "who walked elsewhere, or stood still, leaves no trace"
+    )
     for note in record["notes"]:
         yield f"warning: {note}"
     by_name = {one["name"]: one for one in record["parameters"]}

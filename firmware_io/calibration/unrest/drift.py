@@ -1,9 +1,8 @@
-"""Did the platform stand still, and the scene? A calibration takes both for granted, and both leave traces.
+"""Did the platform stand still? A calibration takes it for granted, and what moved leaves traces.
 
 A platform that has moved by h(t) along a surface's normal shows the surface lower by h, as a dent of that spot would,
 but growing with time and the same over all surfaces. So drift and turning at constant rates are six more parameters,
-whose normal equations follow from those of the bulges, tile by tile. Somebody who walks leaves a trace of another kind:
-both sides of the fan look from one point, so what one of them sees in a direction the other one must see there too.
+whose normal equations follow from those of the bulges, tile by tile.
 """
 
 from __future__ import annotations
@@ -16,19 +15,13 @@ from numpy import ndarray
 from scipy.stats import chi2
 
 from design.arrays import Floats
-from firmware_io.calibration.model import LAG, Mount, ReturnedBeams, beam_rays
+from firmware_io.calibration.model import LAG, Mount, beam_rays
 from firmware_io.calibration.solve import WIDTH, Grouping, covariance, reduced, step
 from firmware_io.calibration.tiles import FlatTiles
 
 _U = WIDTH - 2
 _RATES = 6
 _CHANCE = 1e-6
-_CELL_RAD = np.radians(3.0)
-_LOOKS = 3  # beams of the other side around a direction: fewer may all have missed something slim
-_BEFORE_M = 0.25  # people are farther than that from the walls that they hide
-_SLANTED = 0.1  # of the range: floors run away below the lidar
-_RESIDUAL = 1.5  # times the noise within small patches
-_MANY = 3e-4  # share of beams; a scene that stands still leaves none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,56 +87,6 @@ def drifts(
         square = rate[known] @ np.linalg.solve(spread[np.ix_(known, known)], rate[known])
         found.append(Drift(k, rate[:3], rate[3:], float(square)))
     return tuple(found)
-
-
-def contradicted_share(
-    mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams, side: Int64[ndarray, " beams"]
-) -> float:
-    """Share of the beams that end clearly before all that the other side of the fan saw around their direction."""
-    now = beams.under(x)
-    _, direction = beam_rays(mount, x, now)
-    rows, columns = round(np.pi / _CELL_RAD), round(2 * np.pi / _CELL_RAD)
-    row = np.minimum(rows * np.arccos(np.clip(direction[:, 2], -1, 1)) / np.pi, rows - 1).astype(np.int64)
-    # Cells of one height, the fewer of them the nearer the axis
-    wide = np.maximum(columns * np.sin((row + 0.5) * np.pi / rows), 4).astype(np.int64)
-    turn = np.arctan2(direction[:, 1], direction[:, 0]) / (2 * np.pi) % 1
-    nearest = np.full((2, beams.place.max() + 1, rows + 2, columns + 2), np.inf)
-    looks = np.zeros(nearest.shape, np.int64)
-    for up in (-1, 0, 1):
-        other = np.clip(row + up, 0, rows - 1)
-        across = np.maximum(columns * np.sin((other + 0.5) * np.pi / rows), 4).astype(np.int64)
-        for aside in (-1, 0, 1):
-            cell = (side, beams.place, other, ((turn * across).astype(np.int64) + aside) % across)
-            np.minimum.at(nearest, cell, beams.range_m)
-            if not up and not aside:
-                np.add.at(looks, cell, 1)
-    mine = (1 - side, beams.place, row, (turn * wide).astype(np.int64) % wide)
-    seen = looks[mine] >= _LOOKS
-    before = seen & (beams.range_m < (1 - _SLANTED) * nearest[mine] - _BEFORE_M)
-    return float(before.sum() / max(int(seen.sum()), 1))
-
-
-def warnings(found: tuple[Drift, ...], contradicted: float, residual_m: float, noise_m: float) -> list[str]:
-    """What a person should know of it, one line each."""
-    said = []
-    for drift in found:
-        if drift.sure:
-            mm_s, deg_s = 1e3 * np.linalg.norm(drift.velocity_m_s), np.degrees(np.linalg.norm(drift.turn_rad_s))
-            said.append(
-                f"the platform moved during recording {drift.recording + 1}, by about {mm_s:.2g} mm/s and "
-                f"{deg_s:.2g} deg/s: do not trust this calibration; scan again with the scanner held still"
-            )
-    if contradicted > _MANY:
-        said.append(
-            f"{100 * contradicted:.2g} % of the beams end before what the other side of the fan saw there: somebody "
-            "walked, or something was moved"
-        )
-    if residual_m > _RESIDUAL * noise_m:
-        said.append(
-            f"the ranges are off by {1e3 * residual_m:.1f} mm, their noise is {1e3 * noise_m:.1f} mm: something moved, "
-            "or the scanner has an error that no parameter here stands for"
-        )
-    return said
 
 
 def _with(normal: Floats, rise: Floats) -> Floats:

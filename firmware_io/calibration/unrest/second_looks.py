@@ -1,0 +1,214 @@
+"""Did somebody walk through the scene? Most places are looked at twice: what one look met, the other cannot go through.
+
+Both sides of a fan look from one axis, so half a turn, or a whole one, brings other beams to the same place. At which
+angle of the axis and at which bearing they come to it follows from the mount, in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+from numpy import ndarray
+from scipy.stats import norm
+
+from design.arrays import Floats, Ints, Mask
+from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
+
+_ONCE_IN = 1000  # recordings: noise takes one beam of them for a place that another went through
+_SQUARE = 0.5  # scans around a beam are at least so far from it as its neighbours in the scan, times this
+_SCANS = 8  # but so many at most: people walk on
+_ASKED = 200_000  # beams: more tell nothing new
+_APART_RAD = np.radians(10.0)  # a turn less than that is the same look
+_TURN_RAD = 2 * np.pi
+_ROW_RAD = 2 * _TURN_RAD
+
+
+@dataclass(frozen=True, slots=True)
+class SecondLooks:
+    """What two looks at one place, at two times, say of each other.
+
+    Attributes:
+        asked: beams that could be asked.
+        compared: those of them at whose place another beam looked, from half a turn or a whole one away.
+        seen_through: those whose place that other beam went through, to end well behind it.
+    """
+
+    asked: int
+    compared: int
+    seen_through: int
+
+
+def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams, noise_m: float) -> SecondLooks:
+    """Beams that ended where the beams of another look at the same place went through.
+
+    A beam and its four neighbours (in its scan, and in the scans before and after) ended at five points. A beam of
+    another look passes between these and ends behind all of them, as its own four neighbours do, by more than the five
+    are deep and more than noise makes up even once in `_ONCE_IN` recordings. So the first five met something as wide
+    as what the others went through: no thing that stands still does that, and no slot between things, if it has no
+    holes narrower than three beams.
+
+    Args:
+        mount: where the laser sits.
+        x: what was found.
+        beams: all that returned, in the order they were fired.
+        noise_m: standard deviation of a range.
+    """
+    now = beams.under(x)
+    origin, direction = beam_rays(mount, x, now)
+    range_m = now.range_m + x[4]
+    point = origin + range_m[:, None] * direction
+    scans = _Scans.of(now)
+    patch = _patches(scans, np.hypot(direction[:, 0], direction[:, 1]))
+    around = np.full((5, range_m.size), -1)
+    around[:, patch[0]] = patch
+    patch = patch[:, :: max(1, patch.shape[1] // _ASKED)]
+    looks = list(_other_looks(mount, x, now, scans, point, patch[0]))
+    behind_m = noise_m * np.sqrt(2) * norm.isf(1 / _ONCE_IN / max(1, sum(mine.size for mine, _ in looks)))
+    compared, through = np.zeros((2, patch.shape[1]), bool)
+    for mine, other in looks:
+        five, along = point[patch[:, mine]] - origin[other], direction[other]
+        depth = np.einsum("kij,ij->ki", five, along)
+        across = five - depth[:, :, None] * along
+        whole = _between(across[0], (across[2] - across[1]) / 2, (across[4] - across[3]) / 2)
+        whole &= around[0, other] >= 0
+        compared[mine] |= whole
+        clear_m = range_m[around[:, other]].min(axis=0)
+        through[mine] |= whole & (clear_m > 2 * depth.max(axis=0) - depth.min(axis=0) + behind_m)
+    return SecondLooks(patch.shape[1], int(compared.sum()), int(through.sum()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scans:
+    """The beams as rows of an image: which scan each is of, and where in it.
+
+    Attributes:
+        scan: number of each beam's scan, rising, shape (n,).
+        run: number of each scan's run: of one recording, turning one way, shape (s,).
+        joint_rad: of each scan's middle, shape (s,).
+        bearing_rad: from where a scan begins, rising in it, shape (n,).
+        first_rad, sense: bearing there, and +1 or -1 as bearings rise or fall.
+        gap_rad: between neighbours.
+    """
+
+    scan: Ints
+    run: Ints
+    joint_rad: Floats
+    bearing_rad: Floats
+    first_rad: float
+    sense: float
+    gap_rad: float
+
+    @staticmethod
+    def of(beams: ReturnedBeams) -> _Scans:
+        """A scan ends where the bearing jumps back."""
+        step_rad = np.diff(beams.bearing_rad)
+        sense = float(np.sign(np.median(step_rad)))
+        onward = (sense * step_rad > 0) & (np.diff(beams.recording) == 0)
+        scan = np.append(0, np.cumsum(~onward))
+        gap_rad = float(np.median(np.abs(step_rad[onward])))
+        first_rad = sense * float(np.min(sense * beams.bearing_rad)) - sense * gap_rad
+        middle = np.searchsorted(scan, np.arange(scan[-1] + 1)) + np.bincount(scan) // 2
+        way = beams.way[middle]
+        way = way[np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))]  # standing, it goes on as it did
+        run = np.append(0, np.cumsum((np.diff(way) != 0) | (np.diff(beams.recording[middle]) != 0)))
+        bearing_rad = sense * (beams.bearing_rad - first_rad)
+        return _Scans(scan, run, beams.joint_rad[middle], bearing_rad, first_rad, sense, gap_rad)
+
+    def beam(self, scan: Ints, bearing_rad: Floats) -> tuple[Ints, Mask]:
+        """The beam of a scan that is nearest to a bearing (from where a scan begins), and whether it is near."""
+        key, wanted = self.scan * _ROW_RAD + self.bearing_rad, scan * _ROW_RAD + bearing_rad
+        at = np.clip(np.searchsorted(key, wanted), 1, key.size - 1)
+        at = at - (wanted - key[at - 1] < key[at] - wanted)
+        return at, (self.scan[at] == scan) & (np.abs(self.bearing_rad[at] - bearing_rad) < self.gap_rad)
+
+
+def _patches(scans: _Scans, aside: Floats) -> Ints:
+    """Beams that have four neighbours: each, the ones before and after it, those of scans around it, shape (5, k).
+
+    `aside`: sine of each beam's angle to the axis. Near that the scans crowd.
+    """
+    step_rad = np.median(np.abs(np.diff(scans.joint_rad)))
+    beam = np.arange(1, scans.scan.size - 1)
+    row = scans.scan
+    inner = (row[beam - 1] == row[beam + 1]) & (
+        scans.bearing_rad[beam + 1] - scans.bearing_rad[beam - 1] < 3 * scans.gap_rad
+    )
+    beam = beam[inner]
+    square = _SQUARE * scans.gap_rad / np.maximum(step_rad * aside[beam], 1e-9)
+    apart = np.clip(np.rint(square), 1, _SCANS).astype(np.int64)
+    last, has_last = scans.beam(row[beam] - apart, scans.bearing_rad[beam])
+    following, has_following = scans.beam(row[beam] + apart, scans.bearing_rad[beam])
+    whole = has_last & has_following & (scans.run[row[last]] == scans.run[row[following]])
+    return np.stack([beam, beam - 1, beam + 1, last, following])[:, whole]
+
+
+def _other_looks(
+    mount: Mount, x: Floats, now: ReturnedBeams, scans: _Scans, point: Floats, asked: Ints
+) -> Iterator[tuple[Ints, Ints]]:
+    """Which of the asked beams another look came near to, and the beam of that look that came nearest."""
+    run = scans.run[scans.scan[asked]]
+    for psi_rad, bearing_rad in _towards(mount, x, point[asked]):
+        joint_rad = 2 * psi_rad - axis_angle(x, psi_rad, np.zeros(psi_rad.size))
+        here_rad = now.joint_rad[asked] + _APART_RAD
+        next_rad = here_rad + (joint_rad - here_rad) % _TURN_RAD
+        here_rad = now.joint_rad[asked] - _APART_RAD
+        last_rad = here_rad - (here_rad - joint_rad) % _TURN_RAD
+        from_first_rad = scans.sense * (bearing_rad - scans.first_rad) % _TURN_RAD
+        for r in range(scans.run[-1] + 1):
+            rows = np.flatnonzero(scans.run == r)
+            place = now.place[np.searchsorted(scans.scan, rows[0])]
+            own = (run == r) & np.isfinite(joint_rad)
+            beside = (np.abs(run - r) == 1) & (now.place[asked] == place) & np.isfinite(joint_rad)
+            low_rad = scans.joint_rad[rows].min()
+            # Of the own run the next look and the last; of the runs before and after it any one
+            for mine, wanted_rad in (
+                (own, next_rad),
+                (own, last_rad),
+                (beside, low_rad + (joint_rad - low_rad) % _TURN_RAD),
+            ):
+                yield _found(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
+
+
+def _found(
+    now: ReturnedBeams, scans: _Scans, rows: Ints, mine: Ints, wanted_rad: Floats, bearing_rad: Floats
+) -> tuple[Ints, Ints]:
+    """Those of `mine` whose joint angle the scans `rows` of one run reach, and their beams nearest to it."""
+    joint_rad = scans.joint_rad[rows]
+    way = 1 if joint_rad[-1] > joint_rad[0] else -1
+    wanted, bearing = wanted_rad[mine], bearing_rad[mine]
+    reached = (wanted >= joint_rad.min()) & (wanted <= joint_rad.max())
+    mine, wanted, bearing = mine[reached], wanted[reached], bearing[reached]
+    after = rows[0] + np.searchsorted(way * joint_rad, way * wanted)
+    best, off = np.zeros(mine.size, np.int64), np.full(mine.size, np.inf)
+    for scan in (after - 2, after - 1, after, after + 1):  # a scan takes time: its ends are not at its middle's angle
+        beam, near = scans.beam(np.clip(scan, rows[0], rows[-1]), bearing)
+        its = np.where(near, np.abs(now.joint_rad[beam] - wanted), np.inf)
+        best, off = np.where(its < off, beam, best), np.minimum(its, off)
+    return mine[np.isfinite(off)], best[np.isfinite(off)]
+
+
+def _towards(mount: Mount, x: Floats, point: Floats) -> Iterator[tuple[Floats, Floats]]:
+    """The two angles of the axis whose scan plane holds a point, and its bearing in it; NaN where none does."""
+    columns = mount.plane(x)[0]
+    normal, offset = np.cross(columns[:, 0], columns[:, 1]), np.array([x[2], x[3], mount.along_m])
+    a = point[:, :2] @ normal[:2]
+    b = point[:, 1] * normal[0] - point[:, 0] * normal[1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        half_rad = np.arccos((normal @ offset - normal[2] * point[:, 2]) / np.hypot(a, b))
+    for sign in (-1, 1):
+        psi_rad = np.arctan2(b, a) + sign * half_rad
+        cos, sin = np.cos(psi_rad), np.sin(psi_rad)
+        x_rot, y_rot = cos * point[:, 0] + sin * point[:, 1], cos * point[:, 1] - sin * point[:, 0]
+        seen = np.column_stack([x_rot, y_rot, point[:, 2]]) - offset
+        yield psi_rad, np.arctan2(seen @ columns[:, 1], seen @ columns[:, 0])
+
+
+def _between(off: Floats, one: Floats, two: Floats) -> Mask:
+    """Whether each `off`, shape (n, 3), lies in the diamond whose corners are +- `one` and +- `two`."""
+    aa, bb, ab = (np.einsum("ij,ij->i", p, q) for p, q in ((one, one), (two, two), (one, two)))
+    ao, bo = (np.einsum("ij,ij->i", p, off) for p in (one, two))
+    area = aa * bb - ab**2
+    return np.abs(ao * bb - bo * ab) + np.abs(bo * aa - ao * ab) < area
