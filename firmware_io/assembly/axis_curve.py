@@ -17,10 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
-from scipy.interpolate import BSpline, PPoly
 from scipy.linalg import solveh_banded
 
-from design.arrays import Floats
+from design.arrays import Floats, Ints
 from firmware_io.samples import AxisCurve, JointLog, straight
 
 _LEAST = 32  # samples; with fewer there is nothing to average
@@ -99,11 +98,10 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
         return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain"
     if np.abs(residual).max() > _SWING * rms + step_rad:
         return f"they jump: one lies {np.degrees(np.abs(residual).max()):.2g} deg off a smooth curve"
-    pieces = PPoly.from_spline(best.spline)
-    knots = pieces.x[3:-3]
+    knots = best.knots[3:-3]
     curve = AxisCurve(
         knot_ns=log.time_ns[0] + np.rint(knots * 1e9).astype(np.int64),
-        coefficient=np.ascontiguousarray(pieces.c[::-1, 3:-3].T),
+        coefficient=_polynomials(best.knots, best.weight),
     )
     return SmoothAxis(
         curve=curve,
@@ -119,10 +117,10 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
 class _Fit:
     """A least-squares spline; `score` is the mean squared error it will make on a new sample (cross-validation)."""
 
-    spline: BSpline
+    knots: Floats
+    weight: Floats
     residual: Floats
     per_knot: float
-    unknowns: int
     score: float
 
 
@@ -144,18 +142,45 @@ def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_
     inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
     # normal equations of cubic B-splines: at each sample four beside each other are not 0, so the matrix is a band
-    basis = BSpline.design_matrix(seconds, knots, 3)
-    value, first = basis.data.reshape(count, 4), basis.indices[::4]
+    piece = np.searchsorted(inner[1:-1], seconds, "right") + 3
+    value, first = _b_splines(seconds, knots, piece, 3), piece - 3
     unknowns = knots.size - 4
     band, right = np.zeros((4, unknowns)), np.zeros(unknowns)
     for k in range(4):
-        right += np.bincount(first + k, value[:, k] * position, unknowns)
+        right += np.bincount(first + k, value[k] * position, unknowns)
         for below in range(4 - k):
-            band[below] += np.bincount(first + k, value[:, k] * value[:, k + below], unknowns)
+            band[below] += np.bincount(first + k, value[k] * value[k + below], unknowns)
     weight = solveh_banded(band, right, lower=True)
-    residual = position - np.sum(value * weight[first[:, None] + np.arange(4)], axis=1)
+    residual = position - sum(value[k] * weight[first + k] for k in range(4))
     score = np.mean(residual**2) / (1 - unknowns / count) ** 2
-    return _Fit(BSpline(knots, weight, 3), residual, per_knot, unknowns, float(score))
+    return _Fit(knots, weight, residual, per_knot, float(score))
+
+
+def _b_splines(at: Floats, knots: Floats, piece: Ints, degree: int) -> list[Floats]:
+    """The B-splines that are not 0 in the piece of each time, number `piece - degree` first (de Boor's recurrence)."""
+    value = [np.ones_like(at)]
+    for d in range(1, degree + 1):
+        kept = np.zeros_like(at)
+        for k in range(d):
+            after, before = knots[piece + k + 1], knots[piece + k + 1 - d]
+            part = value[k] / (after - before)
+            value[k] = kept + (after - at) * part
+            kept = (at - before) * part
+        value.append(kept)
+    return value
+
+
+def _polynomials(knots: Floats, weight: Floats) -> Floats:
+    """A cubic spline from knot to knot, shape (pieces, 4): powers 0 to 3 of the time into the piece."""
+    first, columns = np.arange(knots.size - 7), []
+    for power, degree in enumerate((3, 2, 1, 0)):
+        begin = knots[first + degree]
+        value = _b_splines(begin, knots, first + degree, degree)
+        columns.append(sum(value[k] * weight[first + k] for k in range(degree + 1)) / math.factorial(power))
+        if degree:  # on to the derivative, a spline of one degree less
+            weight = degree * np.diff(weight) / (knots[degree + 1 : -1] - knots[1 : -degree - 1])
+            knots = knots[1:-1]
+    return np.stack(columns, axis=1)
 
 
 def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], step_rad: float) -> float:
@@ -175,7 +200,7 @@ def _error(
     with half the knots misses 16 times as much of the motion (in rms); what it differs by beyond its noise tells.
     """
     count = seconds.size
-    noise = rms**2 * best.unknowns / count * max(correlated, 1.0)
+    noise = rms**2 * best.weight.size / count * max(correlated, 1.0)
     coarse = _fit(seconds, position, 2 * best.per_knot)
     differs = float(np.mean((coarse.residual - best.residual) ** 2))
     missed = max(differs - noise / 2, 0.0) / 15**2

@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
 from design import frames
 from design.arrays import Floats, Pose, Times
@@ -90,6 +89,8 @@ class Trajectory:
 
     def T_map_world(self, time_ns: Int64[ndarray, " k"]) -> Float64[ndarray, "k 4 4"]:
         """Pose at each time, shape (n, 4, 4), NaN outside."""
+        from scipy.spatial.transform import Rotation, Slerp  # a heavy import that a platform at rest does without
+
         inside = (time_ns >= self.time_ns[0]) & (time_ns <= self.time_ns[-1])
         # epoch nanoseconds do not fit a float64, differences do
         origin_ns = self.time_ns[0]
@@ -104,6 +105,8 @@ class Trajectory:
 
     def pieces(self, first_ns: int, last_ns: int, T_world_rot: Pose) -> PosePieces:
         """The poses from one time to another, behind the constant `T_world_rot`."""
+        from scipy.spatial.transform import Rotation
+
         begin, end = np.searchsorted(self.time_ns, [first_ns, last_ns], side="right")
         begin = min(max(int(begin) - 1, 0), self.time_ns.size - 2)
         near = slice(begin, max(int(end) + 1, begin + 2))
@@ -134,6 +137,8 @@ class Trajectory:
         miss is four times the error (a h^2 / 8). What the platform does between two poses without trace in them
         (vibration) is not in it. NaN for two poses.
         """
+        from scipy.spatial.transform import Rotation
+
         if self.time_ns.size < 3:
             return float("nan"), float("nan")
         gap_s = np.diff(self.time_ns) / 1e9

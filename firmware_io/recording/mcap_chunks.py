@@ -49,10 +49,11 @@ def read_note(path: Path, name: str) -> dict[str, str]:
     return next((record.metadata for record in records if record.name == name), {})
 
 
-def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, bytes]]:
+def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -> Iterator[tuple[str, bytes]]:
     """Topic and bytes of each message, in the order of the log times, as they stand in the file where those are equal.
 
-    Holds the chunks that overlap in time, commonly one, and unpacks the next ones while these are used.
+    Holds the chunks that overlap in time, commonly one, and unpacks the next ones while these are used. `summed`: their
+    check sums are compared, as they need not be where the file was read before.
 
     Raises:
         RecordingError: the file is missing, not MCAP, or damaged.
@@ -67,7 +68,7 @@ def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, by
         waiting = [] if summary.chunk_indexes else foreign(f"{path}: damaged", _unchunked, stream, topics)
 
         def unpack(chunk: ChunkIndex) -> list[_Timed]:
-            return foreign(f"{path}: damaged", _chunk, stream, chunk, wanted)
+            return foreign(f"{path}: damaged", _chunk, stream, chunk, wanted, summed)
 
         with closing(ahead(unpack, chunks)) as unpacked:
             for chunk, messages in zip(chunks, unpacked, strict=True):
@@ -101,9 +102,9 @@ def _summary(path: Path, stream: BinaryIO) -> Summary:
     return summary
 
 
-def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str]) -> list[_Timed]:
+def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: bool) -> list[_Timed]:
     stream.seek(index.chunk_start_offset + _RECORD.size)
-    unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+    unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=summed)
     data = unpacked.read(size)
     found = []
     at = 0

@@ -7,14 +7,29 @@ compared in the others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from design.arrays import Bytes, Floats, Ints, Times
 from firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
-from firmware_io.samples import Block
+from firmware_io.samples import Block, Scan
 
 _STAMP = 4  # seconds and nanoseconds, behind the encapsulation
+
+
+class ScanOutline(NamedTuple):
+    """What alike LaserScan messages are, but for the measurements: times [ns], beams of each, whether they are lit."""
+
+    stamp_ns: Times
+    beams: int
+    has_intensity: bool
+
+
+def outlines_in(messages: Sequence[bytes]) -> Iterator[ScanOutline]:
+    """As `blocks_in`, for those who need no ranges yet."""
+    for scan, places, rows in _alike_scans(messages):
+        yield ScanOutline(_stamps(rows, places.order), scan.range_m.size, bool(scan.intensity.size))
 
 
 def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
@@ -24,6 +39,17 @@ def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
         ValueError: a message is no LaserScan; so of `struct`, where it is cut off.
         RecordingError: as `Scan` does.
     """
+    for scan, places, rows in _alike_scans(messages):
+        yield Block(
+            first=scan,
+            stamp_ns=_stamps(rows, places.order),
+            range_m=_numbers(rows, places.ranges, f"{places.order}f4").astype(np.float32, copy=False),
+            intensity=_numbers(rows, places.intensities, f"{places.order}f4").astype(np.float32, copy=False),
+        )
+
+
+def _alike_scans(messages: Sequence[bytes]) -> Iterator[tuple[Scan, ScanPlaces, Bytes]]:
+    """Scans that differ in nothing else: the first of them, where its numbers are, and the bytes of each, a row."""
     for same_length in _runs(_lengths(messages)):
         rows = _rows(messages[same_length])
         done = 0
@@ -31,13 +57,7 @@ def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
             first = messages[same_length.start + done]
             places = ScanPlaces.of(first)
             alike = _alike(rows[done:], places.shared)
-            block = rows[done : done + alike]
-            yield Block(
-                first=decode_scan(first),
-                stamp_ns=_stamps(block, places.order),
-                range_m=_numbers(block, places.ranges, f"{places.order}f4").astype(np.float32, copy=False),
-                intensity=_numbers(block, places.intensities, f"{places.order}f4").astype(np.float32, copy=False),
-            )
+            yield decode_scan(first), places, rows[done : done + alike]
             done += alike
 
 

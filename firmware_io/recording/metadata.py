@@ -7,12 +7,14 @@ In MCAP it is a metadata record. In a bag it is a latched message of text, JSON 
 from __future__ import annotations
 
 import json
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from design.errors import RecordingError
 from firmware_io.foreign import foreign
-from firmware_io.recording.bags import Bag
 from firmware_io.recording.mcap_chunks import read_note
+
+if TYPE_CHECKING:
+    from firmware_io.recording.bags import Bag
 
 NOTE: Final = "scanwright"
 NOTE_TOPIC: Final = "/scanwright/note"

@@ -33,7 +33,7 @@ from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.arrays import RecordingArrays, arrays_of
 from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
-from firmware_io.recording.message_batches import blocks_in, joints_in
+from firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
 from firmware_io.recording.metadata import NOTE, held_by
 from firmware_io.recording.ros_messages import Beams
 from firmware_io.samples import Block, JointLog, Scan, blocks
@@ -192,12 +192,12 @@ class Recording:
                 scan = replace(scan, beam_bearing_rad=beams[1][0], beam_offset_ns=beams[1][1])
             yield scan
 
-    def blocks(self, most: int = 256) -> Iterator[Block]:
+    def blocks(self, most: int = 128) -> Iterator[Block]:
         """The same scans, up to `most` at once: a tenth of the time where they differ in nothing else."""
         if BEAMS_TOPIC in read_topics(self.path):
             yield from blocks(self.scans(), most)
             return
-        messages = (data for _, data in read_messages(self.path, {SCAN_TOPIC}))
+        messages = (data for _, data in read_messages(self.path, {SCAN_TOPIC}, summed=False))
         while some := list(islice(messages, most)):
             yield from _blocks_in(self.path, some)
 
@@ -220,10 +220,10 @@ def open_recording(path: Path) -> Recording:
     messages = read_messages(path, set(_TYPES))
     while some := list(islice(messages, _AT_ONCE)):
         logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
-        for block in _blocks_in(path, [data for topic, data in some if topic == SCAN_TOPIC]):
-            has_intensity |= bool(block.intensity.size)
-            stamps.append(block.stamp_ns)
-            beams += [block.range_m.shape[1]] * len(block.range_m)
+        for outline in _outlines_in(path, [data for topic, data in some if topic == SCAN_TOPIC]):
+            has_intensity |= outline.has_intensity
+            stamps.append(outline.stamp_ns)
+            beams += [outline.beams] * outline.stamp_ns.size
     if not any(time_ns.size for time_ns, _ in logs):
         raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
     if not beams:
@@ -261,6 +261,10 @@ def _decoded_scan(path: Path, data: bytes) -> Scan:
 
 def _blocks_in(path: Path, messages: list[bytes]) -> list[Block]:
     return foreign(f"{path}: a message of {SCAN_TOPIC}", lambda: list(blocks_in(messages)))
+
+
+def _outlines_in(path: Path, messages: list[bytes]) -> list[ScanOutline]:
+    return foreign(f"{path}: a message of {SCAN_TOPIC}", lambda: list(outlines_in(messages)))
 
 
 def _joints_in(path: Path, messages: list[bytes]) -> tuple[Times, Floats]:

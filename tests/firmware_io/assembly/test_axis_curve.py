@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import make_lsq_spline
 
 from firmware_io.assembly.axis_curve import SmoothAxis, axis_curve, smooth
 from firmware_io.samples import JointLog, straight
@@ -52,6 +53,16 @@ def test_smoothing_is_nearer_than_straight_lines_and_says_by_how_much(speed, rat
     assert error < 1.05 * off_rad(straight(log), log, truth)  # a fast servo read rarely: hardly better, never worse
     assert error / 3 < found.error_rad < 8 * error  # on the safe side where steps last for many samples
     assert found.residual_rad == pytest.approx(STEP / np.sqrt(12), rel=0.25)
+
+
+def test_the_curve_is_the_spline_of_least_squares():
+    log, _ = turning(20)
+    found = smooth(log)
+    seconds, knots = (log.time_ns - log.time_ns[0]) / 1e9, (found.curve.knot_ns - log.time_ns[0]) / 1e9
+    known = make_lsq_spline(seconds, log.position_rad, np.pad(knots, 3, "edge"))
+    asked_ns = np.linspace(log.time_ns[0], log.time_ns[-1], 999).astype(np.int64)
+    asked_s = (asked_ns - log.time_ns[0]) / 1e9
+    np.testing.assert_allclose(found.curve.angle_at(asked_ns), known(asked_s), rtol=0, atol=1e-9)
 
 
 def test_at_the_speed_of_a_careful_scan_the_error_falls_to_a_third():
