@@ -161,8 +161,6 @@ def _platform(
     recording: Path, poses: str | None, imu: str | None, imu_rpy_deg: tuple[float, float, float] | None
 ) -> tuple[Trajectory | None, list[str]]:
     """Where the platform was, how it turned between two poses if an IMU tells, and what is to be said of that."""
-    from firmware_io.poses.gyro import oriented
-    from firmware_io.poses.gyro_files import imu_mount, load_gyro
     from firmware_io.poses.pose_files import load_trajectory
 
     trajectory = None if poses is None else load_trajectory(poses, recording)
@@ -170,6 +168,9 @@ def _platform(
         return trajectory, []
     if trajectory is None:
         raise RecordingError("imu: a gyro goes from pose to pose; name the --poses too")
+    from firmware_io.poses.gyro import oriented
+    from firmware_io.poses.gyro_files import imu_mount, load_gyro
+
     gyro = load_gyro(imu, recording)
     return oriented(trajectory, gyro, imu_mount(imu_rpy_deg, gyro, trajectory.platform, recording))
 
