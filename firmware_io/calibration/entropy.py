@@ -5,7 +5,9 @@
 No tiles, no planes, no rejection: a cloud whose two halves fall on each other is crisp, whatever its surfaces are.
 Each point weighs the area that it stands for, so that near surfaces do not drown far ones, nor those about the axis,
 where beams crowd, the rest: r^2 dOmega is r^2 times the beam's change along the fan towards the axis, db, and
-dpsi (for a fan that holds the axis: times the sine of the angle to it).
+dpsi (for a fan that holds the axis: times the sine of the angle to it). The kernel is at least as wide as half the
+spacing of the points: a narrower one sees their grid, and takes a mount that lays the grids of both sides on each other
+for the crisper one.
 
 A sum over pairs of a sample is known as well as the sample is large: what each point adds to the change of the entropy
 says how well (W. Hoeffding, "A Class of Statistics with Asymptotically Normal Distribution", 1948).
@@ -24,9 +26,11 @@ from scipy.spatial import cKDTree
 from design.arrays import Floats
 from firmware_io.calibration.model import MOUNT, PARAMETERS, Mount, ReturnedBeams, beam_rays
 from firmware_io.calibration.observable import stood_still
+from firmware_io.calibration.scans import Scans
 
 _SAMPLE = 15_000  # points of each side
 _REACH = 4.0  # widths: pairs farther apart add nothing
+_SPACINGS = 0.5  # of the points, in a kernel: of their grid exp(-10) is left
 _SURE = 3.0  # sampling errors: less is no change
 _PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
 
@@ -66,13 +70,13 @@ def witness(
 ) -> Witness:
     """Ask the entropy before, after, and around the result."""
     rng = np.random.default_rng(0)
-    width_m = max(3 * noise_m, 0.03)
     halves = [np.flatnonzero(side == k) for k in (0, 1)]
     sample = np.concatenate([rng.choice(half, min(half.size, _SAMPLE), replace=False) for half in halves])
     few, one = beams.taken(sample), side[sample] == 0
 
     # The same weights for all, or their own change would pass for one of the cloud
     weight = _areas(mount, found, few)
+    width_m = max(3 * noise_m, 0.03, _SPACINGS * _spacing_m(beams, float(np.average(few.range_m, weights=weight))))
 
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
@@ -83,6 +87,12 @@ def witness(
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, found, k, after.entropy) for k in MOUNT}
     spread = (after.share - before.share) * after.weight
     return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
+
+
+def _spacing_m(beams: ReturnedBeams, range_m: float) -> float:
+    """How far points lie apart at a range, in a scan or from scan to scan, whichever is more."""
+    scans = Scans.of(beams)
+    return range_m * max(scans.gap_rad, scans.step_rad)
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:

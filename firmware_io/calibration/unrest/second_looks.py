@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from design.arrays import Floats, Ints, Mask
 from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
+from firmware_io.calibration.scans import Scans
 
 _ONCE_IN = 1000  # recordings: noise takes one beam of them for a place that another went through
 _SQUARE = 0.5  # scans around a beam are at least so far from it as its neighbours in the scan, times this
@@ -23,7 +24,6 @@ _SCANS = 8  # but so many at most: people walk on
 _ASKED = 200_000  # beams: more tell nothing new
 _APART_RAD = np.radians(10.0)  # a turn less than that is the same look
 _TURN_RAD = 2 * np.pi
-_ROW_RAD = 2 * _TURN_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: Return
     origin, direction = beam_rays(mount, x, now)
     range_m = now.range_m + x[4]
     point = origin + range_m[:, None] * direction
-    scans = _Scans.of(now)
+    scans = Scans.of(now)
     patch = _patches(scans, np.hypot(direction[:, 0], direction[:, 1]))
     around = np.full((5, range_m.size), -1)
     around[:, patch[0]] = patch
@@ -80,64 +80,18 @@ def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: Return
     return SecondLooks(patch.shape[1], int(compared.sum()), int(through.sum()))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Scans:
-    """The beams as rows of an image: which scan each is of, and where in it.
-
-    Attributes:
-        scan: number of each beam's scan, rising, shape (n,).
-        run: number of each scan's run: of one recording, turning one way, shape (s,).
-        joint_rad: of each scan's middle, shape (s,).
-        bearing_rad: from where a scan begins, rising in it, shape (n,).
-        first_rad, sense: bearing there, and +1 or -1 as bearings rise or fall.
-        gap_rad: between neighbours.
-    """
-
-    scan: Ints
-    run: Ints
-    joint_rad: Floats
-    bearing_rad: Floats
-    first_rad: float
-    sense: float
-    gap_rad: float
-
-    @staticmethod
-    def of(beams: ReturnedBeams) -> _Scans:
-        """A scan ends where the bearing jumps back."""
-        step_rad = np.diff(beams.bearing_rad)
-        sense = float(np.sign(np.median(step_rad)))
-        onward = (sense * step_rad > 0) & (np.diff(beams.recording) == 0)
-        scan = np.append(0, np.cumsum(~onward))
-        gap_rad = float(np.median(np.abs(step_rad[onward])))
-        first_rad = sense * float(np.min(sense * beams.bearing_rad)) - sense * gap_rad
-        middle = np.searchsorted(scan, np.arange(scan[-1] + 1)) + np.bincount(scan) // 2
-        way = beams.way[middle]
-        way = way[np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))]  # standing, it goes on as it did
-        run = np.append(0, np.cumsum((np.diff(way) != 0) | (np.diff(beams.recording[middle]) != 0)))
-        bearing_rad = sense * (beams.bearing_rad - first_rad)
-        return _Scans(scan, run, beams.joint_rad[middle], bearing_rad, first_rad, sense, gap_rad)
-
-    def beam(self, scan: Ints, bearing_rad: Floats) -> tuple[Ints, Mask]:
-        """The beam of a scan that is nearest to a bearing (from where a scan begins), and whether it is near."""
-        key, wanted = self.scan * _ROW_RAD + self.bearing_rad, scan * _ROW_RAD + bearing_rad
-        at = np.clip(np.searchsorted(key, wanted), 1, key.size - 1)
-        at = at - (wanted - key[at - 1] < key[at] - wanted)
-        return at, (self.scan[at] == scan) & (np.abs(self.bearing_rad[at] - bearing_rad) < self.gap_rad)
-
-
-def _patches(scans: _Scans, aside: Floats) -> Ints:
+def _patches(scans: Scans, aside: Floats) -> Ints:
     """Beams that have four neighbours: each, the ones before and after it, those of scans around it, shape (5, k).
 
     `aside`: sine of each beam's angle to the axis. Near that the scans crowd.
     """
-    step_rad = np.median(np.abs(np.diff(scans.joint_rad)))
     beam = np.arange(1, scans.scan.size - 1)
     row = scans.scan
     inner = (row[beam - 1] == row[beam + 1]) & (
         scans.bearing_rad[beam + 1] - scans.bearing_rad[beam - 1] < 3 * scans.gap_rad
     )
     beam = beam[inner]
-    square = _SQUARE * scans.gap_rad / np.maximum(step_rad * aside[beam], 1e-9)
+    square = _SQUARE * scans.gap_rad / np.maximum(scans.step_rad * aside[beam], 1e-9)
     apart = np.clip(np.rint(square), 1, _SCANS).astype(np.int64)
     last, has_last = scans.beam(row[beam] - apart, scans.bearing_rad[beam])
     following, has_following = scans.beam(row[beam] + apart, scans.bearing_rad[beam])
@@ -146,7 +100,7 @@ def _patches(scans: _Scans, aside: Floats) -> Ints:
 
 
 def _other_looks(
-    mount: Mount, x: Floats, now: ReturnedBeams, scans: _Scans, point: Floats, asked: Ints
+    mount: Mount, x: Floats, now: ReturnedBeams, scans: Scans, point: Floats, asked: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
     """Which of the asked beams another look came near to, and the beam of that look that came nearest."""
     run = scans.run[scans.scan[asked]]
@@ -173,7 +127,7 @@ def _other_looks(
 
 
 def _found(
-    now: ReturnedBeams, scans: _Scans, rows: Ints, mine: Ints, wanted_rad: Floats, bearing_rad: Floats
+    now: ReturnedBeams, scans: Scans, rows: Ints, mine: Ints, wanted_rad: Floats, bearing_rad: Floats
 ) -> tuple[Ints, Ints]:
     """Those of `mine` whose joint angle the scans `rows` of one run reach, and their beams nearest to it."""
     joint_rad = scans.joint_rad[rows]

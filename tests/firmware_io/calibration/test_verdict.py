@@ -180,6 +180,17 @@ def test_a_wrong_answer_is_less_crisp(beams):
     assert not witness(mount, beams, fan_side(beams, mount), start, TRUE, 0.01).less_crisp
 
 
+def test_grids_that_fall_on_each_other_are_no_crispness(tmp_path):
+    """A rolling scanner's two sides look in the same directions if it is as designed, which this one is not."""
+    room, setup, truth = case(1086)
+    recording = open_recording(write(tmp_path / "r.mcap", simulate(room, setup, truth)))
+    beams = gather([recording], one_place=True)[0]
+    mount, start = mount_of(setup)
+    x = np.array([getattr(truth, name) for name in NAMES])
+    seen = witness(mount, beams, fan_side(beams, mount), start, x, 0.01)
+    assert seen.after < seen.before - 3 * seen.change_sd
+
+
 def test_drift_is_asked_of_every_recording(tmp_path):
     """One that crept among two: it is the one that is named."""
     made = [
