@@ -36,6 +36,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 def pytest_addoption(parser):
     parser.addoption("--measure-slow", action="store_true", help="list anew which tests are slow: all of them must run")
+    parser.addoption("--every-sample", action="store_true", help="the samples too that only repeat what others show")
 
 
 def pytest_configure(config):
@@ -43,8 +44,10 @@ def pytest_configure(config):
         config.pluginmanager.register(quick_tests.Stopwatch(hasattr(config, "workerinput")))
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     quick_tests.mark(items)
+    if not config.getoption("--every-sample"):
+        quick_tests.leave_out_samples(config, items)
 
 
 @pytest.hookimpl(wrapper=True)

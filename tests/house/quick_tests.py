@@ -2,6 +2,7 @@
 
 A test is slow if it takes more than a tenth of a second of processor, processes that it starts and all fixtures that
 it needs included, or waits for more than a second. What is parametrised is slow if one of its cases is.
+Samples are more cases of a law than a change needs: they run with `--every-sample`, as `benchmarks/promises.toml` asks.
 """
 
 import time
@@ -30,6 +31,25 @@ def mark(items):
     for item in items:
         if name_of(item.nodeid) not in slow:
             item.add_marker(pytest.mark.quick)
+
+
+def samples(every, daily):
+    """Parameters of a test: `daily`, which differ in kind, always; the others only if every sample is asked for.
+
+    A tuple holds the values of several parameters.
+    """
+    daily = list(daily)
+    return [one if one in daily else _sample(*(one if isinstance(one, tuple) else (one,))) for one in every]
+
+
+def _sample(*values):
+    return pytest.param(*values, marks=pytest.mark.sample)
+
+
+def leave_out_samples(config, items):
+    """Take the samples that are not daily out of the tests."""
+    config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("sample")])
+    items[:] = [item for item in items if not item.get_closest_marker("sample")]
 
 
 class Stopwatch:

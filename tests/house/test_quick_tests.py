@@ -50,3 +50,16 @@ def test_a_test_costs_what_its_fixtures_cost_whoever_came_first(monkeypatch, tmp
         watch.pytest_runtest_logreport(SimpleNamespace(when="call", **vars(item)))
     watch.pytest_sessionfinish()
     assert quick_tests.slow_tests() == {"a.py::first", "a.py::second"}
+
+
+def test_a_sample_that_is_not_daily_waits_until_every_one_is_asked_for():
+    seeds, pairs = quick_tests.samples(range(3), range(1)), quick_tests.samples([(1, 2), (3, 4)], [(3, 4)])
+    assert seeds[0] == 0 and pairs[1] == (3, 4)
+    assert [one.values for one in (*seeds[1:], pairs[0])] == [(1,), (2,), (1, 2)]
+    marked = seeds[1].marks[0].name
+    items = [SimpleNamespace(get_closest_marker=lambda name, has=has: has == name) for has in ("quick", marked)]
+    told = []
+    config = SimpleNamespace(hook=SimpleNamespace(pytest_deselected=lambda items: told.extend(items)))
+    left = items.copy()
+    quick_tests.leave_out_samples(config, left)
+    assert (left, told) == (items[:1], items[1:])

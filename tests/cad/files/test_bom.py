@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scanners import TILTED, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.files.bom import _wiring, bom_text, items_of
@@ -182,10 +183,9 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert (seat.part, seat.count) == ("sub_plate", 4)
 
 
-def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made):
-    printer = load_catalogue().products["fdm-0.4-insert"]
-    scanner = replace(made.scanner, printer=printer)
-    assembly = make_parts(scanner)
+def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
+    scanner = scanner_at(TILTED, printer="fdm-0.4-insert")
+    assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
     joints = joints_of(assembly.layout)
     held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}

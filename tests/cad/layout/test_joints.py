@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
+from quick_tests import samples
+from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from cad.geometry.holes import Piercing, rounds_of
 from cad.layout.all_joints import joints_of
@@ -159,7 +160,8 @@ def is_reachable(hole, head, piercing):
 FOOT, COVER, FLAG = Modules(tripod_foot=True), Modules(ring_cover=True), Modules(homing_flag=True)
 SETTINGS = {
     "tilted, with a bearing": scanner_at(GROUND_AHEAD),
-    "tilted, nuts": scanner_at((0, 35, -20, -70), printer="fdm-0.4-nut"),
+    "tilted, nuts": scanner_at(TILTED, printer="fdm-0.4-nut"),
+    "tilted, inserts": scanner_at(TILTED, printer="fdm-0.4-insert"),
     "hanging, inserts": scanner_at((180, 20, 30, -45), printer="fdm-0.4-insert"),
     "upright on the deck": scanner_at(UPRIGHT),
     "upright, a sub-plate": scanner_at((0, 0, 25.5, -21.4), sensor="URG-04LX"),
@@ -168,11 +170,10 @@ SETTINGS = {
     "printed throughout, inserts": scanner_at(
         (0, 0, 0, 50), slip_ring=None, sensor="STL27L", servo="XL430-W250", printer="fdm-0.4-insert"
     ),
-    "a cover on a cage": scanner_at(GROUND_AHEAD, modules=COVER),
+    "a cover on a cage, a tripod": scanner_at(GROUND_AHEAD, modules=Modules(ring_cover=True, tripod_foot=True)),
     "a cover on a fork": scanner_at(UPRIGHT, modules=COVER),
     "a switch on a cage": scanner_at(GROUND_AHEAD, modules=FLAG),
     "a switch on a fork": scanner_at(UPRIGHT, modules=FLAG),
-    "a tripod": scanner_at(GROUND_AHEAD, modules=FOOT),
     "a belt on a tripod, nuts M5": replace(
         scanner_at(ROLLING, slip_ring=CAPSULE, printer="fdm-0.4-nut", modules=FOOT),
         deck=Rectangle(shape="rectangle", size_mm=(90, 90), screw="M5"),
@@ -180,9 +181,22 @@ SETTINGS = {
     "a belt": scanner_at(ROLLING, slip_ring=CAPSULE),
     "a belt, nuts": scanner_at((60, 20, 10, 60), slip_ring=CAPSULE, printer="fdm-0.4-nut"),
 }
+DAILY = (  # every way to hold something, and every part that takes a screw, once
+    "tilted, nuts",
+    "tilted, inserts",
+    "upright on the deck",
+    "a sub-plate in nuts",
+    "small, without a ring",
+    "printed throughout, inserts",
+    "a cover on a cage, a tripod",
+    "a cover on a fork",
+    "a switch on a cage",
+    "a belt",
+    "a belt on a tripod, nuts M5",
+)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", samples(SETTINGS, DAILY))
 def test_the_declared_joints_are_those_that_the_solids_have(name, parts_of):
     scanner = SETTINGS[name]
     assembly = parts_of(scanner)

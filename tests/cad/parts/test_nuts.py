@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scanners import scanner_at
+from scanners import TILTED, scanner_at
 
 from cad import outlines, solids
 from cad.checks.remarks import without_traps
@@ -30,7 +30,7 @@ PRINTER = load_catalogue().products["fdm-0.4-nut"]
 
 @pytest.fixture(scope="module")
 def nutted(parts_of):
-    scanner = scanner_at((0, 35, -20, -70), printer="fdm-0.4-nut")
+    scanner = scanner_at(TILTED, printer="fdm-0.4-nut")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
     return scanner, assembly, rounds, joints_of(assembly.layout)
