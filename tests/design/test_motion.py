@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from quick_tests import samples
 from scipy.spatial import cKDTree
 
 from design.density.beams import beam_directions_rot, scan_at
@@ -75,9 +76,10 @@ def counts_over_phases(lines, setting, directions, ball, phases):
     return np.stack([ball_search(scan, directions, ball) for scan in scans])
 
 
-@pytest.mark.parametrize(
-    "limits, period", [((-90, 90), 9.7), ((-180, 180), 7.3), ((-20, 150), 4.0), ((30, 30), 2.0), ((-180, -100), 3.3)]
-)
+SWEEPS = [((-180, 180), 7.3), ((-20, 150), 4.0), ((30, 30), 2.0), ((-90, 90), 9.7), ((-180, -100), 3.3)]
+
+
+@pytest.mark.parametrize("limits, period", samples(SWEEPS, SWEEPS[:3]))
 def test_a_sweep_counts_what_simulated_scans_hold(limits, period):
     lines = SweepLines(Sweep(limits_deg=limits, period_s=period, accel_deg_s2=400.0), 10.0)
     setting, ball, phases = np.radians([20, -40, 60, 20]), np.radians(4), 400
@@ -109,7 +111,7 @@ def indoor():
     return problem_of(load_task(Path("indoor_urg")))
 
 
-@pytest.mark.parametrize("setting", [(0, 90, 80, -90), (0, 20, -40, 10), (0, -55, 0, 30)])
+@pytest.mark.parametrize("setting", [(0, 90, 80, -90), (0, 20, -40, 10)])
 def test_J_of_a_sweep_is_that_of_the_ball_search(indoor, setting):
     found, ball = score(indoor, np.radians(setting)), ball_score(indoor, np.radians(setting), 2000)
     assert abs(found.J - ball.J) < found.J_error + ball.J_error

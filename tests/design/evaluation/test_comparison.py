@@ -232,7 +232,8 @@ def test_the_command_end_to_end(command, tmp_path, rows):
 
 
 def test_the_command_as_json(command, tmp_path, rows, monkeypatch):
-    monkeypatch.setattr(comparison, "compare", lambda *_: rows)
+    monkeypatch.setattr("scanwright.pipeline.comparison.compare", lambda *_: rows)
+    monkeypatch.setattr("scanwright.pipeline.comparison.compare_picture", lambda *_: None)
     code, out, _ = command("compare", "ceiling", "--json", "--out", tmp_path)
     assert code == 0
     assert json.loads(out) == {"task": "ceiling", "rows": [asdict(row) for row in rows]}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_tests import samples
 from scipy.spatial.transform import Rotation
 
 from design.catalogue.catalogue import load_catalogue
@@ -84,7 +85,7 @@ def is_whole(lines):
     return abs(lines.count * lines.step_rad - 2 * pi) < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", samples(range(8), (0, 1, 2, 6)))
 def test_twenty_times_the_nodes_stay_within_the_stated_error_which_is_a_thousandth_at_most(seed):
     p, setting = random_pair(seed)
     try:
@@ -114,7 +115,7 @@ def by_spirals(p, setting, count=60_000, sets=8):
     return np.mean(found), 5 * np.std(found, ddof=1) / np.sqrt(sets)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 6, 7])
+@pytest.mark.parametrize("seed", samples([1, 2, 6, 7], [1, 2]))
 def test_a_plain_sum_over_directions_agrees(seed):
     p, setting = random_pair(seed)
     one = score(p, setting)

@@ -14,6 +14,7 @@ from design.objective.ball_search import start_phases
 from design.objective.problem import problem_of
 from design.objective.score import quick_J
 from design.objective.tolerance import rise_words, sensitivity, worst_within
+from design.search import families
 from design.search import search as search_module
 from design.search.grid_classes import fold_planes, mirrors_of
 from design.search.limits import allowed_planes
@@ -24,6 +25,12 @@ from design.task.task import Limits, LoadedTask, Task, load_task
 
 AHEAD = {"shape": "band", "theta_deg": [95, 140], "phi_deg": [-50, 50]}
 ANGLES = {"alpha_rot_deg": 0, "beta_rot_deg": [-90, 90], "alpha_laser_deg": -80, "step_deg": 15}
+
+
+@pytest.fixture(autouse=True)
+def few_families(monkeypatch):
+    """Nobody looks at the answers behind the first ones."""
+    monkeypatch.setattr(families, "FAMILIES", 3)
 
 
 def loaded(**more):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_tests import samples
 
 from design.catalogue.catalogue import load_catalogue
 from design.concurrency import parallel
@@ -67,7 +68,7 @@ def every_setting(ranges):
 
 
 @pytest.mark.usefixtures("unrefined")
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", samples(CASES, CASES.keys() - {"all four free", "a fan without symmetry"}))
 def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name):
     """Brute force: J of every setting, no folding, no bound. Without refinement both must find the same best J."""
     problem, ranges = CASES[name]
@@ -101,9 +102,9 @@ def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor):
     uneven = {"weight": [{"shape": "all", "value": 0.2}, LEFT["weight"][0]]}
     problem, ranges = case(uneven, {"step_deg": 45}, sensor=sensor, period_s=4.0)
     best = search(problem, ranges).best
-    J = np.array([quick_J(problem, setting, 486) for setting in np.radians(every_setting(ranges))])
+    J = np.array([quick_J(problem, setting, 81) for setting in np.radians(every_setting(ranges))])
     for family in best[:3]:
-        assert family.members == (np.abs(J - quick_J(problem, family.angles_rad, 486)) < 1e-7).sum()
+        assert family.members == (np.abs(J - quick_J(problem, family.angles_rad, 81)) < 1e-7).sum()
 
 
 @pytest.mark.usefixtures("unrefined")
@@ -144,6 +145,7 @@ def test_angles_that_the_task_fixes_stay_through_the_refinement():
 
 
 def test_refinement_never_makes_it_worse(monkeypatch):
+    monkeypatch.setattr(families, "FAMILIES", 3)
     problem, ranges = CASES["one angle fixed, one range short"]
     refined = search(problem, ranges).best[0].score
     monkeypatch.setattr(families, "REFINE_ROUNDS", ())
@@ -163,10 +165,11 @@ def test_all_is_covered_with_fewer_evaluations():
 
 
 def test_the_number_of_threads_changes_no_digit(monkeypatch):
+    monkeypatch.setattr(families, "FAMILIES", 3)
     problem, ranges = CASES["all four free, two seconds"]
     one, *others = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3, 7))
     for other in others:
-        assert other.best == one.best
+        assert other.best == one.best and len(one.best) == 3
         np.testing.assert_array_equal(other.planes, one.planes)
         assert (other.covered, other.evaluated, other.left_out) == (one.covered, one.evaluated, one.left_out)
 
