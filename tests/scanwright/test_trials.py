@@ -49,15 +49,16 @@ def test_the_orders_between_samples_are_ordered(monkeypatch):
     assert cubic > line  # through the samples means through their steps
 
 
-def test_the_command_reports_every_choice_and_the_chosen_one(command, monkeypatch, tmp_path):
+def test_the_command_reports_every_choice_and_the_chosen_one(command, monkeypatch, tmp_path, cheapest_task):
     monkeypatch.setattr(meshes, "ANGLES", (0.5, meshes.CHORD_ANGLE))
     monkeypatch.setattr(meshes, "CHORDS", (meshes.CHORD_ERROR,))
     monkeypatch.setattr(solvers, "TOLERANCES", (1e-6,))
     monkeypatch.setattr(axis, "BEAMS", 20_000)
-    code, out, _ = command("accuracy", "rolling", "--choices", "--out", tmp_path)
+    (tmp_path / "ahead.toml").write_text(cheapest_task)
+    code, out, _ = command("accuracy", tmp_path / "ahead.toml", "--choices", "--out", tmp_path)
     assert code == 0
-    with (tmp_path / "rolling" / "choices.csv").open(newline="") as file:
+    with (tmp_path / "ahead" / "choices.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len({row["choice"] for row in rows}) == 3 == sum(row["chosen"] == "true" for row in rows)
     assert all(float(row["error"]) > 0 and float(row["seconds_median"]) > 0 for row in rows)
-    assert "chosen" in out and (tmp_path / "rolling" / "choices.png").stat().st_size > 10_000
+    assert "chosen" in out and (tmp_path / "ahead" / "choices.png").stat().st_size > 10_000
