@@ -20,7 +20,7 @@ from numba import njit
 from numpy import ndarray
 
 from design.arrays import Floats, Ints
-from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams, axis_angle
+from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
 
 _Q = COUNT
 _U = COUNT + 3
@@ -86,20 +86,22 @@ def sums(
         q: plane that each beam should meet, one row per tile, shape (m, 3).
         kink: standard deviations beyond which a residual counts in proportion, not in square (Huber).
     """
-    psi = axis_angle(x, beams.joint_rad, beams.way)
     return _sums(
-        mount.plane(x), mount.along_m, x, psi, beams.joint_rad, beams.speed_rad_s, beams.way, beams.bearing_rad,
+        mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.way, beams.bearing_rad,
         beams.range_m, tile, weight, q, kink,
     )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)
-def _sums(plane, along_m, x, psi, joint, speed, way, bearing, range_m, tile, weight, q, kink):  # type: ignore[no-untyped-def]
+def _sums(plane, along_m, x, joint, speed, way, bearing, range_m, tile, weight, q, kink):  # type: ignore[no-untyped-def]
     tiles = len(q)
     out = np.zeros((tiles, WIDTH, WIDTH))
     row = np.zeros(WIDTH)
     for i in range(range_m.size):
-        c, s = np.cos(psi[i]), np.sin(psi[i])
+        c1, s1 = np.cos(joint[i]), np.sin(joint[i])
+        c2, s2 = c1 * c1 - s1 * s1, 2.0 * c1 * s1
+        psi = joint[i] + x[5] * c1 + x[6] * s1 + x[7] * c2 + x[8] * s2 - 0.5 * x[10] * way[i]
+        c, s = np.cos(psi), np.sin(psi)
         cb, sb = np.cos(bearing[i]), np.sin(bearing[i])
         a, b, n = q[tile[i], 0], q[tile[i], 1], q[tile[i], 2]
         # the plane as the turning frame sees it
@@ -122,8 +124,6 @@ def _sums(plane, along_m, x, psi, joint, speed, way, bearing, range_m, tile, wei
         row[2] = e / slant
         row[3] = f / slant
         row[4] = 1.0
-        c1, s1 = np.cos(joint[i]), np.sin(joint[i])
-        c2, s2 = c1 * c1 - s1 * s1, 2.0 * c1 * s1
         row[5] = around * c1
         row[6] = around * s1
         row[7] = around * c2
@@ -178,17 +178,24 @@ def reduced(
 def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
     """Values of tiles summed over each spot, and one tile of each spot."""
     used = grouping.used
-    spots, first, label = np.unique(grouping.spot[used], return_index=True, return_inverse=True)
-    return _summed(values[used], label, spots.size), used[first]
+    spots, first, numbers = np.unique(grouping.spot[used], return_index=True, return_inverse=True)
+    label = np.full(len(values), -1)
+    label[used] = numbers
+    return _summed(values, label, spots.size), used[first]
 
 
 def _summed(values: Floats, label: Ints, labels: int) -> Floats:
-    """Rows summed by label, zero where a label has none."""
-    order = np.argsort(label, kind="stable")
-    present, first = np.unique(label[order], return_index=True)
+    """Rows summed by label, zero where a label has none; those of label -1 are left out."""
     out = np.zeros((labels, *values.shape[1:]))
-    out[present] = np.add.reduceat(values[order], first)
+    _add(values.reshape(len(values), -1), label, out.reshape(labels, -1))
     return out
+
+
+@njit(cache=True, nogil=True)
+def _add(values, label, out):  # type: ignore[no-untyped-def]
+    for i in range(label.size):
+        if label[i] >= 0:
+            out[label[i]] += values[i]
 
 
 def step(part: Reduced) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Floats, Ints
@@ -18,7 +19,7 @@ from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping
 from firmware_io.calibration.tiles import FlatTiles, normals
 
-_SEEDS = 24
+_SAMPLE = 200  # tiles: so many tell which planes are the largest
 _REFITS = 15  # a plane grows from its seed to the ends of its wall
 _MISFIT = 4.0  # standard deviations of a mean of squares
 _GRAZING = 0.08  # cosine: to a plane it grazes, a beam is near everywhere
@@ -44,36 +45,25 @@ def group(
     limit = np.cos(turn_rad + 2.5 * tiles.normal_sd_rad)
     place = tiles.middle.place
     surface = np.full(weight.size, -1)
-    done = np.zeros(weight.size, bool)
     planes: list[Floats] = []
     rng = np.random.default_rng(0)
-    free = np.flatnonzero(tiles.normal_sd_rad < vague_rad)
-    while free.size >= _FEWEST:
-        seeds = rng.choice(free, min(_SEEDS, free.size), replace=False, p=weight[free] / weight[free].sum())
-        height = np.sum(normal[seeds] * point[seeds], axis=1)
-        fits = np.abs(normal[seeds] @ point[free].T - height[:, None]) < near_m
-        fits &= (normal[seeds] @ normal[free].T > limit[free]) & (place[seeds][:, None] == place[free])
-        best = int(np.argmax(fits @ weight[free]))
-        members = free[fits[best]]
-        alone = seeds[fits.sum(axis=1) < _FEWEST]
-        for _ in range(_REFITS):
-            if members.size < _FEWEST:
-                break
-            n, c = _plane(point[members], normal[members], weight[members])
-            mine = (np.abs(point[free] @ n - c) < near_m) & (normal[free] @ n > limit[free])
-            mine &= (np.abs(direction[free] @ n) > _GRAZING) & (place[free] == place[seeds[best]])
-            if np.array_equal(free[mine], members):
-                break
-            members = free[mine]
-        if members.size < _FEWEST:
-            alone = np.append(alone, seeds[best])
-        else:
-            if abs(c) > _NEAREST_M:
-                surface[members] = len(planes)
-                planes.append(n / c)
-            alone = np.append(alone, members)
-        done[alone] = True
-        free = free[~done[free]]
+    left = tiles.normal_sd_rad < vague_rad
+    seeds = np.flatnonzero(left)
+    some = rng.choice(seeds, min(_SAMPLE, seeds.size), replace=False, p=weight[seeds] / weight[seeds].sum())
+    height = np.sum(normal * point, axis=1)
+    agree = np.abs(normal[seeds] @ point[some].T - height[seeds, None]) < near_m
+    agree &= (normal[seeds] @ normal[some].T > limit[some]) & (place[seeds, None] == place[some])
+    for seed in seeds[np.argsort(-agree.sum(axis=1), kind="stable")]:
+        if not left[seed]:
+            continue
+        n, c, mine = _grown(seed, left, place, point, normal, direction, weight, limit, near_m)
+        left[seed] = False
+        if np.count_nonzero(mine) < _FEWEST:
+            continue
+        if abs(c) > _NEAREST_M:
+            surface[mine] = len(planes)
+            planes.append(n / c)
+        left &= ~mine
     if not planes:
         raise RecordingError("no flat patches lie in one plane: a calibration needs walls, floors or other planes")
     cells = np.floor(point / _SPOT_M).astype(np.int64)
@@ -81,19 +71,44 @@ def group(
     return Grouping(surface, spot.ravel(), np.array(planes))
 
 
-def _plane(
-    point: Float64[ndarray, "n 3"], normal: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"]
-) -> tuple[Floats, float]:
+@njit(cache=True, nogil=True)
+def _grown(seed, left, place, point, normal, direction, weight, limit, near_m):  # type: ignore[no-untyped-def]
+    """The plane n . p = c that grows from a tile to the ends of its wall, and which tiles that are left lie in it."""
+    n, c = normal[seed], _dot(normal[seed], point[seed])
+    before = np.zeros(left.size, np.bool_)
+    for _ in range(_REFITS):
+        mine = np.zeros(left.size, np.bool_)
+        for i in range(left.size):
+            if left[i] and place[i] == place[seed]:
+                mine[i] = (
+                    abs(_dot(n, point[i]) - c) < near_m
+                    and _dot(n, normal[i]) > limit[i]
+                    and abs(_dot(n, direction[i])) > _GRAZING
+                )
+        if mine.sum() < _FEWEST or np.array_equal(mine, before):
+            break
+        n, c = _plane(point[mine], normal[mine], weight[mine])
+        before = mine
+    return n, c, mine
+
+
+@njit(inline="always")
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, nogil=True)
+def _plane(point, normal, weight):  # type: ignore[no-untyped-def]
     """Plane through weighted points; few of them lean on their normals."""
     mean = weight @ point / weight.sum()
     spread = point - mean
-    values, vectors = np.linalg.eigh((spread * weight[:, None]).T @ spread)
-    n = vectors[:, 0]
+    values, vectors = np.linalg.eigh((spread * weight.reshape(-1, 1)).T @ spread)
+    n = np.ascontiguousarray(vectors[:, 0])
     if values[1] < 1e-2 * values[2]:  # in a row: any plane through the row fits
         n = weight @ normal
         n /= np.linalg.norm(n)
     n = n if weight @ (normal @ n) > 0 else -n
-    return n, float(n @ mean)
+    return n, n @ mean
 
 
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:

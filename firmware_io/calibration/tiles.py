@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Floats, Ints
@@ -172,27 +173,50 @@ def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
     """The plane q of each window: 1/r is linear in it, so one weighted least squares finds it."""
     origin, direction = beam_rays(mount, x, beams)
     range_m = beams.range_m + x[4]
-    regressor = direction + origin / range_m[:, None]
-    first = start[:-1]
     count = np.diff(start)
-    mean_m = np.add.reduceat(range_m, first) / count
-    weight = np.repeat(mean_m, count) ** 2  # turns a difference of 1/r into one of r
-    A = regressor * weight[:, None]
-    y = weight / range_m
-    products = np.stack([A[:, i] * A[:, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))], axis=1)
-    sums = np.add.reduceat(products, first)
-    information = sums[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    information, right = _normal_equations(origin, direction, range_m, start)
     enough = (count >= _LEAST) & (np.linalg.cond(information) < 1e12)
     information = np.where(enough[:, None, None], information, np.eye(3))
-    right = np.add.reduceat(A * y[:, None], first)
     q = np.linalg.solve(information, right[..., None])[..., 0]
-    spread = np.repeat(q, count, axis=0)
-    slant = np.sum(spread * direction, axis=1)
+    square, slant = _misfits(origin, direction, range_m, start, q)
     with np.errstate(divide="ignore", invalid="ignore"):
-        residual = range_m - (1 - np.sum(spread * origin, axis=1)) / slant
-        square = np.add.reduceat(residual**2, first) / np.maximum(count - 3, 1)
-        cosine = np.abs(np.add.reduceat(slant, first)) / count / np.linalg.norm(q, axis=1)
+        square /= np.maximum(count - 3, 1)
+        cosine = np.abs(slant) / count / np.linalg.norm(q, axis=1)
     return _Flat(start, q, information, np.where(enough, np.sqrt(square), np.inf), cosine)
+
+
+@njit(cache=True, nogil=True)
+def _normal_equations(origin, direction, range_m, start):  # type: ignore[no-untyped-def]
+    """Sums of each window: regressors with each other, shape (m, 3, 3), and with 1/r, shape (m, 3)."""
+    windows = start.size - 1
+    information, right = np.zeros((windows, 3, 3)), np.zeros((windows, 3))
+    row = np.zeros(3)
+    for w in range(windows):
+        weight = range_m[start[w] : start[w + 1]].mean() ** 2  # turns a difference of 1/r into one of r
+        for k in range(start[w], start[w + 1]):
+            for i in range(3):
+                row[i] = weight * (direction[k, i] + origin[k, i] / range_m[k])
+                right[w, i] += row[i] * weight / range_m[k]
+                for j in range(i + 1):
+                    information[w, i, j] += row[i] * row[j]
+        for i in range(3):
+            for j in range(i):
+                information[w, j, i] = information[w, i, j]
+    return information, right
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _misfits(origin, direction, range_m, start, q):  # type: ignore[no-untyped-def]
+    """Sums of each window: squares of what its ranges are off its plane, and of the beams' slants to it."""
+    square, slants = np.zeros(len(q)), np.zeros(len(q))
+    for w in range(len(q)):
+        a, b, c = q[w]
+        for k in range(start[w], start[w + 1]):
+            slant = a * direction[k, 0] + b * direction[k, 1] + c * direction[k, 2]
+            off = range_m[k] - (1 - a * origin[k, 0] - b * origin[k, 1] - c * origin[k, 2]) / slant
+            square[w] += off * off
+            slants[w] += slant
+    return square, slants
 
 
 def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
