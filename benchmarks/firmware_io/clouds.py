@@ -11,7 +11,7 @@ of the wall, and of the processor where other programs may run beside:
 4. error against run time of the ways to go between encoder samples.
 
 KISS-ICP moves points by one constant velocity; the kernel does the servo, and with poses the platform too. It gets all
-points as one frame, which is its fastest; the kernel gets blocks of 256 scans, as the command makes them.
+points as one frame, which is its fastest; the kernel gets blocks of 128 scans, as the command makes them.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def main() -> None:
 
 def kernel() -> None:
     """Tables 1 and 2."""
-    listed = list(blocks(scans(SCANS)))
+    listed = list(blocks(scans(SCANS), 128))
     curve = straight(joint_log(SCANS * PERIOD_NS / 1e9, 100.0))
     moving = trajectory(SCANS * PERIOD_NS / 1e9, 100.0)
     points = SCANS * BEAMS

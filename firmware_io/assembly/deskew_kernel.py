@@ -83,7 +83,7 @@ def place_block(
             points_m[rows],
         )
 
-    in_chunks(work, scans, smallest=16)
+    in_chunks(work, scans, smallest=64)
     return PlacedBlock(joint_rad, verdict, points_m.reshape(scans, beams, 3))
 
 

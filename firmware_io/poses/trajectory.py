@@ -190,7 +190,8 @@ def at_rest(T_world_rot: Pose) -> PosePieces:
 def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"], Float64[ndarray, " k"]]:
     """Axis (z where there is none) and angle [rad] from each orientation to the next, the short way round."""
     v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
-    vector = w0 * v1 - w1 * v0 - np.cross(v0, v1)
+    after, last = [1, 2, 0], [2, 0, 1]
+    vector = w0 * v1 - w1 * v0 - (v0[:, after] * v1[:, last] - v0[:, last] * v1[:, after])
     cosine = np.sum(quaternion[:-1] * quaternion[1:], axis=1)
     sine = np.linalg.norm(vector, axis=1)
     there = np.where(cosine < 0, -sine, sine)
@@ -200,7 +201,10 @@ def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"]
 
 def _with_z(axis: Floats) -> Floats:
     """Rotations whose third column is each unit vector, shape (n, 3, 3)."""
-    aside = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
-    x = np.cross(aside, axis)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return np.stack([x, np.cross(axis, x), axis], axis=2)
+    # T. Duff and others, "Building an Orthonormal Basis, Revisited" (2017)
+    x, y, z = axis.T
+    side = np.copysign(1.0, z)
+    a = -1 / (side + z)
+    b = x * y * a
+    columns = (1 + side * x * x * a, side * b, -side * x), (b, side + y * y * a, -y), (x, y, z)
+    return np.array(columns).transpose(2, 1, 0)
