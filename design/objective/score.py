@@ -9,7 +9,7 @@ A sweep is not zonal: its moments are means over sets of directions that share n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -66,8 +66,8 @@ def score(problem: Problem, angles_rad: Setting) -> Score:
         nodes, before = nodes * 3, (found.J, found.J_error)
 
 
-def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
-    """J of a setting on a number of nodes.
+def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool = True) -> Score:
+    """J of a setting on a number of nodes; `J_error` and `J_lower` are NaN where they are not to be stated.
 
     The rule with a third of the nodes is inside the full one. Their differences on the segments have no common sign,
     so their root sum of squares stands for the error; added is twice that of the steps of g from node to node, which
@@ -76,19 +76,24 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
     Raises:
         TaskError: no direction has a weight.
     """
-    take = _moment_on_circles if problem.sweep is None else _moment_on_directions
-    found = [take(problem, k, angles_rad, nodes) for k in range(len(problem.objective.moments))]
     join, moments = problem.objective.join, problem.objective.moments
+    if problem.sweep is None:
+        found = [_moment_on_circles(problem, k, angles_rad, nodes, stated) for k in range(len(moments))]
+    else:
+        found = [_moment_on_directions(problem, k, angles_rad, nodes) for k in range(len(moments))]
     values = np.array([moment.value for moment in found])
     J = float(join(values))
-    moved = np.array(
-        [join(np.where(np.arange(len(values)) == k, m.value + m.error, values)) for k, m in enumerate(found)]
-    )
+    J_error = J_lower = np.nan
+    if stated:
+        each = np.arange(len(values))
+        moved = np.array([join(np.where(each == k, m.value + m.error, values)) for k, m in enumerate(found)])
+        J_error = float(np.linalg.norm(moved - J)) + ROUNDING if np.isfinite(J) else 0.0
+        J_lower = float(join(np.array([moment.lower for moment in found])))
     spoken = [(moment.share, m) for moment, m in zip(moments, found, strict=True) if moment.share > 0]
     return Score(
         J=J,
-        J_error=float(np.linalg.norm(moved - J)) + ROUNDING if np.isfinite(J) else 0.0,
-        J_lower=float(join(np.array([moment.lower for moment in found]))),
+        J_error=J_error,
+        J_lower=J_lower,
         least=min(m.least for _, m in spoken),
         blind_weight=sum(share * m.blind for share, m in spoken),
     )
@@ -96,9 +101,7 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int) -> Score:
 
 def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """J alone, as `score` computes it: for searches that call it often."""
-    take = _moment_on_circles if problem.sweep is None else _moment_on_directions
-    found = [take(problem, k, angles_rad, nodes).value for k in range(len(problem.objective.moments))]
-    return float(problem.objective.join(np.array(found)))
+    return score_on(problem, angles_rad, nodes, stated=False).J
 
 
 def blind_to_sweep(
@@ -121,39 +124,36 @@ def blind_to_sweep(
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A moment of one setting, with its error, its lower bound, the least count and the share that is blind."""
+    """A moment of one setting, with the least count, the share that is blind, and its error and its lower bound."""
 
     value: float
-    error: float
-    lower: float
     least: int
     blind: float
+    error: float = np.nan
+    lower: float = np.nan
 
 
-def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
+def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int, stated: bool) -> _Found:
     """A moment by quadrature over the polar angle."""
     moment = problem.objective.moments[index]
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
     z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[index])
-    lower = moment.g(z.mean)
     blind = np.zeros(len(rule.polar_rad), dtype=bool)
     for low, high in problem.blind_zones(polar):
         blind |= (low < rule.polar_rad) & (rule.polar_rad < high)
     if moment.gathered == "highest":
-        return _highest(moment, z, lower, rule.fine, blind)
+        return _highest(moment, z, moment.g(z.mean), rule.fine, blind)
     total = rule.fine.sum()
     share = rule.fine / total
+    found = _Found(float(share @ z.mean_g), int(z.least[share > 0].min()), float(share @ blind))
+    if not stated:
+        return found
     by_segment = np.bincount(rule.segment, (share - rule.coarse / total) * z.mean_g)
     # both rules may miss a step of g between two nodes alike: the steps that are seen tell how large one may be
     inside = rule.segment[1:] == rule.segment[:-1]
     steps = np.abs(np.diff(z.mean_g)) * np.maximum(share[1:], share[:-1]) * inside
-    return _Found(
-        value=float(share @ z.mean_g),
-        error=float(np.linalg.norm(by_segment) + 2 * np.linalg.norm(steps)),
-        lower=float(share @ lower),
-        least=int(z.least[share > 0].min()),
-        blind=float(share @ blind),
-    )
+    error = float(np.linalg.norm(by_segment) + 2 * np.linalg.norm(steps))
+    return replace(found, error=error, lower=float(share @ moment.g(z.mean)))
 
 
 def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
@@ -175,7 +175,7 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
         else:
             share = samples.weights / samples.weights.sum()
             value, bound, hidden = (float(share @ of[own]) for of in (z.mean_g, lower, blind))
-            found.append(_Found(value, 0.0, bound, int(z.least[own].min()), hidden))
+            found.append(_Found(value, int(z.least[own].min()), hidden, lower=bound))
     values, least = np.array([f.value for f in found]), min(f.least for f in found)
     gather = np.max if moment.gathered == "highest" else np.mean
     if moment.gathered == "highest":

@@ -104,7 +104,7 @@ class Requirements:
 
     def J(self, angles_deg: Setting, nodes: int) -> float:
         """J on a number of nodes; inf where the setting is refused."""
-        found = score_on(self.problem, np.radians(angles_deg), nodes)
+        found = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
         return found.J if self.keeps(found, angles_deg) else np.inf
 
     def keeps(self, found: Score, angles_deg: Setting) -> bool:

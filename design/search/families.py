@@ -9,6 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Array, Setting
+from design.concurrency.parallel import in_chunks
 from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score
@@ -200,15 +201,24 @@ def refine_leaders(
     rounds: int = len(REFINE_ROUNDS),
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
+    minima = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
+    ordered = sorted(minima.values(), key=lambda pair: pair[0].J)
+
+    def refined_ones(some: slice) -> list[tuple[Setting, Score | None]]:
+        out = []
+        for k, (_, leader) in list(enumerate(ordered))[some]:
+            its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
+            refined = refined_setting(problem, ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
+            out.append(allowed_setting(refined, leader.angles_deg, required))
+        return out
+
+    # each by itself: what turns out to lie in a better one's valley costs less than the others' waiting for it
+    found = [each for some in in_chunks(refined_ones, len(ordered), smallest=1) for each in some]
     families: list[Family] = []
-    minima = [(leader.score, leader) for leader in leaders if leader.score is not None]
-    for exact, leader in sorted(minima, key=lambda pair: pair[0].J):
+    for (exact, leader), (refined, again) in zip(ordered, found, strict=True):
         if len(families) == FAMILIES:
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
-            its_rounds = REFINE_ROUNDS[: min(rounds, 1) if families else rounds]
-            refined = refined_setting(problem, ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
-            refined, again = allowed_setting(refined, leader.angles_deg, required)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))

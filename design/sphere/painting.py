@@ -98,6 +98,11 @@ def _sort(values: Array, n: int) -> None:
 
 
 @njit(cache=True, nogil=True)
+def _dot(a: Array, b: Array) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, nogil=True)
 def circle_means(
     frames: Array,
     polar: Array,
@@ -116,25 +121,22 @@ def circle_means(
     weights = np.zeros((len(frames), len(polar)))
     shares = np.zeros((len(frames), len(polar)))
     cuts = np.empty(2 * len(planes) + 1)
-    inside = np.empty((len(planes), 3))
+    azimuth, across, along = np.empty(len(planes)), np.empty(len(planes)), np.empty(len(planes))
     for f in range(len(frames)):
         frame = frames[f]
         for k in range(len(planes)):
-            for axis in range(3):
-                m = planes[k]
-                inside[k, axis] = m[0] * frame[axis, 0] + m[1] * frame[axis, 1] + m[2] * frame[axis, 2]
+            a, b, along[k] = _dot(planes[k], frame[0]), _dot(planes[k], frame[1]), _dot(planes[k], frame[2])
+            azimuth[k], across[k] = np.arctan2(b, a), np.sqrt(a * a + b * b)
         for i in range(len(polar)):
             if not within[f, 0] <= polar[i] <= within[f, 1]:
                 continue
             st, ct = np.sin(polar[i]), np.cos(polar[i])
             n = 0
             for k in range(len(planes)):
-                a, b = st * inside[k, 0], st * inside[k, 1]
-                c = planes[k, 3] - ct * inside[k, 2]
-                r = np.sqrt(a * a + b * b)
+                c, r = planes[k, 3] - ct * along[k], st * across[k]
                 if r > abs(c):
-                    middle, half = np.arctan2(b, a), np.arccos(c / r)
-                    first, last = middle - half, middle + half  # from -2 pi to 2 pi: no division is needed
+                    half = np.arccos(c / r)
+                    first, last = azimuth[k] - half, azimuth[k] + half  # from -2 pi to 2 pi: no division is needed
                     cuts[n] = first if first >= 0.0 else first + 2 * np.pi
                     cuts[n + 1] = last if last >= 0.0 else last + 2 * np.pi
                     n += 2

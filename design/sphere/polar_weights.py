@@ -12,10 +12,10 @@ from design.concurrency.parallel import in_chunks
 from design.errors import TaskError
 from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
 from design.sphere.outline import reach_about
-from design.sphere.polar_rule import MANY_EDGES
 from design.sphere.regions import Field
 
-DIRECTIONS = 20_000  # that stand for a map, where circles would be slower
+FEW_EDGES = 16  # above this (maps) directions stand for the field: circles would be slower
+DIRECTIONS = 20_000  # that do so
 MISSED = 0.05  # share of the weight that circles may miss or count twice
 
 
@@ -37,7 +37,7 @@ def weights_over_polar(
     if grid_step_deg:
         grid = equal_angle_grid(grid_step_deg)
         rows = _histogram(Samples(grid, field.weight_at(grid)), axes, nodes)
-    elif field.edges > MANY_EDGES:
+    elif field.edges > FEW_EDGES:
         rows = _histogram(weighted_samples(field, DIRECTIONS), axes, nodes)
     else:
         polar = (np.arange(circles) + 0.5) * (np.pi / circles)
