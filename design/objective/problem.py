@@ -21,6 +21,7 @@ from design.sphere.regions import Field, field_of
 from design.task.task import LoadedTask
 
 FRONT = Path(__file__).parent / "front.csv"
+MANY_LINES = 100  # of a turn: one more or less is less than what their number decides
 NODES = 6561  # per setting, spread over the segments
 
 
@@ -64,6 +65,16 @@ class Problem:
     def field(self) -> Field:
         """Weights and masks of the task."""
         return self.objective.field
+
+    def without_seam(self) -> Problem:
+        """The same with the nearest whole number of lines, where they are many: J differs, but as good as everywhere alike.
+
+        Counts at a seam take ten times as long.
+        """
+        if self.sweep is not None or self.lines.count < MANY_LINES:
+            return self
+        count = round(2 * np.pi / self.lines.step_rad)
+        return replace(self, lines=replace(self.lines, count=count, step_rad=2 * np.pi / count))
 
     def with_objective(self, objective: Objective) -> Problem:
         """The same scanner with another aim."""

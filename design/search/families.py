@@ -208,14 +208,14 @@ def refine_leaders(
         out = []
         for k, (_, leader) in list(enumerate(ordered))[some]:
             its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
-            refined = refined_setting(problem, ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
+            refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
             out.append(allowed_setting(refined, leader.angles_deg, required))
         return out
 
     # each by itself: what turns out to lie in a better one's valley costs less than the others' waiting for it
-    found = [each for some in in_chunks(refined_ones, len(ordered), smallest=1) for each in some]
+    minimised = [each for some in in_chunks(refined_ones, len(ordered), smallest=1) for each in some]
     families: list[Family] = []
-    for (exact, leader), (refined, again) in zip(ordered, found, strict=True):
+    for (exact, leader), (refined, again) in zip(ordered, minimised, strict=True):
         if len(families) == FAMILIES:
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):

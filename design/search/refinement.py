@@ -18,7 +18,6 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from design.arrays import Array, Setting, Vector
-from design.objective.problem import Problem
 from design.objective.score import Score
 from design.objective.tolerance import worst_within
 from design.search.constraints import Requirements
@@ -46,7 +45,6 @@ FINE = Enough(0.005, 1e-7, 30)
 
 
 def refined_setting(
-    problem: Problem,
     ranges: AngleRanges,
     angles_deg: Setting,
     any_axis: bool,
@@ -64,17 +62,19 @@ def refined_setting(
     if not free.any() or not rounds:
         return angles
 
-    def J_of(setting: Setting, nodes: int) -> float:
+    def J_of(setting: Setting, nodes: int, required: Requirements = required) -> float:
         designed = required.J(setting, nodes)
         if not ranges.tolerance_deg or not np.isfinite(designed):
             return designed
-        return worst_within(problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
+        return worst_within(required.problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
 
+    exact_count = required.limits.min_density is not None
+    easier = required if exact_count else replace(required, problem=required.problem.without_seam())
     for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
-        chart = _Chart(angles, free, limits, on_spheres=problem.sweep is None)
+        chart = _Chart(angles, free, limits, on_spheres=required.problem.sweep is None)
 
         def J(moved: Array, chart: _Chart = chart, nodes: int = nodes) -> float:
-            return J_of(chart.setting(moved), nodes)
+            return J_of(chart.setting(moved), nodes, easier)
 
         corners, values = _first_simplex(J, chart, reach * ranges.step_deg)
         enough = FINE if len(rounds) > 1 else ROUGH
