@@ -90,7 +90,9 @@ def polar_and_azimuth(directions: Float[ndarray, "n 3"]) -> tuple[Float[ndarray,
 def is_closed(bearings_rad: Float[ndarray, " beams"]) -> bool:
     """Whether a fan sees all around: from its last beam to its first it is no farther than between others."""
     apart = np.abs(np.diff(bearings_rad))
-    return apart.size > 1 and bool(2 * np.pi - apart.sum() <= 1.5 * np.median(apart))
+    if apart.size < 2 or 2 * np.pi - apart.sum() > 1.5 * apart.max():  # a median takes longer than the rest
+        return False
+    return bool(2 * np.pi - apart.sum() <= 1.5 * np.median(apart))
 
 
 def blind_zones(
@@ -102,13 +104,13 @@ def blind_zones(
     middle of it, as behind a part that turns along, it is several.
     """
     apart = np.diff(bearings_rad)
-    ends = np.empty(0, dtype=int)
+    first = np.zeros(1, dtype=int)  # beam of each fan
     if len(apart) > 1 and not 0 < apart.max() <= 1.5 * apart.min():  # a median costs more than all else here
-        ends = np.flatnonzero(apart > 1.5 * np.median(apart)) + 1
-    fans = np.array([[fan.min() - ball_rad, fan.max() + ball_rad] for fan in np.split(beam_polar_rad, ends)])
-    fans = fans[np.argsort(fans[:, 0])]
-    starts = np.concatenate([[0.0], np.maximum.accumulate(fans[:, 1])])
-    zones = np.column_stack([starts, np.concatenate([fans[:, 0], [np.pi]])])
+        first = np.append(first, np.flatnonzero(apart > 1.5 * np.median(apart)) + 1)
+    low, high = (of.reduceat(beam_polar_rad, first) for of in (np.minimum, np.maximum))
+    order = np.argsort(low)
+    starts = np.append(0.0, np.maximum.accumulate(high[order] + ball_rad))
+    zones = np.stack([starts, np.append(low[order] - ball_rad, np.pi)], axis=1)
     return zones[zones[:, 1] > zones[:, 0]]
 
 

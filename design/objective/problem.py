@@ -67,7 +67,7 @@ class Problem:
         return self.objective.field
 
     def without_seam(self) -> Problem:
-        """The same with the nearest whole number of lines, where they are many: J differs, but as good as everywhere alike.
+        """The same with the nearest whole number of lines, if they are many: J differs, but nearly alike everywhere.
 
         Counts at a seam take ten times as long.
         """

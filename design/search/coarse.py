@@ -113,7 +113,7 @@ def coarse_landscape(
     usual = max(180, 2 * np.pi / problem.ball_rad) if few else 90
     half = min((MOST_NODES - 1) // 2, int(effort.fineness * usual))
     nodes = 2 * half + 1  # odd: one at the equator, which turning round leaves where it is
-    circles = max(nodes - 1, 720 - 720 % (nodes - 1)) if few else nodes - 1
+    circles = nodes - 1
     polar = np.linspace(0, np.pi, nodes)
     moments = problem.objective.moments
     over: dict[int, Array] = {}  # moments share fields

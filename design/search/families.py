@@ -82,7 +82,8 @@ def find_leaders(
     left = J.reshape(len(J), -1).copy()
     low = left.min(axis=1)  # of each plane
     q = planes.representatives
-    u = np.stack([axes.representatives, -axes.representatives])
+    cosines = axes.representatives @ axes.representatives.T
+    next_to, opposite = cosines >= np.cos(NEAR_RAD), cosines <= -np.cos(NEAR_RAD)
     minima: list[Leader] = []
     slopes: list[Leader] = []
     looks = refused = 0
@@ -93,7 +94,8 @@ def find_leaders(
         c = int((low <= lowest + EQUAL).argmax())
         way, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
         same = J[c] <= lowest + EQUAL
-        around = (u @ u[same].T).max(axis=2) >= np.cos(NEAR_RAD)
+        around = np.stack([side[same[0]].any(axis=0) for side in (next_to, opposite)])
+        around |= np.stack([side[same[1]].any(axis=0) for side in (opposite, next_to)])
         near = [
             np.ix_(np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD, there.ravel())
             for mirror in mirrors

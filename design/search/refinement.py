@@ -17,10 +17,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.arrays import Array, Setting, Vector
+from design.arrays import Array, Rotation, Setting, Vector
 from design.objective.score import Score
 from design.objective.tolerance import worst_within
 from design.search.constraints import Requirements
+from design.sphere.regions import frames_about
 from design.task.angle_ranges import NAMES, AngleRanges
 
 STEP = 2  # values that one step takes
@@ -159,7 +160,8 @@ class _Chart:
     ) -> None:
         self._angles, self._free, self._limits = angles_deg, free, limits_deg
         self._on_sphere = [on_spheres and bool(free[pair].all()) for pair in PAIRS]
-        self._at = [_pole_of_axis(angles_deg[PAIRS[0]]), _pole_of_plane(angles_deg[PAIRS[1]])]
+        poles = [_pole_of_axis(angles_deg[PAIRS[0]]), _pole_of_plane(angles_deg[PAIRS[1]])]
+        self._frames = frames_about(np.stack(poles))
         spherical = np.repeat(self._on_sphere, 2)
         self.origin = np.where(spherical, 0.0, angles_deg)[free]
         self.bounds = np.where(spherical[:, None], [[-np.inf, np.inf]], limits_deg)[free]
@@ -171,7 +173,7 @@ class _Chart:
         whole[self._free] = moved
         for k, pair in enumerate(PAIRS):
             if self._on_sphere[k]:
-                found[pair] = (_axis_of, _plane_of)[k](_walked(self._at[k], np.radians(whole[pair])))
+                found[pair] = (_axis_of, _plane_of)[k](_walked(self._frames[k], np.radians(whole[pair])))
             else:
                 found[pair] = np.where(self._free[pair], whole[pair], found[pair])
         return np.clip(found, *self._limits.T)
@@ -198,14 +200,13 @@ def _plane_of(q: Vector) -> Array:
     return np.degrees([np.arctan2(q[1], abs(q[2])), -np.arcsin(np.clip(q[0], -1, 1))])
 
 
-def _walked(start: Vector, moved_rad: Array) -> Vector:
+def _walked(frame: Rotation, moved_rad: Array) -> Vector:
     """From a point of the unit sphere along the great circle that leaves it in a direction of its tangent plane."""
+    across, up, start = frame
     away = float(np.hypot(*moved_rad))
     if away == 0.0:
         return start
-    first = np.cross(start, np.eye(3)[np.abs(start).argmin()])
-    first /= np.linalg.norm(first)
-    along = (moved_rad[0] * first + moved_rad[1] * np.cross(start, first)) / away
+    along = (moved_rad[0] * across + moved_rad[1] * up) / away
     return np.cos(away) * start + np.sin(away) * along
 
 
