@@ -21,7 +21,7 @@ from design.sphere.regions import Field, cross, frames_about
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
 GRID = 180  # segments of that grid
-BEND = 50  # nodes for each corner, below which segments that end there are too short: maps have hundreds
+MANY_CORNERS = 64  # above this (maps) segments between them would cost more nodes than the bends at them
 MOST_CORNERED = 256  # edges of bands and cones whose corners are looked for: pairs of them
 
 
@@ -51,8 +51,7 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
         breaks_rad: where else the integrand breaks.
         nodes: about how many, spread over the segments; none where no direction has a weight.
     """
-    cornered = BEND * len(edge_corners(field)) <= nodes
-    ends = np.array(weighted_segments(field, axis, breaks_rad, cornered)).reshape(-1, 2)
+    ends = np.array(weighted_segments(field, axis, breaks_rad)).reshape(-1, 2)
     length = ends[:, 1] - ends[:, 0]
     least = 3 if 9 * len(ends) <= nodes else 1  # thirds of a segment: of a map there are many
     thirds = np.maximum(least, np.round(nodes / 3 * length / length.sum())).astype(int)
@@ -68,21 +67,21 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
 
 
 def breaks_of(
-    field: Field, axis: Vector, more_rad: Float[ndarray, " more"], cornered: bool = True
+    field: Field, axis: Vector, more_rad: Float[ndarray, " more"], most_corners: int | None = None
 ) -> Float[ndarray, " n"]:
     """Polar angles about an axis where the circle mean of the weight breaks, with some more, sorted, 0 to pi.
 
-    At corners it only bends: they may be left out.
+    At corners it only bends: all of them are left out where they are more than so many.
     """
-    of_field = _breaks(field, axis, cornered)
+    corners = edge_corners(field)
+    corners = corners[:0] if most_corners is not None and len(corners) > most_corners else corners
+    of_field = _breaks(field, axis, corners)
     return np.unique(np.round(np.concatenate([of_field, _fold(more_rad)]), 12))
 
 
-def weighted_segments(
-    field: Field, axis: Vector, more_rad: Float[ndarray, " n"], cornered: bool
-) -> list[tuple[float, float]]:
-    """Ranges of the polar angle between breaks, as `breaks_of` finds them, those of weight zero left out."""
-    breaks = breaks_of(field, axis, more_rad, cornered)
+def weighted_segments(field: Field, axis: Vector, more_rad: Float[ndarray, " n"]) -> list[tuple[float, float]]:
+    """Ranges of the polar angle between breaks, those of weight zero left out."""
+    breaks = breaks_of(field, axis, more_rad, MANY_CORNERS)
     if not len(field.patches):  # as the logarithms of equal weights are
         return []
     if field.edges > MANY_EDGES:
@@ -137,13 +136,13 @@ def _cells(field: Field, patch: int) -> tuple[Float[ndarray, "n 3"], Float[ndarr
     return centres, (theta[1] - theta[0]) / 2 + half_phi * widest
 
 
-def _breaks(field: Field, axis: Vector, cornered: bool) -> Float[ndarray, " n"]:
+def _breaks(field: Field, axis: Vector, corners: Float[ndarray, "corners 3"]) -> Float[ndarray, " n"]:
     """Polar angles at which a circle about `axis` touches an edge or passes a corner; 0 and pi too."""
     planes = _breaking(field)
     touched = _touched(planes, axis)
     across = LOOK_RAD * np.concatenate([planes[:, :3], planes[:, :3]])
     inside, outside = field.weight_at(np.concatenate([touched + across, touched - across])).reshape(2, -1)
-    points = np.concatenate([touched[inside != outside], edge_corners(field)[: None if cornered else 0]])
+    points = np.concatenate([touched[inside != outside], corners])
     grid = np.linspace(0, np.pi, GRID + 1) if field.edges > MANY_EDGES else np.array([0.0, np.pi])
     return np.concatenate([grid, _polar_about(axis, points)])
 

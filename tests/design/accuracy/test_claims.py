@@ -122,7 +122,7 @@ def test_an_angle_that_is_fixed_and_the_same_angle_searched():
     np.testing.assert_allclose(one.planes[:, 2], all_of_them.planes[at][:, 2], atol=1e-4)
 
 
-def every_segment(field, axis, more_rad, _):
+def every_segment(field, axis, more_rad):
     breaks = breaks_of(field, axis, more_rad)
     return list(pairwise(breaks))
 
