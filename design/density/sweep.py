@@ -123,7 +123,8 @@ def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> 
         out[0, 0], out[0, 1] = 0.0, 2 * half * rate
         return 1
     # the first copy of the window that ends above the lower limit, and those after it that start below the upper one
-    start = (centre - half_angle - lower) % turn - turn
+    start = centre - half_angle - lower
+    start -= turn * (np.floor(start / turn) + 1.0)  # half of the time that `%` takes
     while start <= span:
         end = start + 2 * half_angle
         if end >= 0.0:
