@@ -50,7 +50,7 @@ def _columns(rows: int) -> Int64[ndarray, " {rows}"]:
     return np.maximum(1, (2 * rows * np.sin(middle)).astype(np.int64))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cells(beams: Array, rows: int, columns: Array, starts: Array) -> Array:
     out = np.empty(len(beams), np.int64)
     for i in range(len(beams)):
@@ -61,7 +61,7 @@ def _cells(beams: Array, rows: int, columns: Array, starts: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sorted(beams: Array, cells: Array, count: int) -> tuple[Array, Array]:
     """Beams in the order of their cells, one row per coordinate (3, beams), and where each cell starts."""
     offsets = np.zeros(count + 1, np.int64)
@@ -78,7 +78,7 @@ def _sorted(beams: Array, cells: Array, count: int) -> tuple[Array, Array]:
     return out, offsets
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _count(
     beams: Array, offsets: Array, directions: Array, ball: float, rows: int, columns: Array, starts: Array
 ) -> Array:
@@ -113,7 +113,7 @@ def _count(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _widest(t: float, ball: float, low: float, high: float) -> float:
     """Largest azimuth distance from the centre of a ball at polar angle t to its rim, between two polar angles."""
     if t - ball <= 0.0 or t + ball >= np.pi:
@@ -124,7 +124,7 @@ def _widest(t: float, ball: float, low: float, high: float) -> float:
     return np.arccos(min(1.0, max(-1.0, c)))
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _within(beams: Array, first: int, last: int, x: float, y: float, z: float, chord: float) -> int:
     n = 0
     for k in range(first, last):

@@ -18,7 +18,7 @@ CROWD = 32  # places in one bucket, above which sorting within it would cost mor
 NO_LEVEL = 1 << 62
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def half_width(sin_t: float, cos_t: float, sin_b: float, cos_b: float, sin_ball: float, cos_ball: float) -> float:
     """Azimuth half-width of the ball about polar angle t on the circle t_b; pi is all of it, -1 none of it.
 
@@ -54,7 +54,7 @@ def halves(angle_rad: Array | float) -> Array:
     return np.stack([np.sin(half), np.cos(half)])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def mean_counts(ends: Ints, polar: Array, beams: Array, ball: Array) -> Array:
     """Mean share of a turn in which each beam is within the ball, summed over the beams, (polar angles,)."""
     out = np.zeros(polar.shape[1])
@@ -66,7 +66,7 @@ def mean_counts(ends: Ints, polar: Array, beams: Array, ball: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
     """Indices that sort the first n places, 0 to 1: spread evenly as they are, twice as fast as by comparing."""
     for b in range(n + 1):
@@ -96,7 +96,7 @@ def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
         gap //= 3
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def windows_at(
     i: int, ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, edges: Array
 ) -> tuple[int, int]:
@@ -117,7 +117,7 @@ def windows_at(
     return n, whole
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def even_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, count: int, g: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -156,7 +156,7 @@ def even_zones(
     return mean_g, mean, least, most
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) -> float:
     """Change the count on some pieces of a gap; returned is what the sum of g over the gap changes by."""
     change = 0.0
@@ -166,7 +166,7 @@ def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) 
     return change
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def seam_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, g: Array
 ) -> tuple[Array, Array, Array, Array]:

@@ -95,7 +95,7 @@ def _sorted(
     return *polar_and_azimuth(directions), t_b[order], p_b[order]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _time(done: float, numbers: Array) -> float:
     """Time of the way out at an angle above the lower limit; `Sweep.time_s` for one number."""
     span, cruise, ramp, half = numbers[1], numbers[2], numbers[3], numbers[4]
@@ -113,7 +113,7 @@ def _time(done: float, numbers: Array) -> float:
     return 0.5 * ramp + done / cruise
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> int:
     """Times [scans] in which the joint is within an angle of a centre: (from, to) pairs in `out`, their number."""
     lower, span, half, rate = numbers[0], numbers[1], numbers[4], numbers[5]
@@ -140,7 +140,7 @@ def _stretches(centre: float, half_angle: float, numbers: Array, out: Array) -> 
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _mean(ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Array, numbers: Array) -> Array:
     out = np.zeros(len(p))
     pairs = np.empty((6, 2))
@@ -154,7 +154,7 @@ def _mean(ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Ar
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Array, numbers: Array, g: Array
 ) -> tuple[Array, Array, Array, Array]:

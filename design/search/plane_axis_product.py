@@ -132,7 +132,7 @@ class _Running:
         return Lowest(self.by_plane.astype(float), self.its_class, self.its_flip, lowest_about)
 
 
-@njit(cache=True, nogil=True, fastmath={"nnan", "nsz", "reassoc"})
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "reassoc"})
 def _lower_planes(
     straight: Array,
     turned: Array,
@@ -173,7 +173,7 @@ def _lower_planes(
                     break
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _lower_axes(
     straight: Array, turned: Array, plane: int, axis: int, closed_plane: Array, closed_axis: Array, by_axis: Array
 ) -> None:
@@ -239,7 +239,7 @@ def _highest(g: Array, seen: Mask) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _highest_of(g: Array, seen: Array) -> Array:
     out = np.full((len(g), len(seen)), -np.inf, np.float32)
     for a in range(len(seen)):

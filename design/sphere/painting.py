@@ -16,7 +16,7 @@ COLUMNS = VALUE + 1
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _value(x: float, y: float, z: float, rows: Array, tables: Array, background: float) -> float:
     """Value of the last painted region that contains the direction."""
     for i in range(rows.shape[0] - 1, -1, -1):
@@ -25,7 +25,7 @@ def _value(x: float, y: float, z: float, rows: Array, tables: Array, background:
     return background
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _holds(x: float, y: float, z: float, row: Array) -> bool:
     """Whether a region contains the direction; edges are inclusive."""
     if row[0] == CONE:
@@ -41,7 +41,7 @@ def _holds(x: float, y: float, z: float, row: Array) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
     """What a map holds at the direction; 1 of any other region."""
     if row[0] != MAP:
@@ -54,7 +54,7 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
     return tables[int(row[1]), r, c]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
     """The first row that holds each direction with a value above 0, (directions,); their number where none does."""
     out = np.empty(directions.shape[0], np.int64)
@@ -68,7 +68,7 @@ def first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def values_at(directions: Array, rows: Array, tables: Array, background: float) -> Array:
     """Value of the last painted region that contains each direction, (directions,)."""
     out = np.empty(directions.shape[0])
@@ -77,7 +77,7 @@ def values_at(directions: Array, rows: Array, tables: Array, background: float) 
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sort(values: Array, n: int) -> None:
     """Sort the first n values in place (Shell, Knuth's gaps): on nearly every circle they are few.
 
@@ -97,12 +97,12 @@ def _sort(values: Array, n: int) -> None:
         gap //= 3
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def circle_means(
     frames: Array,
     polar: Array,

@@ -73,7 +73,7 @@ def _share_between_nodes(circles: Array, nodes: int) -> Array:
     return shared
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _polar_histogram(directions: Array, weights: Array, axes: Array, nodes: int) -> Array:
     """Weight by polar angle, each direction shared linearly between its two nodes."""
     out = np.zeros((len(axes), nodes))
