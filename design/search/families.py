@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Float
@@ -203,24 +204,29 @@ def refine_leaders(
     rounds: int = len(REFINE_ROUNDS),
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
-    minima = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
-    ordered = sorted(minima.values(), key=lambda pair: pair[0].J)
+    different = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
+    ordered = sorted(different.values(), key=lambda pair: pair[0].J)
 
-    def refined_ones(some: slice) -> list[tuple[Setting, Score | None]]:
-        out = []
-        for k, (_, leader) in list(enumerate(ordered))[some]:
-            its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
-            refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
-            out.append(allowed_setting(refined, leader.angles_deg, required))
-        return out
+    def minimum(k: int) -> tuple[Setting, Score | None]:
+        leader = ordered[k][1]
+        its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
+        refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
+        return allowed_setting(refined, leader.angles_deg, required)
 
-    # each by itself: what turns out to lie in a better one's valley costs less than the others' waiting for it
-    minimised = [each for some in in_chunks(refined_ones, len(ordered), smallest=1) for each in some]
+    # all at once, but those that are in the winner's valley already
+    apart = [
+        k
+        for k, (exact, each) in enumerate(ordered)
+        if k == 0 or not _same_valley(each.angles_deg, exact.J, ordered[0][1])
+    ]
+    pieces = in_chunks(lambda some: [minimum(k) for k in apart[some]], len(apart), smallest=1)
+    at_once = dict(zip(apart, chain.from_iterable(pieces), strict=True))
     families: list[Family] = []
-    for (exact, leader), (refined, again) in zip(ordered, minimised, strict=True):
+    for k, (exact, leader) in enumerate(ordered):
         if len(families) == FAMILIES:
             break
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
+            refined, again = at_once.get(k) or minimum(k)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
@@ -256,8 +262,9 @@ def _four(angles_deg: Array) -> tuple[float, float, float, float]:
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
-def _same_valley(angles_deg: Array, J: float, better: Family) -> bool:
+def _same_valley(angles_deg: Array, J: float, better: Family | Leader) -> bool:
     """Whether a setting has nearly the axis and nearly the J of a better one: the scan plane is then indifferent."""
+    assert better.score is not None
     u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
     v = R_world_rot(*np.radians(better.angles_deg[:2]))[:, 2]
     return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)
