@@ -19,8 +19,12 @@ def sensitivity(problem: Problem, angles_rad: Setting, off_rad: float, nodes: in
 
 def worst_within(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int) -> float:
     """Highest J of the setting and of those with one angle off, either way."""
-    settings = [angles_rad, *(moved for pair in _moved(angles_rad, off_rad) for moved in pair)]
-    return max(quick_J(problem, setting, nodes) for setting in settings)
+    return max(quick_J(problem, angles_rad, nodes), worst_off(problem, angles_rad, off_rad, nodes))
+
+
+def worst_off(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int) -> float:
+    """Highest J of the settings with one angle off, either way."""
+    return max(quick_J(problem, moved, nodes) for pair in _moved(angles_rad, off_rad) for moved in pair)
 
 
 def rise_words(rises: dict[str, float], J_error: float) -> str:

@@ -19,7 +19,7 @@ from numpy import ndarray
 
 from design.arrays import Array, Rotation, Setting, Vector
 from design.objective.score import Score
-from design.objective.tolerance import worst_within
+from design.objective.tolerance import worst_off
 from design.search.constraints import Requirements
 from design.sphere.regions import frames_about
 from design.task.angle_ranges import NAMES, AngleRanges
@@ -67,7 +67,8 @@ def refined_setting(
         designed = required.J(setting, nodes)
         if not ranges.tolerance_deg or not np.isfinite(designed):
             return designed
-        return worst_within(required.problem, np.radians(setting), np.radians(ranges.tolerance_deg), nodes)
+        off_rad = np.radians(ranges.tolerance_deg)
+        return max(designed, worst_off(required.problem, np.radians(setting), off_rad, nodes))
 
     exact_count = required.limits.min_density is not None
     easier = required if exact_count else replace(required, problem=required.problem.without_seam())
