@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import cadquery as cq
 
 from cad.assembly.bought import BodySpec
+from cad.geometry.inertia import Inertial, of_solid
 from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import PrintPose, print_pose
 from cad.layout.cables.leads import RotorLead
@@ -36,6 +37,7 @@ class Assembly:
     leads: tuple[RotorLead, ...] = ()
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _inertials: dict[str, Inertial] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def spec(self, name: str) -> PartSpec | BodySpec:
         """What is known of a part or a body."""
@@ -73,6 +75,13 @@ class Assembly:
     def meshes(self) -> dict[str, TriMesh]:
         """Of all parts by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
+
+    def inertial(self, name: str) -> Inertial:
+        """Mass properties of a made part, integrated once: each joint asks for all that hangs on it."""
+        if name not in self._inertials:
+            density = self.parts[name].density_g_cm3(self.layout.scanner.printer)
+            self._inertials[name] = of_solid(self.made[name], density)
+        return self._inertials[name]
 
     def print_pose(self, name: str) -> PrintPose:
         """How a part is printed: decided once, before its label, for checks, print files, sheet and plates."""

@@ -23,13 +23,9 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns. Leads are lines.
     """
     lidar, masses = scanner.lidar, assembly.layout.drive.masses
-    own = {
-        name: inertia.of_solid(solid, assembly.parts[name].density_g_cm3(scanner.printer))
-        for name, solid in assembly.made.items()
-    }
-    standing = [own[name] for name in assembly.standing_parts()]
+    standing = [assembly.inertial(name) for name in assembly.standing_parts()]
     standing += [_share(mass, 1 - mass.turning) for mass in masses]
-    turning = [own[name] for name in assembly.turning_parts()]
+    turning = [assembly.inertial(name) for name in assembly.turning_parts()]
     turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.leads if lead.path]
     x, y, z = lidar.body_mm

@@ -43,7 +43,10 @@ def turning_check(
         turning: names of those that turn about the axis.
         meet: pairs that may touch.
     """
-    images = {name: _image(mesh) for name, mesh in meshes.items()}
+    rings = {name: _image(mesh) for name, mesh in meshes.items()}
+    sides = {turns: [rings[name] for name in rings if (name in turning) == turns] for turns in (True, False)}
+    boxes = {turns: shapely.total_bounds(np.concatenate([[], *side])) for turns, side in sides.items()}
+    images = {name: _near(image, boxes[name not in turning]) for name, image in rings.items()}
     nearest, where = FAR, "everything that turns"
     for rotor in sorted(name for name in meshes if name in turning):
         for stator in sorted(name for name in meshes if name not in turning):
@@ -73,6 +76,8 @@ def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Ch
 
 def _distance(one: Array, other: Array) -> float:
     """Least distance of two sets of shapes in the half plane, FAR where it is more."""
+    if len(one) == 0 or len(other) == 0:
+        return FAR
     low, high = shapely.total_bounds(one), shapely.total_bounds(other)
     gap = np.maximum(0.0, np.maximum(low[:2] - high[2:], high[:2] - low[2:]))
     if float(np.hypot(*gap)) >= FAR:
@@ -82,8 +87,15 @@ def _distance(one: Array, other: Array) -> float:
     return float(distances.min(initial=FAR))
 
 
+def _near(rings: Array, box: Array) -> Array:
+    """The shapes within FAR of a box (4,), for nothing farther off can be the nearest: mending all takes long."""
+    bounds = shapely.bounds(rings)
+    near = ((bounds[:, :2] < box[2:] + FAR) & (bounds[:, 2:] > box[:2] - FAR)).all(axis=1)
+    return np.asarray(shapely.make_valid(shapely.polygons(rings[near])))
+
+
 def _image(mesh: TriMesh) -> Array:
-    """Shapes in the half plane that cover the surface at every axis angle, each once."""
+    """Outlines of shapes in the half plane that cover the surface at every axis angle, each once."""
     corners = mesh.vertices[mesh.faces]
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
     across = np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1)
@@ -95,8 +107,7 @@ def _image(mesh: TriMesh) -> Array:
         if chosen.any():
             outlines = _outlines(corners[chosen], many)
             shapes.append(np.unique(np.round(outlines, 3).reshape(len(outlines), -1), axis=0).reshape(-1, 2 * many, 2))
-    found = np.concatenate([shapely.linearrings(rings) for rings in shapes])
-    return np.asarray(shapely.make_valid(shapely.polygons(found)))
+    return np.concatenate([shapely.linearrings(rings) for rings in shapes])
 
 
 def _outlines(corners: Array, levels: int) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from cad.assembly.assembly import Assembly
 from cad.assembly.masses import rotor_of
 from cad.checks.check import Check, Severity, tidy
-from cad.geometry.inertia import Inertial, of_solid
+from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import TriMesh
 from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
 from cad.parts.base_mount import FOOT_RADIUS
@@ -62,11 +62,7 @@ def mount_checks(
 def carried(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:
     """All above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
     rotor, standing = rotor_of(scanner, bodies), bodies["servo"]
-    below = [
-        of_solid(assembly.made[name], assembly.parts[name].density_g_cm3(scanner.printer))
-        for name in (BASE_MOUNT, TRIPOD_FOOT)
-        if name in assembly.made
-    ]
+    below = [assembly.inertial(name) for name in (BASE_MOUNT, TRIPOD_FOOT) if name in assembly.made]
     shares = [
         (standing.mass_kg, standing.centre_m),
         (rotor.mass_kg, rotor.centre_m * [0.0, 0.0, 1.0]),

@@ -110,10 +110,7 @@ def _screws(joint: Joint, hold: Hold) -> Check:
 
 def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
     """Parts and products as one body; the whole of what half turns counts with the shaft and with what holds it."""
-    bodies = [
-        inertia.of_solid(assembly.made[name], assembly.parts[name].density_g_cm3(scanner.printer))
-        for name in sorted(names & assembly.made.keys())
-    ]
+    bodies = [assembly.inertial(name) for name in sorted(names & assembly.made.keys())]
     for mass in assembly.layout.drive.masses:
         if mass.product in names or (mass.turning > 0 and assembly.layout.drive.shaft in names):
             bodies.append(inertia.of_box(mass.mass_g, mass.box.low, mass.box.high))

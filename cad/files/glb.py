@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,9 @@ Z_TO_Y = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]  # quaternion of a 
 CREASE_RAD = np.radians(25.0)  # faces that meet at more have an edge between them; facets of a round meet at 0.1 rad
 NORMAL_DECIMALS = 4
 QUARTERS = 4  # of a turn: linear interpolation of quaternions is exact between them at constant speed
+
+Surface = tuple[Array, Array, NDArray[np.int64]]
+"""Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +50,14 @@ class Node:
     metal: bool = False
 
 
-def glb_bytes(nodes: list[Node], extras: dict[str, Any], spin: tuple[str, float] | None = None) -> bytes:
+def glb_bytes(
+    nodes: list[Node], surfaces: Mapping[str, Surface], extras: dict[str, Any], spin: tuple[str, float] | None = None
+) -> bytes:
     """The file of a scene.
 
     Args:
         nodes: parents before children; the first one is the root.
+        surfaces: of the nodes with a mesh by name, of `shaded`.
         extras: facts for programs, kept under `asset.extras`.
         spin: name of a node that turns about its z, counter-clockwise, and the seconds of one turn.
     """
@@ -70,7 +77,8 @@ def glb_bytes(nodes: list[Node], extras: dict[str, Any], spin: tuple[str, float]
             material = _material(node)
             if material not in materials:
                 materials.append(material)
-            meshes.append({"name": node.name, "primitives": [_primitive(buffer, node.mesh, materials.index(material))]})
+            number = materials.index(material)
+            meshes.append({"name": node.name, "primitives": [_primitive(buffer, surfaces[node.name], number)]})
             entry["mesh"] = len(meshes) - 1
         if node.name in children:
             entry["children"] = children[node.name]
@@ -119,8 +127,8 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _primitive(buffer: _Buffer, mesh: TriMesh, material: int) -> dict[str, Any]:
-    vertices, normals, corners = shaded(mesh)
+def _primitive(buffer: _Buffer, surface: Surface, material: int) -> dict[str, Any]:
+    vertices, normals, corners = surface
     points = (vertices / 1000).astype("<f4")
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     position = buffer.add(points, "VEC3", FLOAT, VERTICES, min=low, max=high)
@@ -130,7 +138,7 @@ def _primitive(buffer: _Buffer, mesh: TriMesh, material: int) -> dict[str, Any]:
     return {"attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material}
 
 
-def shaded(mesh: TriMesh) -> tuple[Array, Array, NDArray[np.int64]]:
+def shaded(mesh: TriMesh) -> Surface:
     """Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
 
     A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from cad.assembly.assembly import Assembly
-from cad.files.glb import Node, glb_bytes
+from cad.files.glb import Node, glb_bytes, shaded
 from cad.geometry.mesh import TriMesh
 from cad.layout.balance.counterweight import Counterweight
 from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, ROTOR_LEADS
@@ -55,9 +55,10 @@ def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh]
     motion = scanner.angles.motion
     spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None
     extras = {"task": scanner.angles.task, "config": config_hash, "unit": "m"}
+    surfaces = {node.name: shaded(node.mesh) for node in nodes if node.mesh is not None}
     return {
-        "assembly.glb": glb_bytes(nodes, extras, spin),
-        "exploded.glb": glb_bytes(_exploded(nodes, assembly, T), extras),
+        "assembly.glb": glb_bytes(nodes, surfaces, extras, spin),
+        "exploded.glb": glb_bytes(_exploded(nodes, assembly, T), surfaces, extras),
     }
 
 

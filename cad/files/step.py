@@ -26,9 +26,10 @@ _STRING = re.compile(r"('(?:[^']|'')*')")
 _COUNTER = re.compile(r"Open CASCADE STEP translator [\d.]+ [\d.]+")
 _OCCURRENCE = re.compile(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\()'\d+',('(?:[^']|'')*')")
 _REFERENCE = re.compile(r"#(\d+)")
+_LIST = re.compile(r"\((#\d+(?:,#\d+)+)\)")
 
-Pieces = list[str]
-"""An entity: text and the numbers that it refers to by turns, text first and last."""
+Entity = tuple[str, tuple[int, ...]]
+"""Its text with `%s` for each reference, and the numbers of what these refer to."""
 
 
 def step_text(assembly: cq.Assembly, title: str) -> str:
@@ -53,19 +54,13 @@ def canonical_step(text: str) -> str:
     head = _COUNTER.sub("Open CASCADE STEP translator", head)
     # the id of an occurrence counts through the process: its name, unique in our assemblies, serves
     data = _OCCURRENCE.sub(r"\1\2,\2", _bare(_COUNTER.sub("Open CASCADE STEP translator", data)))
-    bodies = (entity.split("=", 1) for entity in data.split(";")[:-1])
-    entities = {int(name[1:]): _REFERENCE.split(body) for name, body in bodies}
-    references = {key: [int(number) for number in pieces[1::2]] for key, pieces in entities.items()}
-    digest = _digests(entities, references)
-    for key, pieces in entities.items():
-        if pieces[0].startswith(UNORDERED):
-            entities[key] = _with_sorted_lists(pieces, digest)
-            references[key] = [int(number) for number in entities[key][1::2]]
-    pointed_at = {target for targets in references.values() for target in targets}
-    roots = sorted((key for key in entities if key not in pointed_at), key=lambda key: digest[key])
-    order = _depth_first(roots, references)
-    number = {key: f"#{i + 1}" for i, key in enumerate(order)}
-    lines = [f"{number[key]} = {_filled(entities[key], references[key], number)};" for key in order]
+    entities = {int(name[1:]): _entity(body) for name, body in (line.split("=", 1) for line in data.split(";")[:-1])}
+    digest = _digests(entities)
+    pointed_at = {target for _, targets in entities.values() for target in targets}
+    roots = sorted(entities.keys() - pointed_at, key=digest.__getitem__)
+    order = _parents_first(roots, entities)
+    number = {name: f"#{i}" for i, name in enumerate(order, start=1)}
+    lines = [f"{number[name]} = {_filled(entities[name], number)};" for name in order]
     return f"{head}DATA;\n" + _readable("\n".join(lines)) + f"\nENDSEC;{tail}"
 
 
@@ -84,50 +79,56 @@ def _readable(data: str) -> str:
     return data
 
 
-def _filled(pieces: Pieces, references: list[int], words: dict[int, str]) -> str:
+def _entity(body: str) -> Entity:
+    return _REFERENCE.sub("%s", body.replace("%", "%%")), tuple(map(int, _REFERENCE.findall(body)))
+
+
+def _filled(entity: Entity, words: dict[int, str]) -> str:
     """The text of an entity with a word for each reference."""
-    filled = pieces.copy()
-    filled[1::2] = [words[key] for key in references]
-    return "".join(filled)
+    text, targets = entity
+    return text % tuple(map(words.__getitem__, targets))
 
 
-def _digests(entities: dict[int, Pieces], references: dict[int, list[int]]) -> dict[int, str]:
-    """Merkle hash of every entity: independent of how the entities are numbered."""
+def _digests(entities: dict[int, Entity]) -> dict[int, str]:
+    """Merkle hash of every entity: independent of how the entities are numbered; unordered lists are put in order."""
     digest: dict[int, str] = {}
-    for key in _depth_first(sorted(entities), references, children_first=True):
-        pieces, targets = entities[key], references[key]
-        if pieces[0].startswith(UNORDERED):
-            pieces = _with_sorted_lists(pieces, digest)
-            targets = [int(number) for number in pieces[1::2]]
-        digest[key] = hashlib.sha256(_readable(_filled(pieces, targets, digest)).encode("ascii")).hexdigest()
+    for name in _children_first(entities):
+        if entities[name][0].startswith(UNORDERED):
+            entities[name] = _with_sorted_lists(entities[name], digest)
+        text = _readable(_filled(entities[name], digest))
+        digest[name] = hashlib.sha256(text.encode("ascii")).hexdigest()
     return digest
 
 
-def _with_sorted_lists(pieces: Pieces, digest: dict[int, str]) -> Pieces:
+def _with_sorted_lists(entity: Entity, digest: dict[int, str]) -> Entity:
     def in_order(match: re.Match[str]) -> str:
-        items = match.group(1).split(",")
-        return "(" + ",".join(sorted(items, key=lambda item: digest[int(item[1:])])) + ")"
+        return "(" + ",".join(sorted(match[1].split(","), key=lambda item: digest[int(item[1:])])) + ")"
 
-    body = _filled(pieces, list(range(len(pieces) // 2)), {i: f"#{number}" for i, number in enumerate(pieces[1::2])})
-    return _REFERENCE.split(re.sub(r"\((#\d+(?:,#\d+)+)\)", in_order, body))
+    return _entity(_LIST.sub(in_order, _filled(entity, {number: f"#{number}" for number in entity[1]})))
 
 
-def _depth_first(roots: list[int], references: dict[int, list[int]], *, children_first: bool = False) -> list[int]:
+def _parents_first(roots: list[int], entities: dict[int, Entity]) -> list[int]:
     """Every entity once, in the order of a depth-first walk; iterative, because chains of entities are long."""
-    order: list[int] = []
-    seen: set[int] = set()
-    stack = [(root, False) for root in reversed(roots)]
+    order: dict[int, None] = {}
+    stack = roots[::-1]
     while stack:
-        key, finished = stack.pop()
-        if finished:
-            order.append(key)
-            continue
-        if key in seen:
-            continue
-        seen.add(key)
-        if children_first:
-            stack.append((key, True))
+        name = stack.pop()
+        if name not in order:
+            order[name] = None
+            stack += reversed(entities[name][1])
+    return list(order)
+
+
+def _children_first(entities: dict[int, Entity]) -> list[int]:
+    """Every entity once, after all that it refers to."""
+    done: dict[int, None] = {}
+    opened: set[int] = set()
+    stack = list(entities)
+    while stack:
+        name = stack[-1]
+        if name in opened:
+            done[stack.pop()] = None
         else:
-            order.append(key)
-        stack.extend((child, False) for child in reversed(references[key]) if child not in seen)
-    return order
+            opened.add(name)
+            stack += entities[name][1]
+    return list(done)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import cadquery as cq
 import numpy as np
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
 
 from design.arrays import Array
 
@@ -27,10 +29,12 @@ class Inertial:
 
 def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
     """Of a homogeneous solid in mm."""
-    kg_per_mm3 = density_g_cm3 * 1e-6
-    centre = np.array(solid.Center().toTuple()) / 1000
-    inertia = np.array(cq.Shape.matrixOfInertia(solid)) * kg_per_mm3 * 1e-6
-    return Inertial(solid.Volume() * kg_per_mm3, centre, (inertia + inertia.T) / 2)
+    kg_per_mm3, found = density_g_cm3 * 1e-6, GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid.wrapped, found)  # once: the same integral gives all three
+    matrix = found.MatrixOfInertia()
+    inertia = np.array([[matrix.Value(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)]) * kg_per_mm3 * 1e-6
+    centre = np.array(found.CentreOfMass().Coord()) / 1000
+    return Inertial(found.Mass() * kg_per_mm3, centre, (inertia + inertia.T) / 2)
 
 
 def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> Inertial:

@@ -90,8 +90,9 @@ def view_of(
     cy, sy, cp, sp = np.cos(yaw_rad), np.sin(yaw_rad), np.cos(pitch_rad), np.sin(pitch_rad)
     axes = np.array([[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]])
     axes = axes if R is None else axes @ R.T
-    seen = corners_m @ axes.T
-    middle, half = (seen.min(axis=0) + seen.max(axis=0)) / 2, np.ptp(seen, axis=0) / 2 * margin
+    seen = np.ascontiguousarray((corners_m @ axes.T).T)  # numpy finds the least of a row ten times as fast
+    low, high = seen.min(axis=1), seen.max(axis=1)
+    middle, half = (low + high) / 2, (high - low) / 2 * margin
     pixel = float(2 * max(half[:2] / size))
-    low = middle[:2] - pixel * (np.array(size) - 1) / 2
-    return ParallelView(axes, low, float(middle[2] + 2 * half[2] + 0.1), pixel, size)
+    corner = middle[:2] - pixel * (np.array(size) - 1) / 2
+    return ParallelView(axes, corner, float(middle[2] + 2 * half[2] + 0.1), pixel, size)
