@@ -1,4 +1,4 @@
-"""What a build hands to the workshop beside STEP and STL: print files, the scanner to look at, parts list, drawings."""
+"""What a build hands to the workshop beside STEP, STL and drawings: print files, the scanner to look at, parts list."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 from cad.assembly.print_settings import slicer_settings
 from cad.checks.remarks import without_traps
-from cad.drawings.files import drawing_files
 from cad.files.bom import bom_text, items_of
 from cad.files.glb_scenes import scene_files
 from cad.files.manual.instructions import step_files
@@ -23,7 +22,6 @@ from cad.labels.fit_coupon import fit_coupon
 from cad.layout.all_joints import joints_of
 from cad.layout.layout import config_hash
 from cad.layout.names import FIT_COUPON
-from design.concurrency.second_process import Begin, in_turn
 from design.left_out import LeftOut
 from design.scanner import Scanner
 
@@ -37,17 +35,11 @@ class Exports:
     findings: tuple[PartFinding, ...]
 
 
-def begin_drawings(scanner: Scanner, made: PartsResult, begin: Begin = in_turn) -> Callable[[], dict[str, bytes]]:
-    """Begin the drawings of all parts: what waits for their files, for `export_scanner`."""
-    return begin(drawing_files, scanner, made.assembly, made.masses_g(), config_hash(scanner))
-
-
 def export_scanner(
     scanner: Scanner,
     made: PartsResult,
     folder: Path,
     progress: Callable[[str], None],
-    drawn: Callable[[], dict[str, bytes]] | None = None,
 ) -> Exports:
     """Write all of them into a build folder.
 
@@ -56,7 +48,6 @@ def export_scanner(
         made: its parts, of `part_files.build_parts`.
         folder: the build folder.
         progress: called with a line of text before each step.
-        drawn: the drawings, where `begin_drawings` has begun them.
     """
     assembly, digest, masses = made.assembly, config_hash(scanner), made.masses_g()
     joints = joints_of(assembly.layout)
@@ -80,8 +71,6 @@ def export_scanner(
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
     files |= wiring_files(scanner, digest, assembly.layout.drive.switch)
-    progress("drawing the parts")
-    files |= (drawn or begin_drawings(scanner, made))()
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)
     left_out = tuple(

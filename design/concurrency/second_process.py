@@ -1,4 +1,4 @@
-"""A second process beside the first, for work that does not wait for it. On one core all is done in the first.
+"""Processes beside this one, for work that does not wait for it. On one core all is done in this one.
 
 The result is the same either way: what is called must depend on its arguments alone, and these are copied.
 """
@@ -10,11 +10,13 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import forkserver, resource_tracker
 from types import FrameType
-from typing import ParamSpec, Protocol, TypeVar
+from typing import Generic, ParamSpec, Protocol, TypeVar
 
 from design.errors import BuildError
 
@@ -30,16 +32,39 @@ class Begin(Protocol):
         ...
 
 
-@contextmanager
-def second_process() -> Iterator[Begin]:
-    """What begins work in a second process; the process ends with the block, its work done or not.
+@dataclass(frozen=True, slots=True)
+class Packed(Generic[T]):
+    """What this process passes on from one to another, and cannot open without loading what that takes."""
 
-    Functions, arguments and results are pickled: functions of modules only.
+    content: bytes
+
+    @staticmethod
+    def of(value: T) -> Packed[T]:
+        """Pack it."""
+        return Packed(pickle.dumps(value))
+
+    def open(self) -> T:
+        """A copy of what was packed."""
+        value: T = pickle.loads(self.content)
+        return value
+
+
+@contextmanager
+def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Begin]:
+    """What begins work in so many processes beside this one; they end with the block, their work done or not.
+
+    Functions, arguments and results are pickled: functions of modules only. A process that has loaded `modules`, which
+    it begins to do at once, is their mould; it stays for the next block. What the first block names is what it loads.
     """
     if cores() < 2 or multiprocessing.current_process().daemon:
         yield in_turn
         return
-    pool = spawn_pool()
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(modules))
+    resource_tracker.ensure_running()  # first, for to start it lets Ctrl-C through
+    with ctrl_c_held_back():
+        forkserver.ensure_running()
+    pool = ProcessPoolExecutor(count, context, _attend)
 
     def beside(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
         future = pool.submit(work, *args, **kwargs)
@@ -48,7 +73,7 @@ def second_process() -> Iterator[Begin]:
             try:
                 return future.result()
             except BrokenExecutor as error:
-                raise BuildError("the second process of the build was killed: is there memory enough?") from error
+                raise BuildError("a process of the build was killed: is there memory enough?") from error
 
         return result
 

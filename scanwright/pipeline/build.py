@@ -5,13 +5,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cad.kernel import require_kernel
 from design.angles import standard_settings
-from design.concurrency.second_process import second_process
+from design.concurrency.second_process import Packed, processes_beside
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
@@ -19,13 +18,18 @@ from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
+    from cad.files.part_files import PartReport, PartsResult
     from cad.findings import PartFinding
     from design.evaluation.metres import PlaneFigures
+    from design.left_out import LeftOut
     from design.scanner import Scanner
     from design.search.optimum import Optimum
     from design.search.with_parts import Chosen, Workshop
 
 Say = Callable[[str], None]
+
+KERNEL = ("cad.checks.run", "cad.drawings.files", "cad.files.workshop_files", "scanwright.report.page")
+"""What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
 
 BEHIND = {"search": 0.0, "shadow": 0.18, "parts": 0.38, "pictures": 0.61, "files": 0.67, "report": 0.9}
 """Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
@@ -76,6 +80,16 @@ class Build:
             *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What came of the parts: facts, findings, what was left out, and the parts for those who have the kernel."""
+
+    parts: tuple[PartReport, ...]
+    findings: tuple[PartFinding, ...]
+    left_out: tuple[LeftOut, ...]
+    result: Packed[PartsResult]
 
 
 def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
@@ -149,7 +163,7 @@ def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
     return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
 
 
-def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Assembly]:
+def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Packed[Assembly]]:
     """The setting, the scanner with it, and its parts."""
     from cad.assembly.shadow import PartsWorkshop
     from cad.layout.layout import mount_offset_mm
@@ -161,13 +175,41 @@ def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chos
     angles = angle_set(loaded, chosen.family).model_copy(update={"task_sha256": task_sha256})
     offset = mount_offset_mm(loaded.scanner(angles))
     scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": offset}))
-    return chosen, scanner, workshop.assembly(scanner)
+    return chosen, scanner, Packed.of(workshop.assembly(scanner))
 
 
-def _load_kernel() -> None:
-    """Everything that a second process needs."""
-    for module in ("cad.checks.run", "cad.drawings.files", "design.search.with_parts", "scanwright.report.page"):
-        import_module(module)
+def _checked(scanner: Scanner, assembly: Packed[Assembly], say: Say) -> dict[str, bytes]:
+    """Checks and shadow as files."""
+    from cad.checks.run import check_files
+
+    return check_files(scanner, assembly.open(), say)
+
+
+def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Say) -> Written:
+    """The parts in the folder, with their labels."""
+    from cad.files.part_files import build_parts
+
+    parts = build_parts(scanner, folder, _at(say, "parts"), lambda _: assembly.open())
+    return Written(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
+
+
+def _exported(
+    scanner: Scanner, parts: Packed[PartsResult], folder: Path, say: Say
+) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
+    """What goes to the workshop, in the folder, but the drawings; findings, and what was left out."""
+    from cad.files.workshop_files import export_scanner
+
+    exports = export_scanner(scanner, parts.open(), folder, _at(say, "files"))
+    return exports.findings, exports.left_out
+
+
+def _drawn(scanner: Scanner, parts: Packed[PartsResult]) -> dict[str, bytes]:
+    """Drawings as files."""
+    from cad.drawings.files import drawing_files
+    from cad.layout.layout import config_hash
+
+    made = parts.open()
+    return drawing_files(scanner, made.assembly, made.masses_g(), config_hash(scanner))
 
 
 def _at(say: Say, stage: str) -> Say:
@@ -178,40 +220,38 @@ def _at(say: Say, stage: str) -> Say:
 
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
-    from cad.files.part_files import build_parts, write_files
+    from cad.files.part_files import write_files
     from design.evaluation.density_picture import density_picture
     from design.evaluation.metres import on_planes
     from design.search.optimum import find_optimum
     from scanwright.pipeline import records
 
-    with fresh_folder(target) as work, second_process() as begin:
-        begin(_load_kernel)  # while the search runs
+    with fresh_folder(target) as work, processes_beside(2, KERNEL) as begin:  # this one never loads the kernel
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         made = begin(_chosen_and_made, optimum, asked.sha256(), say)
-        from cad.checks.run import check_files  # the kernel loads here while the parts are made there
-        from cad.files.workshop_files import begin_drawings, export_scanner
-
+        records.write_task(work, asked)
+        records.write_search(work, result)
         chosen, scanner, assembly = made()
         best, angles = chosen.family, scanner.angles
-        checked = begin(check_files, scanner, assembly, say)
-        parts = build_parts(scanner, work, _at(say, "parts"), lambda _: assembly)
-        drawn = begin_drawings(scanner, parts, begin)
+        written = begin(_written, scanner, assembly, work, say)
+        checked = begin(_checked, scanner, assembly, say)
+        (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         _at(say, "pictures")("drawing the density")
         standard = standard_settings()
         settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
         density_picture(work / "density.png", problem, settings, optimum.title)
-        exported = export_scanner(scanner, parts, work, _at(say, "files"), drawn)
+        parts = written()
+        exported, drawn = begin(_exported, scanner, parts.result, work, say), begin(_drawn, scanner, parts.result)
         write_files(work, checked())
-        (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        records.write_task(work, asked)
-        records.write_search(work, result)
-        records.write_left_out(work, [*optimum.left_out, *parts.left_out, *exported.left_out])
+        findings, left_out = exported()
+        write_files(work, drawn())
+        records.write_left_out(work, [*optimum.left_out, *parts.left_out, *left_out])
         write_package(work)
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
         records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad)
-    return Made(optimum, chosen, (*parts.findings, *exported.findings), planes)
+    return Made(optimum, chosen, (*parts.findings, *findings), planes)

@@ -47,28 +47,24 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
 
     Args:
         folder: of the build.
-        begin: who does the share of it that needs the task.
+        begin: who does the shares of it that need the task, and the bodies of the scanner.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
         BuildError: another file is not as a build writes it.
     """
     angles = load_angles(folder / "angles.json")
-    on_task = begin(_on_task, folder)
-    own_body = read(folder / "own_body.npz", load_own_body)
-    assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
+    on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
     bom = read(folder / "bom.csv", read_table)
     planes = read(folder / "search.csv", lambda path: read_columns(path, PLANES_CSV))
     axes = read(folder / "axes.csv", _axes)
-    checks = read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
+    checks = _checks(folder)
     facts = {
         "angles": angles,
         "motion": _motion(angles),
         "off_deg": OFF_DEG,
         "directions": DIRECTIONS,
-        "hidden": None if own_body is None else hidden_by(own_body[0]),
         "total": None if bom is None else next((row for row in bom if row.get("kind") == "total"), None),
-        "scene": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
         "density": read(folder / "density.svg", read_picture),
         "planes": planes,
         "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
@@ -76,7 +72,6 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
         "lowest": None if planes is None else _lowest(planes),
         "checks": checks,
-        "places": {} if checks is None or assembly is None else _places(assembly, checks, bom),
         "bom": bom,
         "steps": read(
             folder / "assembly.md",
@@ -90,6 +85,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "manifest": read(folder / "manifest.json", _manifest),
         "task_text": read(folder / "task.toml", read_text),
         **on_task(),
+        **on_bodies(),
     }
     try:
         return _environment().get_template("page.html.j2").render(facts)
@@ -118,6 +114,22 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "room": room_picture(task, folder, problem, setting, sphere, scanner),
         "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting)),
     }
+
+
+def _on_bodies(folder: Path) -> dict[str, Any]:
+    """What shows the scanner, and what it hides."""
+    angles, checks, bom = load_angles(folder / "angles.json"), _checks(folder), read(folder / "bom.csv", read_table)
+    own_body = read(folder / "own_body.npz", load_own_body)
+    assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
+    return {
+        "hidden": None if own_body is None else hidden_by(own_body[0]),
+        "scene": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
+        "places": {} if checks is None or assembly is None else _places(assembly, checks, bom),
+    }
+
+
+def _checks(folder: Path) -> dict[str, list[dict[str, Any]]] | None:
+    return read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
 
 
 def _axes(path: Path) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from threading import Thread
 
-from design.concurrency.second_process import second_process
+from design.concurrency.second_process import processes_beside
 from design.errors import ScanwrightError
 from design.search.optimum import Optimum, find_optimum
 from scanwright.pipeline.build import setting_built
@@ -59,7 +59,7 @@ class Searching:
             blind = optimum.hole_lines()
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
             self._say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
-            with second_process() as begin:
+            with processes_beside() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)

@@ -1,4 +1,4 @@
-"""The second process: the same results and errors as without it, and nothing left running."""
+"""Processes beside this one: the same results and errors as without it, and nothing left running."""
 
 import contextlib
 import os
@@ -11,19 +11,34 @@ import pytest
 
 from design.angles import load_angles
 from design.concurrency import second_process as beside
-from design.concurrency.second_process import ctrl_c_held_back, in_turn, second_process
+from design.concurrency.second_process import Packed, ctrl_c_held_back, in_turn, processes_beside
 from design.errors import BuildError, TaskError
 
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_work_and_its_errors_are_the_same_with_one_core_and_two(cores, monkeypatch):
     monkeypatch.setattr(beside, "cores", lambda: cores)
-    with second_process() as begin:
+    with processes_beside() as begin:
         where, joined, wrong = begin(os.getpid), begin("-".join, ["a", "b"]), begin(load_angles, Path("none.json"))
         assert (where() == os.getpid()) == (cores == 1)
         assert joined() == "a-b"
         with pytest.raises(TaskError, match=r"none\.json"):
             wrong()
+
+
+def test_processes_come_from_one_mould_and_are_deaf_to_ctrl_c(monkeypatch):
+    monkeypatch.setattr(beside, "cores", lambda: 2)
+    with processes_beside(2) as begin:
+        slow, moulds = begin(time.sleep, 0.1), [begin(os.getppid) for _ in range(2)]
+        assert signal.SIGINT in begin(signal.pthread_sigmask, signal.SIG_BLOCK, ())()
+        slow()
+        assert moulds[0]() == moulds[1]() != os.getpid()
+
+
+def test_what_is_packed_comes_out_as_a_copy():
+    words = ["a"]
+    assert Packed.of(words).open() == words
+    assert Packed.of(words).open() is not words
 
 
 def test_what_is_given_is_as_it_was_when_work_began():
@@ -36,7 +51,7 @@ def test_what_is_given_is_as_it_was_when_work_began():
 def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, tmp_path):
     monkeypatch.setattr(beside, "cores", lambda: 2)
     began, at_work = time.monotonic(), tmp_path / "at_work"
-    with contextlib.suppress(KeyboardInterrupt), second_process() as begin:
+    with contextlib.suppress(KeyboardInterrupt), processes_beside() as begin:
         process = begin(os.getpid)()
         begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(900)")
         while not at_work.exists():  # a second, where the computer is not busy
@@ -46,7 +61,7 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
     assert time.monotonic() - began < 600
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
-    with pytest.raises(BuildError, match="was killed"), second_process() as begin:
+    with pytest.raises(BuildError, match="was killed"), processes_beside() as begin:
         begin(os._exit, 1)()
 
 
