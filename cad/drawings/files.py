@@ -9,7 +9,7 @@ from cad.assembly.assembly import Assembly
 from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
 from cad.drawings.patterns import number
 from cad.drawings.sheet import Sheet, Title, sheet_of
-from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
+from cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from cad.layout.all_joints import joints_of
 from cad.layout.fits import OnSheet
 from cad.parts.part_spec import Process
@@ -30,8 +30,9 @@ def drawing_files(
     files: dict[str, bytes] = {}
     for name in assembly.made:
         sheet = drawing_of(name, scanner, assembly, masses_g[name], config_hash)
-        files[f"drawings/{name}.pdf"] = pdf_bytes(sheet)
-        files[f"drawings/{name}.svg"] = svg_bytes(sheet)
+        shown = list(drawn_on(sheet))
+        files[f"drawings/{name}.pdf"] = pdf_bytes(sheet, shown)
+        files[f"drawings/{name}.svg"] = svg_bytes(sheet, shown)
         files[f"drawings/{name}.dxf"] = dxf_bytes(sheet)
     return files
 

@@ -20,6 +20,8 @@ from typing import Generic, ParamSpec, Protocol, TypeVar
 
 from design.errors import BuildError
 
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # as Dask sets for its own workers
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -62,7 +64,7 @@ def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Be
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(modules))
     resource_tracker.ensure_running()  # first, for to start it lets Ctrl-C through
-    with ctrl_c_held_back():
+    with ctrl_c_held_back(), one_thread_each():
         forkserver.ensure_running()
     pool = ProcessPoolExecutor(count, context, _attend)
 
@@ -123,6 +125,20 @@ def ctrl_c_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
         if came and callable(before):
             before(*came[0])
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes that are born in the block compute in one thread each: there is one of them for every core."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
 
 
 def kill(pool: ProcessPoolExecutor) -> None:

@@ -83,7 +83,7 @@ class Build:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class PartsMade:
     """What came of the parts: facts, findings, what was left out, and the parts for those who have the kernel."""
 
     parts: tuple[PartReport, ...]
@@ -185,12 +185,12 @@ def _checked(scanner: Scanner, assembly: Packed[Assembly], say: Say) -> dict[str
     return check_files(scanner, assembly.open(), say)
 
 
-def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Say) -> Written:
+def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Say) -> PartsMade:
     """The parts in the folder, with their labels."""
     from cad.files.part_files import build_parts
 
     parts = build_parts(scanner, folder, _at(say, "parts"), lambda _: assembly.open())
-    return Written(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
+    return PartsMade(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
 
 
 def _exported(

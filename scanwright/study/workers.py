@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from design.concurrency.second_process import cores, ctrl_c_held_back, kill, spawn_pool
+from design.concurrency.second_process import cores, ctrl_c_held_back, kill, one_thread_each, spawn_pool
 from design.errors import BuildError, TaskError, require
 from scanwright.study.units import Crew
 
@@ -26,7 +25,6 @@ ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
 CONNECT_S = 10.0
 ALONE_S = 60.0  # without any worker: a nanny whose worker dies while it starts gives up
 LOOK_S = 5.0  # between two looks at who is there
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # as Dask sets for its own workers
 
 
 def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractContextManager[Crew]:
@@ -76,16 +74,8 @@ class SingleProcesses(Executor):
 
 @contextmanager
 def _here(processes: int) -> Iterator[Crew]:
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        with SingleProcesses(processes) as executor:
-            yield Crew(executor, lambda: processes)
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name)
-            if value is not None:
-                os.environ[name] = value
+    with one_thread_each(), SingleProcesses(processes) as executor:
+        yield Crew(executor, lambda: processes)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from cad.drawings.pen import DIAMETER, TURN, Pen, document_at
 from cad.drawings.project import Arc, project
 from cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from cad.drawings.sheet import A2, A3, Sheet
-from cad.drawings.write import dxf_bytes, pdf_bytes, svg_bytes
+from cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
 from cad.solids import box, cylinder, upright
@@ -341,14 +341,15 @@ def test_everything_that_a_pen_draws_is_in_every_format():
         return pen, Sheet(document, 0.5, A3, "a & b")
 
     (pen, first), (_, second) = sheet(), sheet()
-    for write in (dxf_bytes, svg_bytes, pdf_bytes):
-        assert write(first) == write(second)
+    assert dxf_bytes(first) == dxf_bytes(second)
+    for write in (svg_bytes, pdf_bytes):
+        assert write(first, list(drawn_on(first))) == write(second, list(drawn_on(second)))
     document = ezdxf.read(io.StringIO(dxf_bytes(first).decode("utf-8")))
     kinds = sorted(entity.dxftype() for entity in document.modelspace())
     assert kinds == ["ARC", "CIRCLE", "DIMENSION", "LWPOLYLINE"]
     assert document.query("CIRCLE")[0].dxf.radius == 20  # views are 1:1, the sheet grows
     assert document.query("DIMENSION")[0].get_measurement() == pytest.approx(40)
-    page = ET.fromstring(svg_bytes(first))
+    page = ET.fromstring(svg_bytes(first, list(drawn_on(first))))
     text = page.find(f".//{SVG}text")
     assert text.text == "2x Ø40 <90°>" and (text.get("x"), text.get("y")) == ("30", "267")
     circle = next(path for path in page.iter(f"{SVG}path") if path.get("d").count("C") > 3)
