@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -203,11 +204,12 @@ def _exported(
     return exports.findings, exports.left_out
 
 
-def _drawn(scanner: Scanner, parts: Packed[PartsResult]) -> dict[str, bytes]:
+def _drawn(scanner: Scanner, parts: Packed[PartsResult], say: Say) -> dict[str, bytes]:
     """Drawings as files."""
     from cad.drawings.files import drawing_files
     from cad.layout.layout import config_hash
 
+    say("drawing the parts")
     made = parts.open()
     return drawing_files(scanner, made.assembly, made.masses_g(), config_hash(scanner))
 
@@ -221,16 +223,18 @@ def _at(say: Say, stage: str) -> Say:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import write_files
-    from design.evaluation.density_picture import density_picture
     from design.evaluation.metres import on_planes
     from design.search.optimum import find_optimum
-    from scanwright.pipeline import records
 
     with fresh_folder(target) as work, processes_beside(2, KERNEL) as begin:  # this one never loads the kernel
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         made = begin(_chosen_and_made, optimum, asked.sha256(), say)
+        begin(import_module, "trimesh")  # for the report: the other process waits for the parts
+        from design.evaluation.density_picture import density_picture  # so does this one
+        from scanwright.pipeline import records
+
         records.write_task(work, asked)
         records.write_search(work, result)
         chosen, scanner, assembly = made()
@@ -244,7 +248,10 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
         density_picture(work / "density.png", problem, settings, optimum.title)
         parts = written()
-        exported, drawn = begin(_exported, scanner, parts.result, work, say), begin(_drawn, scanner, parts.result)
+        exported, drawn = (
+            begin(_exported, scanner, parts.result, work, say),
+            begin(_drawn, scanner, parts.result, say),
+        )
         write_files(work, checked())
         findings, left_out = exported()
         write_files(work, drawn())
