@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import defaultdict
 from pathlib import Path
 
 STAGES = {
@@ -62,7 +62,7 @@ def on_one_core(task: str, folder: str) -> None:
     from design.task.task import load_task
     from scanwright.pipeline.build import build_task
 
-    taken: Counter[str] = Counter()
+    taken: dict[str, float] = defaultdict(float)
     stage, since = "start and search", 0.0  # time.process_time counts from the start of the process
 
     def say(line: str) -> None:
@@ -74,8 +74,8 @@ def on_one_core(task: str, folder: str) -> None:
 
     build_task(load_task(task), Path(folder) / task, say)
     say("")
-    for name, seconds in taken.most_common():
-        print(f"  {name:<50} {seconds:5.2f}  {seconds / taken.total():4.0%}")
+    for name, seconds in sorted(taken.items(), key=lambda item: -item[1]):
+        print(f"  {name:<50} {seconds:5.2f}  {seconds / sum(taken.values()):4.0%}")
 
 
 if __name__ == "__main__":

@@ -230,11 +230,11 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        made = begin(_chosen_and_made, optimum, asked.sha256(), say)
-        begin(import_module, "trimesh")  # for the report: the other process waits for the parts
-        from design.evaluation.density_picture import density_picture  # so does this one
+        from design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
 
+        made = begin(_chosen_and_made, optimum, asked.sha256(), say)
+        begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
         records.write_task(work, asked)
         records.write_search(work, result)
         chosen, scanner, assembly = made()
