@@ -265,7 +265,7 @@ def made(once):
     Its folder, what was made and exported, and the scanner: for reading only.
     """
     from cad.files import part_files, workshop_files
-    from design.concurrency import second_process
+    from design.concurrency import processes
     from scanwright.api import build
 
     def all_of_it(folder):
@@ -281,7 +281,7 @@ def made(once):
         folder.mkdir()
         (folder / "tilted.toml").write_text(TILTED)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(second_process, "cores", lambda: 1)  # all of it here
+            patch.setattr(processes, "cores", lambda: 1)  # all of it here
             patch.setattr(part_files, "build_parts", keeping(part_files.build_parts))
             patch.setattr(workshop_files, "export_scanner", keeping(workshop_files.export_scanner))
             built = build(folder / "tilted.toml", folder / "out")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from cad.kernel import require_kernel
 from design.angles import standard_settings
-from design.concurrency.second_process import Packed, processes_beside
+from design.concurrency.processes import Packed, processes_beside
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from design.concurrency.second_process import Begin, in_turn
+from design.concurrency.processes import Begin, in_turn
 from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import MapRegion, MeshRegion

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from design.angles import AngleSet, load_angles
 from design.arrays import Array
-from design.concurrency.second_process import Begin, in_turn
+from design.concurrency.processes import Begin, in_turn
 from design.errors import BuildError
 from design.evaluation.metres import on_planes
 from design.shadow import load_own_body

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from threading import Thread
 
-from design.concurrency.second_process import processes_beside
+from design.concurrency.processes import processes_beside
 from design.errors import ScanwrightError
 from design.search.optimum import Optimum, find_optimum
 from scanwright.pipeline.build import setting_built

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import ParamSpec, TypeVar
 
-from design.concurrency.second_process import kill, spawn_pool
+from design.concurrency.processes import kill, spawn_pool
 from design.errors import ScanwrightError
 from design.objective.problem import Problem
 from design.scanner import Scanner

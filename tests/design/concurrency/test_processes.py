@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from design.angles import load_angles
-from design.concurrency import second_process as beside
-from design.concurrency.second_process import Packed, ctrl_c_held_back, in_turn, processes_beside
+from design.concurrency import processes as beside
+from design.concurrency.processes import Packed, ctrl_c_held_back, in_turn, processes_beside
 from design.errors import BuildError, TaskError
 
 
