@@ -17,10 +17,11 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
+SEARCH, SOLIDS = "start and search", "kernel, solids and what they hide"
 STAGES = {
-    "loading": "start and search",
-    "parts of": "solids",
-    "making the parts": "solids",
+    "parts of": SOLIDS,
+    "loading": SOLIDS,
+    "making the parts": SOLIDS,
     "engraving": "labels",
     "meshing": "meshes, STEP and STL of the parts",
     "writing assembly.step": "meshes, STEP and STL of the parts",
@@ -41,45 +42,53 @@ SHIPPED = Path(__file__).parents[2] / "design/task/shipped"
 def main(tasks: list[str]) -> None:
     """Print seconds of each task."""
     for task in tasks or sorted(path.stem for path in SHIPPED.glob("*.toml")):
-        with tempfile.TemporaryDirectory() as folder:
-            start = time.perf_counter()
-            command = [sys.executable, "-m", "scanwright", "build", task, "--out", folder, "-q"]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            on_all = time.perf_counter() - start
-        with tempfile.TemporaryDirectory() as folder:
-            one_core = [sys.executable, "-m", "benchmarks.cad.build", "--on-one-core", task, folder]
-            start = time.perf_counter()
-            steps = subprocess.run(one_core, check=True, stdout=subprocess.PIPE, text=True).stdout
-            on_one = time.perf_counter() - start
+        on_all, _ = _built(["scanwright", "build", task, "-q"])
+        on_one, told = _built(["benchmarks.cad.build", "--on-one-core", task])
         print(f"{task}: {on_all:.1f} s on {os.cpu_count()} cores, {on_one:.1f} s on one; seconds of the processor:")
-        print(steps, end="")
+        taken = _stages(told.splitlines())
+        for stage, seconds in sorted(taken.items(), key=lambda item: -item[1]):
+            print(f"  {stage:<50} {seconds:5.2f}  {seconds / sum(taken.values()):4.0%}")
 
 
-def on_one_core(task: str, folder: str) -> None:
-    """Build, and print the seconds of the processor that each stage took."""
+def on_one_core(task: str, folder: Path) -> None:
+    """Build, and print what is done and the seconds of the processor so far."""
     if hasattr(os, "sched_setaffinity"):  # Linux
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     from design.task.task import load_task
     from scanwright.pipeline.build import build_task
 
-    taken: dict[str, float] = defaultdict(float)
-    stage, since = "start and search", 0.0  # time.process_time counts from the start of the process
-
-    def say(line: str) -> None:
-        nonlocal stage, since
-        now = time.process_time()
-        taken[stage] += now - since
-        stage = next((STAGES[begin] for begin in STAGES if line.startswith(begin)), "start and search")
-        since = now
-
-    build_task(load_task(task), Path(folder) / task, say)
+    build_task(load_task(task), folder / task, say)
     say("")
-    for name, seconds in sorted(taken.items(), key=lambda item: -item[1]):
-        print(f"  {name:<50} {seconds:5.2f}  {seconds / sum(taken.values()):4.0%}")
+
+
+def say(line: str) -> None:
+    """A line of progress, with the seconds before it."""
+    print(time.process_time(), line)
+
+
+def _built(command: list[str]) -> tuple[float, str]:
+    """Seconds on the clock of a command that is given an empty folder, and what it prints."""
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-m", *command, "--out", folder], check=True, stdout=subprocess.PIPE, text=True
+        )
+        return time.perf_counter() - start, done.stdout
+
+
+def _stages(told: list[str]) -> dict[str, float]:
+    """Seconds of each stage: a line of progress ends the step before it."""
+    taken: dict[str, float] = defaultdict(float)
+    stage, since = SEARCH, 0.0
+    for words in told:
+        until, _, line = words.partition(" ")
+        taken[stage] += float(until) - since
+        stage, since = next((STAGES[begin] for begin in STAGES if line.startswith(begin)), SEARCH), float(until)
+    return taken
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--on-one-core"]:
-        on_one_core(*sys.argv[2:])
+        on_one_core(sys.argv[2], Path(sys.argv[4]))
     else:
         main(sys.argv[1:])
