@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.angles import AngleSet
+from design.atomic_file import check_place
 from design.concurrency.ahead import ahead
 from design.errors import RecordingError, suggest
 from firmware_io.assembly.axis_curve import axis_curve
@@ -209,6 +210,7 @@ def assemble_recording(
 
 
 def _check(out: Path, lag_s: float, columns: list[str]) -> None:
+    check_place(out, RecordingError)
     if out.suffix != ".ply":
         raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")
     if not abs(lag_s) <= _LONGEST_LAG_S:

@@ -68,9 +68,9 @@ def calibrate_recordings(
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
     """
+    check_place(out, RecordingError)
     if out.suffix != ".json":
         raise RecordingError(f"{out}: an angle set is JSON; name it {out.with_suffix('.json').name}")
-    check_place(out, RecordingError)
     for k, recording in enumerate(recordings):
         if recording.resolve() in [other.resolve() for other in recordings[:k]]:
             raise RecordingError(f"{recording}: named twice; the same beams twice tell nothing more, but seem to")

@@ -18,7 +18,7 @@ from jaxtyping import Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.atomic_file import whole_file
+from design.atomic_file import check_place, whole_file
 from design.errors import RecordingError
 from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
 from firmware_io.foreign import foreign
@@ -108,6 +108,7 @@ def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterab
     Raises:
         RecordingError: the file cannot be written, or is no .ply.
     """
+    check_place(path, RecordingError)
     if path.suffix != ".ply":
         raise RecordingError(f"{path}: clouds are written as PLY; name it {path.with_suffix('.ply').name}")
     fields = np.dtype([(axis, "<f4") for axis in "xyz"])

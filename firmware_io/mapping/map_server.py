@@ -27,10 +27,10 @@ def check_map_place(path: Path) -> None:
     Raises:
         RecordingError: its name does not end in .yaml, or no file can be there.
     """
+    check_place(path, RecordingError)
     if path.suffix not in (".yaml", ".yml"):
         raise RecordingError(f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm beside it")
-    for place in (path, image_beside(path)):
-        check_place(place, RecordingError)
+    check_place(image_beside(path), RecordingError)
 
 
 def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.arrays import Floats, Times
+from design.atomic_file import check_place
 from design.errors import RecordingError
 from firmware_io.recording import ros_messages
 from firmware_io.recording.angle_sources import (
@@ -113,6 +114,7 @@ def import_bag(
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
             have no time in common. Nothing is written then.
     """
+    check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
     if angle_unit not in ("deg", "rad", None):

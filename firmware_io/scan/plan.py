@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from design.angles import CALIBRATED, AngleSet, angles_in_use
+from design.atomic_file import check_place
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
@@ -140,9 +141,8 @@ def plan_scan(
 
 
 def _check_name(recording: Path) -> None:
+    check_place(recording, RecordingError)
     if recording.suffix != ".mcap":
         raise RecordingError(f"{recording}: recordings are MCAP files; name it {recording.with_suffix('.mcap').name}")
     if recording.exists():
         raise RecordingError(f"{recording}: exists already, and a recording is never written over")
-    if not recording.parent.is_dir():
-        raise RecordingError(f"{recording}: the folder {recording.parent} does not exist")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from design.atomic_file import check_place
 from design.errors import RecordingError
 from firmware_io.clouds.cloud import Cloud
 from firmware_io.clouds.formats import read_clouds, write_clouds
@@ -49,6 +50,7 @@ def register(
     from firmware_io.registration.register_files import register_files
 
     target = Path(out)
+    check_place(target, RecordingError)
     tum = target.with_suffix(".tum") if poses is None else Path(poses)
     given = None if start is None else Path(start)
     scanner = None if angles is None else as_angle_set(angles)

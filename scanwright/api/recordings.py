@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Literal
 
 from design.angles import AngleSet
+from design.atomic_file import check_place
 from design.errors import RecordingError
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.clouds.formats import check_target
@@ -201,6 +202,7 @@ def calibrate(
     from firmware_io.calibration.calibrate import calibrate_recordings
 
     before, target = as_angle_set(angles), Path(out)
+    check_place(target, RecordingError)
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
     beside = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
     urdf = robot_frames.calibrated_urdf_place(target)

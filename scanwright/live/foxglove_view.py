@@ -17,7 +17,7 @@ from pathlib import Path
 import foxglove
 
 from design.angles import angles_in_use, load_angles
-from design.atomic_file import whole_file
+from design.atomic_file import check_place, whole_file
 from design.errors import DeviceError, RecordingError
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.recording.mcap_chunks import read_note
@@ -99,6 +99,7 @@ def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
     Raises:
         RecordingError: the recording is unreadable, or the file cannot be written.
     """
+    check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: Foxglove reads MCAP; name it {out.with_suffix('.mcap').name}")
     with whole_file(out, RecordingError) as part:

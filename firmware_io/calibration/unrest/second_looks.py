@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float64
@@ -19,7 +20,10 @@ from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam
 from firmware_io.calibration.scans import Scans
 
 _ONCE_IN = 1000  # recordings: noise takes one beam of them for a place that another went through
-_SQUARE = 0.5  # scans around a beam are at least so far from it as its neighbours in the scan, times this
+_SQUARES = (
+    0.5,
+    1.0,
+)  # how far scans around a beam are off, in units of its neighbours: small for the slim and far ones
 _SCANS = 8  # but so many at most: people walk on
 _ASKED = 200_000  # beams: more tell nothing new
 _APART_RAD = np.radians(10.0)  # a turn less than that is the same look
@@ -61,29 +65,34 @@ def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: Return
     range_m = now.range_m + x[4]
     point = origin + range_m[:, None] * direction
     scans = Scans.of(now)
-    patch = _patches(scans, np.hypot(direction[:, 0], direction[:, 1]))
-    around = np.full((5, range_m.size), -1)
-    around[:, patch[0]] = patch
-    patch = patch[:, :: max(1, patch.shape[1] // _ASKED)]
-    looks = list(_other_looks(mount, x, now, scans, point, patch[0]))
-    behind_m = noise_m * np.sqrt(2) * norm.isf(1 / _ONCE_IN / max(1, sum(mine.size for mine, _ in looks)))
-    compared, through = np.zeros((2, patch.shape[1]), bool)
-    for mine, other in looks:
+    aside = np.hypot(direction[:, 0], direction[:, 1])
+    patches = [_patches(scans, aside, square) for square in _SQUARES]
+    asked = np.flatnonzero(np.any([patch[0] >= 0 for patch in patches], axis=0))
+    asked = asked[:: max(1, asked.size // _ASKED)]
+    looks = list(_other_looks(mount, x, now, scans, point, asked))
+    pairs = len(patches) * sum(mine.size for mine, _ in looks)
+    behind_m = noise_m * np.sqrt(2) * norm.isf(1 / _ONCE_IN / max(1, pairs))
+    compared, through = np.zeros((2, range_m.size), bool)
+    for patch, (mine, other) in product(patches, looks):
+        whole = (patch[0, mine] >= 0) & (patch[0, other] >= 0)
+        mine, other = mine[whole], other[whole]
         five, along = point[patch[:, mine]] - origin[other], direction[other]
         depth = np.einsum("kij,ij->ki", five, along)
         across = five - depth[:, :, None] * along
-        whole = _between(across[0], (across[2] - across[1]) / 2, (across[4] - across[3]) / 2)
-        whole &= around[0, other] >= 0
-        compared[mine] |= whole
-        clear_m = range_m[around[:, other]].min(axis=0)
-        through[mine] |= whole & (clear_m > 2 * depth.max(axis=0) - depth.min(axis=0) + behind_m)
-    return SecondLooks(patch.shape[1], int(compared.sum()), int(through.sum()))
+        between = _between(across[0], (across[2] - across[1]) / 2, (across[4] - across[3]) / 2)
+        compared[mine] |= between
+        clear_m = range_m[patch[:, other]].min(axis=0)
+        through[mine] |= between & (clear_m > 2 * depth.max(axis=0) - depth.min(axis=0) + behind_m)
+    return SecondLooks(asked.size, int(compared.sum()), int(through.sum()))
 
 
-def _patches(scans: Scans, aside: Floats) -> Ints:
-    """Beams that have four neighbours: each, the ones before and after it, those of scans around it, shape (5, k).
+def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
+    """Each beam, the ones before and after it, those of scans around it, shape (5, n); -1 where one is missing.
 
-    `aside`: sine of each beam's angle to the axis. Near that the scans crowd.
+    Args:
+        scans: which beam lies beside which.
+        aside: sine of each beam's angle to the axis, shape (n,). Near that the scans crowd.
+        square: how far off those scans are at least, in units of how far off the beams are.
     """
     beam = np.arange(1, scans.scan.size - 1)
     row = scans.scan
@@ -91,18 +100,20 @@ def _patches(scans: Scans, aside: Floats) -> Ints:
         scans.bearing_rad[beam + 1] - scans.bearing_rad[beam - 1] < 3 * scans.gap_rad
     )
     beam = beam[inner]
-    square = _SQUARE * scans.gap_rad / np.maximum(scans.step_rad * aside[beam], 1e-9)
-    apart = np.clip(np.rint(square), 1, _SCANS).astype(np.int64)
+    apart = square * scans.gap_rad / np.maximum(scans.step_rad * aside[beam], 1e-9)
+    apart = np.clip(np.rint(apart), 1, _SCANS).astype(np.int64)
     last, has_last = scans.beam(row[beam] - apart, scans.bearing_rad[beam])
     following, has_following = scans.beam(row[beam] + apart, scans.bearing_rad[beam])
     whole = has_last & has_following & (scans.run[row[last]] == scans.run[row[following]])
-    return np.stack([beam, beam - 1, beam + 1, last, following])[:, whole]
+    found = np.full((5, row.size), -1)
+    found[:, beam[whole]] = np.stack([beam, beam - 1, beam + 1, last, following])[:, whole]
+    return found
 
 
 def _other_looks(
     mount: Mount, x: Floats, now: ReturnedBeams, scans: Scans, point: Floats, asked: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Which of the asked beams another look came near to, and the beam of that look that came nearest."""
+    """Which beams of those asked another look came near to, and the beam of that look that came nearest."""
     run = scans.run[scans.scan[asked]]
     for psi_rad, bearing_rad in _towards(mount, x, point[asked]):
         joint_rad = 2 * psi_rad - axis_angle(x, psi_rad, np.zeros(psi_rad.size))
@@ -123,7 +134,8 @@ def _other_looks(
                 (own, last_rad),
                 (beside, low_rad + (joint_rad - low_rad) % _TURN_RAD),
             ):
-                yield _found(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
+                its, other = _found(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
+                yield asked[its], other
 
 
 def _found(

@@ -20,7 +20,7 @@ from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.writer import Writer
 
-from design.atomic_file import whole_file
+from design.atomic_file import check_place, whole_file
 from design.errors import RecordingError
 from firmware_io.foreign import foreign
 from firmware_io.recording.mcap_chunks import read_messages
@@ -37,9 +37,9 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
     Raises:
         RecordingError: the file cannot be read, holds not one whole message, or `out` is the same file.
     """
-    out = repaired_place(path) if out is None else out
-    if not path.is_file():
-        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+    beside = repaired_place(path)
+    out = beside if out is None else out
+    check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
     if out.exists() and path.samefile(out):
@@ -68,7 +68,13 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
 
 
 def repaired_place(path: Path) -> Path:
-    """Where the repaired recording goes: beside the damaged one."""
+    """Where the repaired recording goes: beside the damaged one.
+
+    Raises:
+        RecordingError: there is no file of that name.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
     return path.with_name(f"{path.stem}.repaired.mcap")
 
 

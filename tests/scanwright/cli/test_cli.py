@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 import scanwright
+from design.angles import Angles, AngleSet
 from design.task.task import SHIPPED
 from scanwright.cli import app
 
@@ -174,3 +175,35 @@ def test_a_bug_shows_its_traceback(command, monkeypatch):
     monkeypatch.setattr("design.catalogue.catalogue.load_catalogue", lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         command("catalogue")
+
+
+@pytest.mark.parametrize("place", [".", "/"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("calibrate", "r.mcap", "--angles", "angles.json", "-o"),
+        ("assemble", "r.mcap", "--angles", "angles.json", "-o"),
+        ("import", "r.bag", "--scan", "/scan", "--angle", "/joint_states:j", "-o"),
+        ("repair", "r.mcap", "-o"),
+        ("repair",),
+        ("map", "a.ply", "--angles", "angles.json", "-o"),
+        ("register", "a.ply", "b.ply", "-o"),
+    ],
+    ids=lambda words: " ".join(words[:1] + words[-1:]),
+)
+def test_a_folder_for_a_file_is_refused_in_a_line(command, tmp_path, monkeypatch, words, place):
+    """`.` and `/` are folders without a name, of which no other name can be made."""
+    monkeypatch.chdir(tmp_path)
+    angles = AngleSet(
+        task="t",
+        angles_deg=Angles(alpha_rot=0.0, beta_rot=0.0, alpha_laser=60.0, beta_laser=0.0),
+        sensor="any",
+        servo="MX-64R",
+    )
+    Path("angles.json").write_text(angles.to_json())
+    for name in ("r.mcap", "r.bag", "a.ply", "b.ply"):
+        Path(name).touch()
+    code, _, complaints = command(*words, place)
+    assert code == 2
+    assert len(complaints) == 1
+    assert "folder" in complaints[0] or "known: " in complaints[0]
