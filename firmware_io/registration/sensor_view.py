@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import small_gicp
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 from numpy import ndarray
 
 from design.angles import AngleSet
 from design.errors import RecordingError
 from firmware_io.registration.cube_map import DepthMap, depth_map
 from firmware_io.registration.surfels.beams import Beams
-from firmware_io.registration.thin import thin, voxel_means
+from firmware_io.registration.thin import beam_step_rad, thin, voxel_means
 
 THREADS = os.cpu_count() or 1
 _NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py
@@ -85,13 +85,14 @@ def make_view(
     joint_rad = _joints(name, scanner, joint_rad)
     if not finite.all():
         points_m, joint_rad = points_m[finite], joint_rad[finite[: len(joint_rad)]]
-    thinned = thin(points_m, spacing_m) if len(points_m) > 1 else points_m
+    voxels_m, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
+    thinned = thin(voxels_m, counts, spacing_m, beam_step_rad(points_m)) if len(points_m) > 1 else points_m
     if len(thinned) < _MIN_POINTS:
         raise RecordingError(
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m, np.zeros(len(thinned), np.uint8))
-    beams = _beams(points_m, joint_rad, spacing_m, scanner)
+    beams = _beams(points_m, voxels_m, counts, joint_rad, scanner)
     return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE), beams)
 
 
@@ -122,11 +123,11 @@ def _joints(
 
 def _beams(
     points_m: Float64[ndarray, "n 3"],
+    voxels_m: Float64[ndarray, "k 3"],
+    counts: Int64[ndarray, " k"],
     joint_rad: Float64[ndarray, " joints"],
-    spacing_m: float,
     scanner: AngleSet | None,
 ) -> Beams:
-    voxels_m, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
     eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
     if scanner is not None:
         T = scanner.T_world_rot(0.0)

@@ -24,15 +24,16 @@ _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the l
 _LEVELS = 3  # voxels grow up to 2**3 times; where lines are still farther apart nothing is known between them
 
 
-def thin(points_m: Float64[ndarray, "n 3"], spacing_m: float) -> Float64[ndarray, "kept 3"]:
+def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: float) -> Float64[ndarray, "kept 3"]:
     """Mean points of voxels, shape (m, 3), evenly spread over the surfaces that the scanner at the origin saw.
 
     Args:
-        points_m: shape (n, 3), finite, in the order in which they were measured.
-        spacing_m: edge of the finest voxels.
+        means: of the finest voxels, as `voxel_means` has them, like `counts`.
+        counts: how many points each of them holds.
+        spacing_m: their edge.
+        step_rad: as `beam_step_rad` has it.
     """
-    means, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
-    gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, beam_step_rad(points_m))
+    gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, step_rad)
     level = np.clip(np.ceil(np.log2(np.maximum(gap_m, spacing_m) / spacing_m)), 0, _LEVELS).astype(np.uint8)
     # Fine voxels nest in coarse ones, so that nothing is lost by starting from their means
     return joined_means(means, means, counts, spacing_m, level)[0]

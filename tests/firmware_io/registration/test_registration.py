@@ -95,7 +95,8 @@ def test_voxel_means_are_those_of_the_slow_obvious_loop(points, levels):
 
 def test_thinning_undoes_the_density_of_the_scanner():
     points = scan(room(), pose(0, 0, 0), 360, 541, 0)
-    floor = thin(points, 0.15)
+    voxels = voxel_means(points, points, 0.15, np.zeros(len(points), np.uint8))
+    floor = thin(*voxels, 0.15, beam_step_rad(points))
     floor = floor[floor[:, 2] < -0.9]
     raw = points[points[:, 2] < -0.9]
 
