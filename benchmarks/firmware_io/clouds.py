@@ -11,7 +11,8 @@ of the wall, and of the processor where other programs may run beside:
 4. error against run time of the ways to go between encoder samples.
 
 KISS-ICP moves points by one constant velocity; the kernel does the servo, and with poses the platform too. It gets all
-points as one frame, which is its fastest; the kernel gets blocks of 256 scans, where the command makes 128 at once and holds less.
+points as one frame, which is its fastest; the kernel gets blocks of 256 scans, where the
+command makes 128 at once and holds less.
 """
 
 from __future__ import annotations
