@@ -50,7 +50,7 @@ def test_an_xm430_is_laid_out_with_every_ring_and_every_hokuyo(ring, lidar):
 CUPS = [("STS3215", "UST-10LX", (0, 0, 60, -30)), ("XL330-M288", "LD06", TILTED), ("STS3215", "LD06", TILTED)]
 
 
-@pytest.mark.parametrize(("servo", "lidar", "angles"), samples(CUPS, CUPS[:2]))
+@pytest.mark.parametrize(("servo", "lidar", "angles"), samples(CUPS, CUPS[:1]))
 def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_screws(servo, lidar, angles):
     scanner = scanner_for(servo, lidar, None, angles)
     stack, screw = direct_stack(scanner), SCREWS[scanner.servo.horn_screw]

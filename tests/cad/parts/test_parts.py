@@ -56,7 +56,7 @@ def merged(vertices, faces):
     return trimesh.Trimesh(points, faces[keep], process=False)
 
 
-@pytest.fixture(scope="module", params=samples(SETTINGS, ("upright", "ground_ahead", "small")))
+@pytest.fixture(scope="module", params=samples(SETTINGS, ("upright", "ground_ahead")))
 def built(request, built_once):
     setting = SETTINGS[request.param]
     scanner = scanner_for(request.param)

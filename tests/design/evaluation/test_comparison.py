@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_tests import samples
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Multibeam
@@ -96,7 +97,7 @@ def test_a_multibeam_is_a_fan_that_holds_the_axis(name):
 
 
 @pytest.mark.parametrize("name", FULL)
-@pytest.mark.parametrize("turns", [1, 20])
+@pytest.mark.parametrize("turns", samples([1, 20], [20]))
 def test_the_zonal_J_agrees_with_the_sampled_one(ceiling, name, turns):
     _, problem, _ = ceiling
     row = ready_made(problem, multibeam(name), turns)
@@ -107,7 +108,7 @@ def test_the_zonal_J_agrees_with_the_sampled_one(ceiling, name, turns):
     assert row.blind_weight == pytest.approx(blind_weight, abs=2e-3)
 
 
-@pytest.mark.parametrize("ball_deg", [0.5, 2])
+@pytest.mark.parametrize("ball_deg", samples([0.5, 2], [2]))
 @pytest.mark.parametrize("starts", [[0.3, 0.3, 0.3], [0.1, 0.1 + 1 / 3, 0.1 + 2 / 3], [0.82, 0.05, 0.33]])
 def test_turns_may_repeat_or_interlace_and_stay_within_the_stated_error(ceiling, ball_deg, starts):
     _, problem, _ = ceiling
