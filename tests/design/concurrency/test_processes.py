@@ -52,7 +52,7 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
     monkeypatch.setattr(beside, "cores", lambda: 2)
     began, at_work = time.monotonic(), tmp_path / "at_work"
     with contextlib.suppress(KeyboardInterrupt), processes_beside() as begin:
-        process = begin(os.getpid)()
+        process, mould = begin(os.getpid)(), begin(os.getppid)()
         begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(900)")
         while not at_work.exists():  # a second, where the computer is not busy
             assert time.monotonic() - began < 300
@@ -62,6 +62,7 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     with pytest.raises(BuildError, match="was killed"), processes_beside() as begin:
+        assert begin(os.getppid)() != mould  # nor is that left, still loading, with the terminal in its hands
         begin(os._exit, 1)()
 
 
