@@ -138,8 +138,27 @@ def turned(
     return np.array(found)
 
 
-def linkage_line(scanner: Scanner, assembly: Assembly, folder: Path) -> str:
-    """The linkage, with its sub-plate where there is one."""
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A bend by CalculiX, and what a build works with, at the axis or position where it bends most.
+
+    Attributes:
+        bend: by CalculiX [rad].
+        off: length of the difference [rad].
+        stated: error that the build states [rad].
+        changes: how much of the bend changes over a turn [rad].
+        nodes: of the mesh.
+    """
+
+    bend: float
+    off: float
+    stated: float
+    changes: float
+    nodes: int
+
+
+def linkage_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Compared:
+    """The linkage, with its sub-plate where there is one, along the axis that bends it most."""
     stack, linkage, printer = assembly.layout.stack, assembly.layout.linkage, scanner.printer
     names, R = assembly.carriers(), scanner.angles.R_rot_laser()
     first, *others = (assembly.made[name] for name in names)
@@ -160,14 +179,11 @@ def linkage_line(scanner: Scanner, assembly: Assembly, folder: Path) -> str:
     stated = np.linalg.norm(own.rotation_error_rad, axis=0)
     stated = np.maximum(stated, LEAST_ERROR * np.linalg.norm(own.rotation_rad, axis=0))
     worst = int(np.argmax(bend))
-    return (
-        f"linkage turns {_deg(bend[worst])} deg, off by {off[worst] / bend[worst]:.0%}, "
-        f"{off[worst] / stated[worst]:.2f} of the stated error ({len(body.nodes)} nodes)"
-    )
+    return Compared(float(bend[worst]), float(off[worst]), float(stated[worst]), 0.0, len(body.nodes))
 
 
-def mount_line(scanner: Scanner, assembly: Assembly, folder: Path) -> str:
-    """The mount under servo, cage and rotor."""
+def mount_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Compared:
+    """The mount under servo, cage and rotor: what stays the same over a turn."""
     layout, printer = assembly.layout, scanner.printer
     deck, mounted = layout.deck, layout.drive.mounted
     body = tetrahedra(assembly.made[BASE_MOUNT], folder)
@@ -195,16 +211,16 @@ def mount_line(scanner: Scanner, assembly: Assembly, folder: Path) -> str:
     changes = float(np.linalg.norm(found - stays, axis=1).max())
     load = carried(scanner, assembly, bodies)
     own = sum(mount_sag(assembly.mesh(BASE_MOUNT), deck, mounted, load, *material))
-    off = float(np.linalg.norm(own - stays))
-    return (
-        f"mount turns {_deg(bend)} deg in every position, off by {off / bend:.0%}, "
-        f"{off / (LEAST_ERROR * np.linalg.norm(own)):.2f} of the stated error, and {_deg(changes)} deg over a turn "
-        f"({len(body.nodes)} nodes)"
+    stated = float(LEAST_ERROR * np.linalg.norm(own))
+    return Compared(bend, float(np.linalg.norm(own - stays)), stated, changes, len(body.nodes))
+
+
+def _line(what: str, found: Compared) -> str:
+    said = (
+        f"{what} turns {math.degrees(found.bend):.4f} deg, off by {found.off / found.bend:.0%}, "
+        f"{found.off / found.stated:.2f} of the stated error ({found.nodes} nodes)"
     )
-
-
-def _deg(angle: float) -> str:
-    return f"{math.degrees(angle):.4f}"
+    return f"{said}, and {math.degrees(found.changes):.4f} deg over a turn" if found.changes else said
 
 
 def _run(words: list[str], folder: Path) -> None:
@@ -218,10 +234,13 @@ def main() -> None:
     for out in map(Path, sys.argv[1:]):
         scanner = load_task(out / "task.toml").scanner(load_angles(out / "angles.json"))
         assembly = make_parts(scanner)
-        for part, line in ((ALIGNMENT_LINKAGE, linkage_line), (BASE_MOUNT, mount_line)):
+        for part, what, compared in (
+            (ALIGNMENT_LINKAGE, "linkage", linkage_compared),
+            (BASE_MOUNT, "mount", mount_compared),
+        ):
             if part in assembly.made:
                 with tempfile.TemporaryDirectory() as folder:
-                    print(f"{out.name}: {line(scanner, assembly, Path(folder))}", flush=True)
+                    print(f"{out.name}: {_line(what, compared(scanner, assembly, Path(folder)))}", flush=True)
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ def main(count: int = 300, *products: str) -> None:
     passed: Counter[Products] = Counter()
     refused: Counter[Products] = Counter()
     with suppress(KeyboardInterrupt):
-        for number, scanner in enumerate(_scanners(combinations, count)):
+        for number, scanner in enumerate(scanners_of(combinations, count)):
             which, start = combinations[number % len(combinations)], time.process_time()
             setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
             try:
@@ -110,7 +110,7 @@ def main(count: int = 300, *products: str) -> None:
         print(f"  {name:<22} of {len(found):<3} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
 
 
-def _scanners(combinations: tuple[Products, ...], count: int) -> Iterator[Scanner]:
+def scanners_of(combinations: tuple[Products, ...], count: int) -> Iterator[Scanner]:
     """One of each setting, with the combinations in turn."""
     catalogue = load_catalogue()
     lasers = np.random.default_rng(1).uniform(-90, 90, (300, 2))

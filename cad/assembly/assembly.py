@@ -12,6 +12,7 @@ from cad.geometry.inertia import Inertial, of_solid
 from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import PrintPose, print_pose
 from cad.layout.cables.leads import RotorLead
+from cad.layout.cables.standing import StandingLead
 from cad.layout.layout import Layout
 from cad.parts.part_spec import Colour, PartSpec
 
@@ -27,6 +28,7 @@ class Assembly:
         made: parts of this project.
         bought: bodies of bought products.
         leads: between lidar and ring, as they were laid out.
+        standing: cables between devices and deck, likewise.
     """
 
     layout: Layout
@@ -35,6 +37,7 @@ class Assembly:
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
     leads: tuple[RotorLead, ...] = ()
+    standing: tuple[StandingLead, ...] = ()
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
     _inertials: dict[str, Inertial] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -15,11 +15,12 @@ import cadquery as cq
 
 from cad import solids
 from cad.assembly import bought_shapes as draw
-from cad.assembly.tube import LEAD_CHORDS, lead_solid
+from cad.assembly.tube import LEAD_CHORDS, lead_solid, standing_solid
 from cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from cad.layout import names
 from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.leads import RotorLead
+from cad.layout.cables.standing import StandingLead
 from cad.layout.direct.stack import DirectStack
 from cad.layout.layout import Layout
 from cad.layout.modules.homing_flag import HomingBracket, bracket_of
@@ -67,11 +68,11 @@ class BodySpec:
         return self.frame != "servo"
 
 
-def bought_of(layout: Layout, leads: Sequence[RotorLead] = ()) -> list[BodySpec]:
-    """The bodies of everything that one scanner is bought with, and of the leads that join lidar and ring."""
+def bought_of(layout: Layout, leads: Sequence[RotorLead] = (), standing: Sequence[StandingLead] = ()) -> list[BodySpec]:
+    """The bodies of everything that one scanner is bought with, of the leads on the rotor, and of the other cables."""
     stack = layout.stack
     drive = _of_belt(stack) if isinstance(stack, BeltStack) else _of_direct(layout, stack)
-    return [*drive, *_of_lidar(layout), *_of_leads(leads)]
+    return [*drive, *_of_lidar(layout), *_of_leads(leads), *_of_standing(standing)]
 
 
 def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
@@ -162,6 +163,20 @@ def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
                 frame="rot",
                 colour=LEAD,
                 make=partial(lead_solid, lead),
+                chords=LEAD_CHORDS,
+            )
+
+
+def _of_standing(leads: Sequence[StandingLead]) -> Iterator[BodySpec]:
+    """Those that have a way."""
+    for lead in leads:
+        if lead.path is not None:
+            yield BodySpec(
+                name=lead.name,
+                product=names.STANDING_LEADS,
+                frame="servo",
+                colour=LEAD,
+                make=partial(standing_solid, lead),
                 chords=LEAD_CHORDS,
             )
 

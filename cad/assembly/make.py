@@ -10,6 +10,7 @@ from cad.assembly.beds import refuse_what_no_bed_holds
 from cad.assembly.bought import BodySpec, bought_of
 from cad.assembly.masses import rotor_moment
 from cad.layout.cables.leads import leads_of
+from cad.layout.cables.standing import standing_leads_of
 from cad.layout.layout import layout_of
 from cad.layout.names import COUNTERWEIGHT
 from cad.parts.all_parts import parts_of
@@ -30,12 +31,12 @@ def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
     """
     layout = layout_of(scanner)
     parts = {spec.name: spec for spec in parts_of(layout)}
-    leads = leads_of(layout)
-    bodies = {spec.name: spec for spec in bought_of(layout, leads)}
+    leads, standing = leads_of(layout), standing_leads_of(layout)
+    bodies = {spec.name: spec for spec in bought_of(layout, leads, standing)}
     last = parts.pop(COUNTERWEIGHT, None)
     made = {name: spec.make() for name, spec in parts.items() if wanted(spec)}
     bought = {name: spec.make() for name, spec in bodies.items() if wanted(spec)}
-    assembly = Assembly(layout, parts, bodies, made, bought, leads)
+    assembly = Assembly(layout, parts, bodies, made, bought, leads, standing)
     refuse_what_no_bed_holds(assembly)
     return assembly if last is None or not wanted(last) else _balanced(assembly)
 

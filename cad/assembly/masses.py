@@ -25,6 +25,7 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     lidar, masses = scanner.lidar, assembly.layout.drive.masses
     standing = [assembly.inertial(name) for name in assembly.standing_parts()]
     standing += [_share(mass, 1 - mass.turning) for mass in masses]
+    standing += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.standing if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
     turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.leads if lead.path]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from cad.assembly.assembly import Assembly
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import RotorLead
-from cad.layout.cables.words import leads_words
+from cad.layout.cables.words import leads_words, standing_words
 from cad.layout.joints import screws
-from cad.layout.layout import Layout
 from cad.layout.names import (
     BEARING_TOWER,
     DECK,
@@ -20,6 +16,7 @@ from cad.layout.names import (
     SERVO,
     SERVO_CASE,
     SLIP_RING_ADAPTER,
+    STANDING_LEADS,
 )
 from cad.parts.part_spec import Step
 
@@ -44,6 +41,8 @@ RING_STEP = Step(
 )
 LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
+STANDING_TITLE = "Cables to the deck"
+STANDING_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on one is not felt at its plug"
 CAPSULE_STEP = Step(
     "Capsule into the tower",
     "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
@@ -54,16 +53,18 @@ CAPSULE_STEP = Step(
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
     """Part or product that a step puts in, and the step."""
-    steps = {name: assembly.parts[name].step for name in assembly.made} | _of_bought(assembly.layout, assembly.leads)
+    steps = {name: assembly.parts[name].step for name in assembly.made} | _of_bought(assembly)
     return sorted(steps.items(), key=lambda item: assembly.layout.drive.built.index(item[0]))
 
 
-def _of_bought(layout: Layout, leads: Sequence[RotorLead]) -> dict[str, Step]:
-    steps = {LIDAR: LIDAR_STEP}
+def _of_bought(assembly: Assembly) -> dict[str, Step]:
+    layout, leads, steps = assembly.layout, assembly.leads, {LIDAR: LIDAR_STEP}
     if layout.scanner.slip_ring is not None:
         steps[RING] = CAPSULE_STEP if isinstance(layout.stack, BeltStack) else RING_STEP
     if any(lead.path is not None for lead in leads):
         steps[ROTOR_LEADS] = Step(LEADS_TITLE, leads_words(layout, leads), LEADS_CHECK)
+    if any(lead.path is not None for lead in assembly.standing):
+        steps[STANDING_LEADS] = Step(STANDING_TITLE, standing_words(layout, assembly.standing), STANDING_CHECK)
     if layout.deck.flat:
         steps[DECK] = ON_DECK
     return steps

@@ -9,6 +9,7 @@ from cad import solids
 from cad.geometry.mesh import mesh_of
 from cad.layout.cables.leads import JOINT, JOINT_WALL, RotorLead
 from cad.layout.cables.path import Path, PathPiece
+from cad.layout.cables.standing import StandingLead
 from cad.layout.names import ROTOR_LEAD
 from cad.solids import building
 from design.errors import BuildError
@@ -30,9 +31,23 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
             along = (joint.end - joint.start) / joint.length
             start = joint.middle - JOINT / 2 * along
             tube = tube.fuse(solids.cylinder(lead.diameter / 2 + JOINT_WALL, start, along, JOINT))
-        solid = checked(tube)
-        if not mesh_of(solid, *LEAD_CHORDS).is_closed():
-            raise BuildError(f"{ROTOR_LEAD}: mesh: tolerance = {LEAD_CHORDS[0]} mm: the surface is not closed")
+        return _closed(ROTOR_LEAD, checked(tube))
+
+
+def standing_solid(lead: StandingLead) -> cq.Solid:
+    """A cable that stands still.
+
+    Raises:
+        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
+    """
+    assert lead.path is not None
+    with building(lead.name, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
+        return _closed(lead.name, checked(_tube(lead.path, lead.diameter / 2)))
+
+
+def _closed(name: str, solid: cq.Solid) -> cq.Solid:
+    if not mesh_of(solid, *LEAD_CHORDS).is_closed():
+        raise BuildError(f"{name}: mesh: tolerance = {LEAD_CHORDS[0]} mm: the surface is not closed")
     return solid
 
 

@@ -1,4 +1,4 @@
-"""The leads between lidar and ring: that each has a way, keeps its bend radius, has room for its joint, is tied. mm.
+"""The leads on the rotor and the cables to the deck: that each has a way, keeps its bend radius, is tied. mm.
 
 What they touch, and the beams that they hide, is checked with all other bodies: they are bodies of the assembly.
 """
@@ -10,6 +10,25 @@ from cad.checks.check import Check, at_least, note, tidy
 from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
 from cad.layout.cables.tie_seat import TieSeat
 from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
+
+
+def standing_checks(assembly: Assembly) -> list[Check]:
+    """Bend and length of every cable that stands still."""
+    found = []
+    for lead in assembly.standing:
+        if lead.path is None:
+            what = (
+                f"{lead.name}: from {lead.device} no way to the deck bends by {lead.radius:g} mm or more and clears "
+                f"all parts with {lead.diameter:g} mm: lead it away by hand"
+            )
+            found.append(Check("lead_bend", "warning", None, lead.radius, "mm", lead.name, what))
+            continue
+        length = lead.path.length()
+        found.append(note("lead_length", length, "mm", lead.name, f"from {lead.device} to the edge of foot or deck"))
+        if len(lead.path.corners) > 2:
+            bend = lead.path.least_radius()
+            found.append(at_least("lead_bend", bend, lead.radius, "mm", lead.name, "least bend radius of its middle"))
+    return found
 
 
 def lead_checks(assembly: Assembly) -> list[Check]:

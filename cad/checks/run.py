@@ -20,7 +20,7 @@ from cad.checks.mount import mount_checks
 from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
-from cad.checks.rotor_leads import lead_checks
+from cad.checks.rotor_leads import lead_checks, standing_checks
 from design.catalogue.products import SlotSwitch
 from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
@@ -74,6 +74,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *retention_checks(scanner, assembly),
         *electric_checks(scanner, layout.drive.switch),
         *lead_checks(assembly),
+        *standing_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),

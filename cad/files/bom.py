@@ -203,8 +203,8 @@ def _wiring(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomI
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
-        ties = 2 * len(scanner.lidar.cable_y_mm)
-        note = "at the tongues of hub and plate, and to spare; price unknown"
+        ties = 2 + len(scanner.lidar.cable_y_mm)
+        note = "hub, plate and foot of the mount; price unknown"
         yield BomItem("wiring", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
 
 

@@ -17,7 +17,7 @@ from cad.assembly.assembly import Assembly
 from cad.files.glb import Node, glb_bytes, shaded
 from cad.geometry.mesh import TriMesh
 from cad.layout.balance.counterweight import Counterweight
-from cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, ROTOR_LEADS
+from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, LIDAR, ROTOR_LEADS, STANDING_LEADS
 from design.arrays import Array
 from design.scanner import Scanner
 
@@ -99,6 +99,8 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
     lifts |= {product: -GAP_MM * normal for product in along if along[product] == "deck"}
     if ROTOR_LEADS in points:  # they stay where they run, at the linkage
         lifts[ROTOR_LEADS] = lifts[ALIGNMENT_LINKAGE]
+    if STANDING_LEADS in points:  # likewise, at the mount or the deck
+        lifts[STANDING_LEADS] = lifts.get(BASE_MOUNT, np.zeros(3))
     top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
     bar = assembly.layout.counterweight
     for product in (product for product in along if along[product] == "radius"):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cad import outlines
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.envelope import rotor_radius
 from cad.layout.hub import Hub
@@ -34,6 +35,7 @@ RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
 RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
 USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
 PAD_HALF = 26.0  # of the strut on the foot
+STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
 FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
 FREE = 5.0  # above the foot, for everything that is not the mount
@@ -100,6 +102,21 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         tripod=tripod,
         foot=_foot(pattern, screw),
     )
+
+
+def strut_corners(deck: Deck) -> Array:
+    """Of back plate and a pad in the foot: the strut is what of their hull is behind the back plate, shape (n, 3).
+
+    No facet coincides with plate or foot.
+    """
+    x, y = deck.back_half
+    _, cy, cz = deck.back_centre
+    plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
+    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
+    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
+    for z in (0.8, FOOT_THICKNESS - 0.9):
+        layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
+    return np.concatenate(layers)
 
 
 def rail_wall(printer: Printer) -> float:

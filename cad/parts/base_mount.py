@@ -3,8 +3,8 @@
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm; the deck is that of `cad/layout/deck.py`. Two
 rails with feet take the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut
 that stays wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's
-holes: four M4 on 80 x 80 mm unless the task names others. Screws: first the case from behind through the strut, then
-the foot on the deck.
+holes: four M4 on 80 x 80 mm unless the task names others. Slots at the sides of the foot take the ties of cables.
+Screws: first the case from behind through the strut, then the foot on the deck.
 """
 
 from __future__ import annotations
@@ -12,24 +12,26 @@ from __future__ import annotations
 from functools import partial
 
 import cadquery as cq
-import numpy as np
 
 from cad import outlines, solids
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.ties import foot_ties_of
 from cad.layout.deck import (
     BACK_THICKNESS,
     FOOT_THICKNESS,
-    PAD_HALF,
     PLUG_GAP,
     RAIL_INSET,
+    STRUT_BEHIND,
     UNDER_MOUNT_HEAD,
     Deck,
     rail_wall,
+    strut_corners,
 )
 from cad.layout.drive import Mounted
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
 from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
+from cad.parts.linkage_hub import tie_slots
 from cad.parts.part_spec import PartSpec, Step
 from cad.screws import passing_hole
 from cad.solids import building
@@ -54,7 +56,8 @@ def mount_spec(layout: Layout) -> PartSpec | None:
     step = Step(
         "Servo into the mount",
         f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
-        f"Connect the servo's cable now. {screws(DECK)}",
+        "Connect the servo's cable now, and lay a cable tie into the slots of the foot where it leaves. "
+        f"{screws(DECK)}",
         check="the case does not rock on its four feet, nor the mount on the deck",
         brings=(SERVO,),
     )
@@ -62,7 +65,7 @@ def mount_spec(layout: Layout) -> PartSpec | None:
         step = Step(
             "Tower on the mount",
             "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
-            f"{screws(BEARING_TOWER)} {screws(DECK)}",
+            f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
             check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
         )
     return PartSpec(
@@ -93,12 +96,13 @@ def base_mount(layout: Layout) -> cq.Solid:
         rails = [_rail(deck, mounted, printer, side) for side in (1.0, -1.0)]
         feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
-        cuts = []
+        cuts: list[cq.Shape] = []
         for x, y in mounted.holes:
             cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
             cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
+        cuts += [cut.moved(on_deck) for seat in foot_ties_of(deck) for cut in tie_slots(seat)]
         return checked(body.cut(*cuts).clean())
 
 
@@ -110,15 +114,8 @@ def _back_plate(deck: Deck) -> cq.Solid:
 
 def _strut(deck: Deck) -> cq.Shape:
     """Hull of back plate and a pad in the foot, behind the front of the back plate."""
-    x, y = deck.back_half
-    _, cy, cz = deck.back_centre
-    plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
-    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
-    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
-    for z in (0.8, FOOT_THICKNESS - 0.9):
-        layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
-    whole = solids.hull(np.concatenate(layers))
-    return whole.cut(solids.box((-400.0, -400.0, cz - 0.3), (400.0, 400.0, cz + 400.0)))
+    high = deck.back_centre[2] - STRUT_BEHIND
+    return solids.hull(strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
 
 
 def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Solid:

@@ -59,8 +59,8 @@ def tie_slots(seat: TieSeat) -> list[cq.Shape]:
     ]
     if seat.grooved:
         out = seat.half + SLOT_ACROSS
-        low = (seat.first, seat.aside - out, seat.high - GROOVE)
-        cuts.append(solids.box(low, (seat.last, seat.aside + out, seat.high + beyond)))
+        z = (seat.low - beyond, seat.low + GROOVE) if seat.below else (seat.high - GROOVE, seat.high + beyond)
+        cuts.append(solids.box((seat.first, seat.aside - out, z[0]), (seat.last, seat.aside + out, z[1])))
     return [cut.moved(solids.about_axis(seat.azimuth)) for cut in cuts]
 
 

@@ -179,6 +179,14 @@ class Servo(Product):
         description="vendor:product of the adapters between it and a computer; shapes no part",
     )
 
+    cable_exit_mm: Triple | None = Field(
+        default=None, exclude=True, description="where its cable leaves the case; shapes no part"
+    )
+    cable_out: Triple | None = Field(default=None, exclude=True, description="unit vector, likewise; shapes no part")
+    cable_diameter_mm: float | None = Field(default=None, gt=0, exclude=True, description="shapes no part")
+    cable_bend_radius_mm: float | None = Field(
+        default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
+    )
     adapter: str | None = Field(default=None, exclude=True, description="between its bus and a computer")
     adapter_usd: float | None = Field(default=None, gt=0, exclude=True, description="price of the adapter")
     cable: str | None = Field(default=None, exclude=True, description="between the adapter and the servo")
@@ -224,6 +232,9 @@ class SlipRing(Product):
     )
     lead_bend_radius_mm: float | None = Field(
         default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
+    )
+    stator_exit: Literal["side", "end"] | None = Field(
+        default=None, exclude=True, description="where the stator's leads leave, at its lower end; shapes no part"
     )
     price_usd: float | None = Field(default=None, gt=0)
     # left out of the record where there is none, so that a ring with a bore keeps its digest

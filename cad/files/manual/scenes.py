@@ -15,7 +15,7 @@ from cad.assembly.assembly import Assembly
 from cad.assembly.steps import steps_of
 from cad.layout.balance.counterweight import Counterweight
 from cad.layout.joints import ALL_SCREWS, Joint, screws
-from cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS
+from cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS, STANDING_LEADS
 from cad.parts.part_spec import Step
 from design.arrays import Rotation, Vector
 
@@ -128,7 +128,7 @@ def _way(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tu
     """From where it comes: as the exploded view lifts it, from below where all that stands is above it."""
     lifted = "lidar" if thing == LIDAR else assembly.parts[thing].lifted if thing in assembly.parts else "axis"
     R = assembly.layout.stack.R()
-    if thing == ROTOR_LEADS:
+    if thing in (ROTOR_LEADS, STANDING_LEADS):
         return np.zeros(3), np.eye(3)
     if lifted == "lidar":
         return R[:, 2], R

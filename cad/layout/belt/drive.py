@@ -23,6 +23,7 @@ BUILT = (
     names.DRIVE_PULLEY,
     names.BASE_MOUNT,
     names.TRIPOD_FOOT,
+    names.STANDING_LEADS,
     names.LIDAR,
     names.SUB_PLATE,
     names.COUNTERWEIGHT,

@@ -18,7 +18,7 @@ from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import RotorRoom, room_of
 from cad.layout.cables.tie_seat import TieSeat
-from cad.layout.cables.way import Ending, short_way
+from cad.layout.cables.way import Ending, lattice_about_axis, short_way
 from cad.layout.direct.loads import JOURNAL_WALL
 from cad.layout.direct.stack import DirectStack
 from cad.layout.layout import Layout
@@ -108,7 +108,8 @@ def _laid(layout: Layout, ring: SlipRing, order: Sequence[int], places: Sequence
         for within, (seat, exits) in ways:
             starts = [Ending(np.array(corners), out, OUT, radius, 0.0) for corners, out in exits]
             starts = [_from_hub(start, hub, half, seat) for start in starts if room.beside_others(start.corners).all()]
-            path = short_way(within, starts, outlet, half, radius, hub)
+            lattice = lattice_about_axis(room.floor, half, hub, [*starts, outlet])
+            path = short_way(within, starts, [outlet], half, radius, lattice)
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, radius, path)

@@ -114,7 +114,7 @@ def room_of(layout: Layout) -> RotorRoom:
     envelope = envelope_of(layout.scanner.lidar, stack.sub_plate)
     boxes = [envelope.body, envelope.plate, envelope.under]
     corners = [box_corners(box) @ R.T for box in (*boxes, *_stubs(layout.scanner.lidar))]
-    corners.append(_hub(stack.hub_radius, stack.shoulder, -stack.h))
+    corners.append(around_axis(stack.hub_radius, stack.shoulder, -stack.h))
     corners += [tie.corners(tie.inner) @ R.T for tie in p.plate_ties]
     if p.hub_tie is not None:
         corners.append(p.hub_tie.corners(stack.hub_radius))
@@ -124,7 +124,7 @@ def room_of(layout: Layout) -> RotorRoom:
         corners.extend(_bar(layout.counterweight))
     bearings = layout.scanner.lidar.bearings_rad()
     return RotorRoom(
-        shapes=(*(_shape(points) for points in corners), _shape(neck_corners(p, 0), carved=True)),
+        shapes=(*(shape_of(points) for points in corners), shape_of(neck_corners(p, 0), carved=True)),
         channels=envelope.cables,
         R_rot_laser=R,
         bearings_rad=(float(bearings.min()), float(bearings.max())),
@@ -135,7 +135,8 @@ def room_of(layout: Layout) -> RotorRoom:
     )
 
 
-def _shape(corners: Array, carved: bool = False) -> Shape:
+def shape_of(corners: Array, carved: bool = False) -> Shape:
+    """The convex hull of corners, shape (n, 3)."""
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
 
@@ -156,7 +157,8 @@ def _stubs(lidar: Lidar) -> list[Box]:
     ]
 
 
-def _hub(radius: float, low: float, high: float) -> Array:
+def around_axis(radius: float, low: float, high: float) -> Array:
+    """Corners around a cylinder about the axis, shape (n, 3)."""
     turn = 2 * math.pi * np.arange(HUB_SIDES) / HUB_SIDES
     around = radius / math.cos(math.pi / HUB_SIDES)
     ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)

@@ -26,7 +26,8 @@ class TieSeat:
         low: its lower face.
         high: its upper face.
         half: of the room between the slots.
-        grooved: whether a groove of its upper face takes the tie.
+        grooved: whether a groove takes the tie: of its upper face, or of the lower one where `below`.
+        below: see `grooved`.
     """
 
     azimuth: float
@@ -37,6 +38,7 @@ class TieSeat:
     high: float
     half: float
     grooved: bool = False
+    below: bool = False
 
     @property
     def last(self) -> float:

@@ -1,7 +1,7 @@
-"""Where the leads on the rotor are tied to the linkage, so that a pull on one ends there.
+"""Where leads are tied to the parts, so that a pull on one ends there.
 
 The hub has a tongue over the way out of the ring's leads, rotation frame; the plate one under each cable of the lidar,
-laser frame. Millimetres. No kernel.
+laser frame; the foot of the mount slots at its sides, frame of the deck. Millimetres. No kernel.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy as np
 
 from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.tie_seat import SLOT_ACROSS, TieSeat
+from cad.layout.cables.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
+from cad.layout.deck import FOOT_THICKNESS, PAD_HALF, Deck
 from cad.layout.envelope import PLATE_THICKNESS
 from cad.layout.linkage import AlignmentLinkage, neck_corners
 from cad.layout.names import HUB_TIE, PLATE_TIE
@@ -35,6 +36,8 @@ GAP = 0.5
 BEAM = 4.0  # around the scan plane: a tongue may stand before the window beside its beams
 STEP = 1.5  # of the points that stand for a tongue
 PLATE_LOW = 5.0  # thickness of a tongue of the plate
+FOOT_ROOM = 5.5  # half of the room between the slots of the foot: two leads lie side by side
+FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 
 
 def plate_ties_of(lidar: Lidar, p: AlignmentLinkage) -> tuple[TieSeat, ...] | LeftOut:
@@ -63,6 +66,33 @@ def plate_ties_of(lidar: Lidar, p: AlignmentLinkage) -> tuple[TieSeat, ...] | Le
         if in_hull(tie, neck, GAP).any():
             return _without(PLATE_TIE, "the neck lies under the place where it would be")
     return seats
+
+
+def foot_ties_of(deck: Deck) -> tuple[TieSeat, ...]:
+    """At the middle of each side of the foot, frame of the deck, but where a screw is; the groove is below."""
+    if deck.flat:
+        return ()
+    x, y, _ = deck.foot
+    seats = [
+        TieSeat(
+            azimuth=turn * math.pi / 2,
+            inner=PAD_HALF,
+            first=half - SLOT_WALL - SLOT_ALONG,
+            low=0.0,
+            high=FOOT_THICKNESS,
+            half=FOOT_ROOM,
+            grooved=True,
+            below=True,
+        )
+        for turn, half in enumerate((x, y, x, y))
+    ]
+    return tuple(seat for seat in seats if seat.first > PAD_HALF + 1.0 and not _near_screw(seat, deck))
+
+
+def _near_screw(seat: TieSeat, deck: Deck) -> bool:
+    across = np.linspace(-1.0, 1.0, 9) * (seat.half + SLOT_ACROSS)
+    slots = seat.points(np.array([seat.first, seat.last]), across, np.zeros(1))[:, None, :2]
+    return bool((np.linalg.norm(slots - np.array(deck.deck_holes), axis=2) < FROM_DECK_SCREW).any())
 
 
 def hub_tie_of(scanner: Scanner, p: AlignmentLinkage) -> TieSeat | LeftOut:

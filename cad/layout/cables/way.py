@@ -11,13 +11,13 @@ import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cad.layout.cables.path import Path
-from cad.layout.cables.room import RotorRoom
-from design.arrays import Array
+from design.arrays import Array, Mask
 
 SAMPLE = 3.0  # mm between two points that are looked at
 AZIMUTHS = 24
@@ -30,6 +30,16 @@ ARRIVALS = 6  # at a point from which one goes on: no way of 28 was lost or long
 SHARPEST = math.radians(125.0)
 GAP = 0.6  # between a lead and what it passes
 ROUNDING = 0.3  # more along the straight pieces
+
+
+class Room(Protocol):
+    """What a lead must stay clear of."""
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        ...
+
+
 Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and the length that an arc may take of it
 
 
@@ -57,50 +67,50 @@ class Ending:
 
 
 def short_way(
-    room: RotorRoom, starts: Sequence[Ending], goal: Ending, half: float, radius: float, hub: float
+    room: Room, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
-    """A short path from one of some ends to the goal, within GREED of the shortest; None where there is none.
+    """A short path from one of some ends to one of others, within GREED of the shortest; None where there is none.
 
     Args:
         room: that it runs through.
-        starts: ends at the ring; any of them will do.
-        goal: the end at the lidar.
+        starts: ends at the one device; any of them will do.
+        goals: ends at the other one, likewise.
         half: radius of the lead.
         radius: that it may be bent to.
-        hub: radius of the hub.
+        lattice: points that it may turn at, shape (n, 3).
     """
-    ends = [(start, tip) for start in starts for tip in range(len(start.lengths))]
-    ends = [(start, tip) for start, tip in ends if _clear(room, start, tip, half)]
-    goals = [tip for tip in range(len(goal.lengths)) if _clear(room, goal, tip, half)]
-    if not ends or not goals:
+    first, last = ([pair for end in ends for pair in _tips(room, end, half)] for ends in (starts, goals))
+    if not first or not last:
         return None
-    first, last = np.array([start.tips()[tip] for start, tip in ends]), goal.tips()[goals]
-    lattice = _lattice(room.floor + half + GAP + ROUNDING, hub, np.concatenate([first, last]))
     lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
-    graph = WayGraph(room, half, radius, np.concatenate([first, lattice, last]))
-    chain = graph.chain(
-        {i: (start.direction, start.lengths[tip] - start.used) for i, (start, tip) in enumerate(ends)},
-        {
-            i: (-goal.direction, goal.lengths[tip] - goal.used)
-            for i, tip in enumerate(goals, start=len(first) + len(lattice))
-        },
+    points = np.concatenate([[end.tips()[tip] for end, tip in first], lattice, [end.tips()[tip] for end, tip in last]])
+    beyond = len(first) + len(lattice)
+    chain = WayGraph(room, half, radius, points).chain(
+        {i: (end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(first)},
+        {i: (-end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(last, start=beyond)},
     )
     if not chain:
         return None
-    corners = np.concatenate([ends[chain[0]][0].corners, graph.points[chain], goal.corners[::-1]])
+    start, goal = first[chain[0]][0], last[chain[-1] - beyond][0]
+    corners = np.concatenate([start.corners, points[chain], goal.corners[::-1]])
     return Path(tuple((float(x), float(y), float(z)) for x, y, z in corners), radius)
 
 
-def _lattice(low: float, hub: float, ends: Array) -> Array:
-    """Points about the axis, from beside the hub to beyond the ends, shape (n, 3)."""
+def _tips(room: Room, end: Ending, half: float) -> list[tuple[Ending, int]]:
+    return [(end, tip) for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
+
+
+def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[Ending]) -> Array:
+    """Points about the axis, from beside a hub to beyond some ends, above a floor, shape (n, 3)."""
+    low, tips = floor + half + GAP + ROUNDING, np.concatenate([end.tips() for end in ends])
     turn = 2 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    radius = np.arange(hub + FROM_HUB, float(np.hypot(ends[:, 0], ends[:, 1]).max()) + BEYOND, STEP)
-    height = np.arange(low + 0.5, float(ends[:, 2].max()) + BEYOND, STEP)
+    radius = np.arange(hub + FROM_HUB, float(np.hypot(tips[:, 0], tips[:, 1]).max()) + BEYOND, STEP)
+    height = np.arange(low + 0.5, float(tips[:, 2].max()) + BEYOND, STEP)
     t, r, z = (a.ravel() for a in np.meshgrid(turn, radius, height, indexing="ij"))
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def _clear(room: RotorRoom, end: Ending, tip: int, half: float) -> bool:
+def _clear(room: Room, end: Ending, tip: int, half: float) -> bool:
     """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
     first, last = min(end.held, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
@@ -118,7 +128,7 @@ class WayGraph:
         points: first those at the ring, last those at the lidar.
     """
 
-    room: RotorRoom
+    room: Room
     half: float
     radius: float
     points: Array

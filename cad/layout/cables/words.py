@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from cad.layout.belt.stack import BeltStack
 from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
+from cad.layout.cables.standing import StandingLead
 from cad.layout.layout import Layout
 
 SPARE = 15.0  # mm more than its way, so that a joint can be made once again
@@ -68,3 +69,24 @@ def _one(layout: Layout, lead: RotorLead) -> str:
         f"90 at the index), is {lead.path.length():.0f} mm long to the jacket{where}, and is bent by no less than "
         f"{lead.radius:g} mm; cut it {lead.path.length() + SPARE:.0f} mm long."
     )
+
+
+def standing_words(layout: Layout, leads: Sequence[StandingLead]) -> str:
+    """The words of the step of what stands still."""
+    said = []
+    for lead in leads:
+        what = f"The {lead.name.replace('_', ' ')} of {lead.device}"
+        if lead.path is None:
+            said.append(f"For the {lead.name.replace('_', ' ')} no way was found: see `lead_bend` in `checks.json`.")
+        elif layout.deck.flat and len(lead.path.corners) == 2:
+            x, y, _ = lead.path.corners[0]
+            said.append(f"{what} leaves into the deck: drill a hole for its plug at ({x:g}, {y:g}) mm from the axis.")
+        else:
+            ends = "beside the case" if layout.deck.flat else "over the edge of the mount's foot"
+            bent = f"{lead.path.length():.0f} mm to there, bent by no less than {lead.radius:g} mm"
+            runs, stops = ("run", "end") if lead.name.endswith("s") else ("runs", "ends")
+            said.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
+    if not layout.deck.flat:
+        said.append("Close the cable tie in the two slots of the foot around what lies there: a pull ends there.")
+    said.append("Nobody draws where they leave their devices: if yours leave elsewhere, keep the bends and the ties.")
+    return " ".join(said)

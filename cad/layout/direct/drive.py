@@ -31,6 +31,7 @@ BUILT = (
     names.BEARING_CAGE,
     names.RING_COVER,
     names.HOMING_BRACKET,
+    names.STANDING_LEADS,
     names.LIDAR,
     names.SUB_PLATE,
     names.COUNTERWEIGHT,

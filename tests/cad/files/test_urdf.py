@@ -10,6 +10,7 @@ from cad.files.part_files import build_parts
 from cad.files.urdf import urdf_text
 from cad.geometry.inertia import Inertial
 from cad.layout.cables.leads import leads_of
+from cad.layout.cables.standing import standing_leads_of
 from cad.layout.layout import drive_of, layout_of, mount_offset_mm
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
@@ -88,6 +89,7 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(made):
     turning += own.get("journal_sleeve", 0.0)
     turning += sum(lead.mass_g for lead in leads_of(layout_of(made.scanner))) / 1000
     standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
+    standing += sum(lead.mass_g for lead in standing_leads_of(layout_of(made.scanner))) / 1000
     assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
     assert mass["servo"] == pytest.approx(standing + 0.126, abs=5e-4)
     assert mass["laser"] == pytest.approx(0.370)

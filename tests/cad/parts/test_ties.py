@@ -8,7 +8,9 @@ from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 from cad.checks.remarks import left_out_of
 from cad.layout.cables.leads import tied_mm
 from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
-from cad.layout.names import ALIGNMENT_LINKAGE, HUB_TIE
+from cad.layout.cables.ties import foot_ties_of
+from cad.layout.deck import FOOT_THICKNESS
+from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, HUB_TIE
 
 TIE = (2.5, 1.1)  # width and thickness
 
@@ -18,8 +20,8 @@ def tied(request, parts_of):
     return parts_of(scanner_at(request.param))
 
 
-def filled(assembly, points):
-    solid = assembly.made[ALIGNMENT_LINKAGE]
+def filled(assembly, points, part=ALIGNMENT_LINKAGE):
+    solid = assembly.made[part]
     return np.array([solid.isInside(cq.Vector(*point)) for point in points.tolist()])
 
 
@@ -48,6 +50,20 @@ def test_a_tie_goes_around_every_tongue(tied):
             np.array([seat.first + 0.2, seat.last]), across, np.array([seat.low + 0.2, seat.low + 1.5])
         )
         assert filled(tied, inside @ turn).all()
+
+
+def test_a_tie_goes_through_the_foot_and_below_it(parts_of):
+    assembly = parts_of(scanner_at(GROUND_AHEAD))
+    deck, seats = assembly.layout.deck, foot_ties_of(assembly.layout.deck)
+    assert len(seats) == 4
+    for seat in seats:
+        middle = np.array([(seat.first + seat.last) / 2])
+        across = np.linspace(0.0, seat.half + SLOT_ACROSS / 2, 8)
+        groove = seat.points(middle, np.concatenate([-across, across]), np.array([0.1, TIE[1]]))
+        sides = (seat.half + SLOT_ACROSS / 2) * np.array([-1.0, 1.0])
+        slots = seat.points(middle, sides, np.linspace(0.0, FOOT_THICKNESS + 1.0, 8))
+        tie = np.concatenate([groove, slots]) @ deck.rotation().T + np.array(deck.centre)
+        assert not filled(assembly, tie, BASE_MOUNT).any()
 
 
 def test_the_leads_leave_the_ring_under_the_tongue_near_enough_to_be_pulled_up(tied):

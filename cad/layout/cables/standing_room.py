@@ -1,0 +1,126 @@
+"""Where a cable may run that stands still: beside servo, ring and mount, over the deck, below all that turns.
+
+Rotation frame at gamma = 0, mm. Parts are taken for boxes, cylinders and hulls around them, as those of the rotor are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cad import outlines
+from cad.layout.belt.stack import FOOT, FOOT_HALF, PLATE, SHELF, BeltStack, case_corners, drive_corners
+from cad.layout.cables.room import Shape, around_axis, shape_of
+from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PLUG_GAP, RAIL_INSET, STRUT_BEHIND, Deck, strut_corners
+from cad.layout.direct import adapter
+from cad.layout.direct.cage import SEAT_GAP, plate_half_x
+from cad.layout.direct.stack import DirectStack
+from cad.layout.envelope import box_corners
+from cad.layout.layout import Layout
+from cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from cad.screws import SCREWS
+from design.arrays import Array, Mask
+
+RAIL_HALF = 5.0  # of the mount's rails, at most
+
+
+@dataclass(frozen=True, slots=True)
+class StandingRoom:
+    """What a cable that stands still must stay clear of.
+
+    Attributes:
+        shapes: convex shapes.
+        ceiling: height below all that turns.
+        deck: that it lies on.
+        others: middles of cables that run already, shape (n, 3), and the largest radius of one.
+    """
+
+    shapes: tuple[Shape, ...]
+    ceiling: float
+    deck: Deck
+    others: tuple[Array, float]
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        room = half + gap
+        over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
+        clear = (points[:, 2] < self.ceiling - room) & (over_deck > half)
+        for shape in self.shapes:
+            near = np.flatnonzero(clear)
+            near = near[np.linalg.norm(points[near] - shape.middle, axis=1) < shape.reach + room]
+            clear[near] = (points[near] @ shape.planes[:, :3].T + shape.planes[:, 3]).max(axis=1) > room
+        middles, radius = self.others
+        nearest = np.linalg.norm(points[:, None] - middles, axis=2).min(axis=1, initial=np.inf)
+        return np.asarray(clear & (nearest > radius + room))
+
+    def beside(self, middles: Array, radius: float) -> StandingRoom:
+        """The room that is left beside a cable."""
+        return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
+
+
+def standing_room_of(layout: Layout) -> StandingRoom:
+    """The room around all that stands still, no cable in it yet."""
+    stack = layout.stack
+    if isinstance(stack, BeltStack):
+        shapes, ceiling = [shape_of(corners) for corners in _belt(stack)], stack.tower_top - SHELF
+    else:
+        shapes = [shape_of(corners) for corners in _direct(layout, stack)]
+        ceiling = stack.ring_top if stack.bearing is None else stack.cage_top
+    if not layout.deck.flat:
+        shapes += _mount(layout)
+    return StandingRoom(tuple(shapes), ceiling, layout.deck, (np.zeros((0, 3)), 0.0))
+
+
+def _direct(layout: Layout, stack: DirectStack) -> Iterator[Array]:
+    """Case, ring, and what stands on the case around it."""
+    servo = layout.scanner.servo
+    (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
+    front = stack.horn + z1 + SEAT_GAP
+    yield box_corners(((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1)))
+    if stack.bearing is not None:
+        yield around_axis(stack.cage_outer, front, stack.cage_top)
+        wide = plate_half_x(servo, SCREWS[servo.case_screw])
+        yield box_corners(((-wide, y0, front), (wide, 0.0, stack.ring_bottom)))
+    elif stack.ring_length > 0:
+        outer = max(stack.ring_radius + adapter.PLAY + adapter.ARM, plate_half_x(servo, SCREWS[servo.case_screw]))
+        yield around_axis(stack.ring_radius, stack.ring_bottom, stack.ring_top)
+        yield box_corners(((-outer, -adapter.ARM_HALF_WIDTH, front), (outer, adapter.ARM_HALF_WIDTH, stack.ring_top)))
+        yield box_corners(((-outer, y0, front), (outer, adapter.ARM_HALF_WIDTH, front + adapter.PLATE)))
+    bracket = bracket_of(layout.scanner, stack)
+    if isinstance(bracket, HomingBracket):
+        box = box_corners(((bracket.face, -10.0, bracket.low), (bracket.outer, 10.0, bracket.top)))
+        c, s = np.cos(bracket.azimuth), np.sin(bracket.azimuth)
+        yield box @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _belt(stack: BeltStack) -> Iterator[Array]:
+    """Tower with its foot, the servo beside it and its plate."""
+    yield around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top)
+    yield box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, stack.tower_bottom + FOOT)))
+    yield case_corners(stack)
+    corners = drive_corners(stack)
+    low = np.where(np.arange(3) == 2, stack.tower_top - SHELF, corners.min(axis=0))
+    high = np.where(np.arange(3) == 2, stack.tower_top + PLATE, corners.max(axis=0))
+    yield box_corners((tuple(low.tolist()), tuple(high.tolist())))
+
+
+def _mount(layout: Layout) -> list[Shape]:
+    """Back plate, rails, strut and foot; what is under the foot is below the face of the deck."""
+    deck, mounted = layout.deck, layout.drive.mounted
+    (x, y), (_, cy, cz) = deck.back_half, deck.back_centre
+    boxes = [((-x, cy - y, cz - BACK_THICKNESS), (x, cy + y, cz))]
+    for side in (1.0, -1.0):
+        middle, along = side * abs(mounted.holes[0][0]), y - RAIL_INSET
+        boxes.append(((middle - RAIL_HALF, cy - along, cz), (middle + RAIL_HALF, cy + along, cz + PLUG_GAP)))
+    strut = shape_of(strut_corners(deck))
+    front = np.array([[0.0, 0.0, 1.0, STRUT_BEHIND - cz]])
+    outline = outlines.octagon(*deck.foot)
+    layers = [np.column_stack([outline, np.full(8, z)]) for z in (0.0, FOOT_THICKNESS)]
+    foot = np.concatenate(layers) @ deck.rotation().T + np.array(deck.centre)
+    return [
+        *(shape_of(box_corners(box)) for box in boxes),
+        replace(strut, planes=np.concatenate([strut.planes, front])),
+        shape_of(foot),
+    ]

@@ -1,0 +1,77 @@
+"""Cables that stand still: from servo and stator to the edge of foot or deck, clear of what turns, tied to the foot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scanners import CAPSULE, GROUND_AHEAD, scanner_at
+
+from cad.layout.cables.standing import standing_leads_of
+from cad.layout.cables.standing_room import standing_room_of
+from cad.layout.cables.ties import foot_ties_of
+from cad.layout.deck import FOOT_THICKNESS
+from cad.layout.layout import layout_of
+from design.deck_holes import Rectangle
+
+LAID = [
+    (GROUND_AHEAD, {}),  # a cage around the ring
+    ((0, 10, 30, 0), {}),  # arms beside it
+    ((0, 19, 84, 41), {"sensor": "URG-04LX", "slip_ring": CAPSULE}),
+    ((0, 0, 0, 0), {}),  # upright on the deck
+]
+
+
+@pytest.mark.parametrize(("setting", "products"), LAID, ids=["cage", "arms", "belt", "deck"])
+def test_every_cable_leaves_its_device_and_keeps_its_bend(setting, products):
+    layout = layout_of(scanner_at(setting, **products))
+    room = standing_room_of(layout)
+    leads = standing_leads_of(layout)
+    assert [lead.name for lead in leads] == ["servo_cable", "stator_leads"]
+    for lead in leads:
+        points = lead.path.points(1.0)
+        assert lead.path.least_radius() >= lead.radius and lead.mass_g > 0
+        assert points[:, 2].max() < room.ceiling  # below all that turns
+        if layout.deck.flat:
+            continue
+        R, centre = layout.deck.rotation(), np.array(layout.deck.centre)
+        end = (points[-1] - centre) @ R
+        half = np.array(layout.deck.foot[:2])
+        assert (np.abs(end[:2]) > half).any() and abs(end[2] - FOOT_THICKNESS - lead.diameter / 2) < 1.5
+        assert (((points - centre) @ R)[:, 2] > lead.diameter / 2).all()
+    middles = [lead.path.points(1.0) for lead in leads]
+    apart = np.linalg.norm(middles[0][:, None] - middles[1], axis=2).min()
+    assert apart > sum(lead.diameter for lead in leads) / 2
+
+
+def test_on_the_foot_each_lies_between_two_slots():
+    layout = layout_of(scanner_at(GROUND_AHEAD))
+    deck = layout.deck
+    for lead in standing_leads_of(layout):
+        points = (lead.path.points(0.5) - np.array(deck.centre)) @ deck.rotation()
+        inside = []
+        for seat in foot_ties_of(deck):
+            out = seat.direction()
+            along, across = points @ out, points @ [-out[1], out[0], 0.0]
+            over = (along > seat.first) & (along < seat.last) & (points[:, 2] < FOOT_THICKNESS + lead.diameter)
+            inside.append(over.any() and (np.abs(across[over]) + lead.diameter / 2 < seat.half).all())
+        assert inside.count(True) == 1
+
+
+def test_what_the_catalogue_does_not_tell_is_not_laid():
+    layout = layout_of(scanner_at(GROUND_AHEAD))
+    scanner = layout.scanner
+    silent = replace(scanner, servo=scanner.servo.model_copy(update={"cable_out": None}))
+    assert [lead.name for lead in standing_leads_of(replace(layout, scanner=silent))] == ["stator_leads"]
+
+
+def test_a_cable_that_cannot_bend_has_no_way():
+    layout = layout_of(scanner_at(GROUND_AHEAD))
+    stiff = layout.scanner.servo.model_copy(update={"cable_bend_radius_mm": 40.0})
+    (lead, _) = standing_leads_of(replace(layout, scanner=replace(layout.scanner, servo=stiff)))
+    assert lead.path is None and lead.mass_g == 0
+
+
+def test_no_slot_of_the_foot_is_where_a_screw_of_the_deck_is():
+    scanner = replace(scanner_at(GROUND_AHEAD), deck=Rectangle(shape="rectangle", size_mm=(80.0, 20.0), screw="M4"))
+    seats = foot_ties_of(layout_of(scanner).deck)
+    assert {round(np.degrees(seat.azimuth)) % 180 for seat in seats} == {90}
