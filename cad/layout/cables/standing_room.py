@@ -5,6 +5,7 @@ Rotation frame at gamma = 0, mm. Parts are taken for boxes, cylinders and hulls 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -98,7 +99,9 @@ def _direct(layout: Layout, stack: DirectStack) -> Iterator[Array]:
 def _belt(stack: BeltStack) -> Iterator[Array]:
     """Tower with its foot, the servo beside it and its plate."""
     yield around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top)
-    yield box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, stack.tower_bottom + FOOT)))
+    flares = max(0.0, math.sqrt(2) * FOOT_HALF - stack.wide_radius)  # the cone on the foot, at 45 deg
+    foot = stack.tower_bottom + FOOT + flares
+    yield box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, foot)))
     yield case_corners(stack)
     corners = drive_corners(stack)
     low = np.where(np.arange(3) == 2, stack.tower_top - SHELF, corners.min(axis=0))

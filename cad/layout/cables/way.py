@@ -32,7 +32,7 @@ GAP = 0.6  # between a lead and what it passes
 ROUNDING = 0.3  # more along the straight pieces
 
 
-class Room(Protocol):
+class LeadRoom(Protocol):
     """What a lead must stay clear of."""
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
@@ -67,7 +67,7 @@ class Ending:
 
 
 def short_way(
-    room: Room, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
+    room: LeadRoom, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
     """A short path from one of some ends to one of others, within GREED of the shortest; None where there is none.
 
@@ -96,7 +96,7 @@ def short_way(
     return Path(tuple((float(x), float(y), float(z)) for x, y, z in corners), radius)
 
 
-def _tips(room: Room, end: Ending, half: float) -> list[tuple[Ending, int]]:
+def _tips(room: LeadRoom, end: Ending, half: float) -> list[tuple[Ending, int]]:
     return [(end, tip) for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
 
 
@@ -110,7 +110,7 @@ def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[End
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def _clear(room: Room, end: Ending, tip: int, half: float) -> bool:
+def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
     """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
     first, last = min(end.held, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
@@ -128,7 +128,7 @@ class WayGraph:
         points: first those at the ring, last those at the lidar.
     """
 
-    room: Room
+    room: LeadRoom
     half: float
     radius: float
     points: Array
