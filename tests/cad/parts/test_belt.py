@@ -17,7 +17,7 @@ from cad.checks.printing import thin_walls
 from cad.checks.remarks import without_traps
 from cad.checks.run import run_checks
 from cad.drawings.files import drawing_of
-from cad.drawings.write import Words, drawn
+from cad.drawings.write import Words, drawn_on
 from cad.files.bom import items_of
 from cad.files.manual.instructions import instructions_text
 from cad.files.manual.scenes import scenes_of
@@ -339,7 +339,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     sheet = drawing_of("main_shaft", made.scanner, made.assembly, 80.0, "0" * 12)
-    said = [item.text for item in drawn(sheet) if isinstance(item, Words)]
+    said = [item.text for item in drawn_on(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
     threads = [text for text in said if text.startswith("Ø2.5 THRU, TAPPED M3, RADIAL")]
     assert len(threads) == 4 and any("M3 through the spigot" in text for text in said)
@@ -359,7 +359,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     said = {}
     for name in ("drive_pulley", "bearing_tower"):
         sheet = drawing_of(name, made.scanner, made.assembly, 1.0, "0" * 12)
-        said[name] = [item.text for item in drawn(sheet) if isinstance(item, Words)]
+        said[name] = [item.text for item in drawn_on(sheet) if isinstance(item, Words)]
     assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
     seat = "Ø37.1 ±0.1: seat of 61805-2RS, from size for size to a sliding fit, as printed, sanded or reamed to it."
     assert seat in " ".join(said["bearing_tower"])
@@ -502,7 +502,7 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
     assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, list(joints.values()))}
     sheet = drawing_of("bearing_tower", scanner, assembly, 1.0, "0" * 12)
-    said = {item.text for item in drawn(sheet) if isinstance(item, Words)}
+    said = {item.text for item in drawn_on(sheet) if isinstance(item, Words)}
     assert {
         "Hexagons under the arms for nuts M4: 7.2 across flats.",
         "Slots in the foot for nuts M3: 5.7 wide, from its corners.",
