@@ -41,7 +41,7 @@ RING_STEP = Step(
 )
 LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
-STANDING_TITLE = "Cables to the deck"
+STANDING_TITLE = "Cables that stand still"
 STANDING_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on one is not felt at its plug"
 CAPSULE_STEP = Step(
     "Capsule into the tower",
