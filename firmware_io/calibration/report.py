@@ -192,7 +192,7 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
     looks = record["second_looks"]
     yield (
-        f"looked at twice   {looks['compared'] / max(looks['asked'], 1):.0%} of the beams: "
+        f"looked at twice   {100 * looks['compared'] // max(looks['asked'], 1)} % of the beams: "
         "who walked elsewhere, or stood still, leaves no trace"
     )
     for note in record["notes"]:

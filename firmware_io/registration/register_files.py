@@ -63,7 +63,8 @@ class RegisteredFiles:
             x, y, z = T[:3, 3]
             sigma_mm = 1e3 * np.sqrt(covariance[3:, 3:].trace())
             sigma_deg = np.degrees(np.sqrt(covariance[:3, :3].trace()))
-            lines.append(f"{name}: at ({x:.4f}, {y:.4f}, {z:.4f}) m, sigma {sigma_mm:.2f} mm and {sigma_deg:.4f} deg")
+            sure = f"sigma {sigma_mm:.2f} mm and {sigma_deg:.4f} deg" if covariance.any() else "the frame of the map"
+            lines.append(f"{name}: at ({x:.4f}, {y:.4f}, {z:.4f}) m, {sure}")
         return [*lines, f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}"]
 
 
@@ -109,6 +110,8 @@ def register_files(
         said += lines
     if len(clouds) < 2:
         raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
+    if scanner is None and all("joint_rad" in cloud.columns for cloud in clouds):
+        said.append("the sigmas take the scanner's angles as true: --angles adds what its calibration left open")
     for k, cloud in enumerate(clouds):
         for i in range(k):
             if np.array_equal(cloud.points_m, clouds[i].points_m, equal_nan=True):

@@ -197,12 +197,15 @@ def calibrate(
         say: is told what is being done.
 
     Raises:
-        RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
+        RecordingError: a recording is unreadable, they do not show the mounting errors, or `out` is the file of
+            `angles`. Nothing is written then.
     """
     from firmware_io.calibration.calibrate import calibrate_recordings
 
     before, target = as_angle_set(angles), Path(out)
     check_place(target, RecordingError)
+    if not isinstance(angles, AngleSet) and target.resolve() == Path(angles).resolve():
+        raise RecordingError(f"{target}: holds the angles that are to be calibrated: write to another file (-o)")
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
     beside = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
     urdf = robot_frames.calibrated_urdf_place(target)

@@ -4,6 +4,7 @@ import doctest
 import subprocess
 import sys
 from inspect import isfunction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,6 +123,15 @@ def test_wrong_input_is_one_line():
         sw.evaluate("uniform", (0, 90, 0))
     with pytest.raises(RecordingError, match=r"'\.txt' is no format of clouds"):
         sw.read_cloud("cloud.txt")
+
+
+def test_a_calibration_does_not_overwrite_the_angles_that_it_began_with(tmp_path):
+    angles = tmp_path / "angles.json"
+    angles.write_text(Path("design/angle_sets/tilting_urg.json").read_text())
+    before = angles.read_bytes()
+    with pytest.raises(RecordingError, match=r"angles\.json: holds the angles that are to be calibrated"):
+        sw.calibrate([tmp_path / "a.mcap"], angles, tmp_path / "." / "angles.json")
+    assert angles.read_bytes() == before
 
 
 def test_clouds_go_out_and_in(tmp_path):

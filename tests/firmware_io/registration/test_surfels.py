@@ -134,6 +134,17 @@ def test_what_cannot_be_told_of_the_calibration_is_one_line(command, tmp_path):
         assert says in complaints[0]
 
 
+def test_what_the_sigmas_leave_out_is_said_of_our_own_clouds(command, tmp_path):
+    paths = [tmp_path / "a.npz", tmp_path / "b.npz"]
+    for seed, path in enumerate(paths):
+        points = scan(room(), frames.rigid(np.eye(3), [0.2 * seed, 0, 1.0]), 120, 181, seed)
+        write_clouds(path, [Cloud(points, {"joint_rad": np.zeros(len(points), np.float32)})])
+    code, out, _ = command("register", *paths, "-o", tmp_path / "map.ply")
+    assert code == 0
+    assert "note: the sigmas take the scanner's angles as true" in out
+    assert "a: at (0.0000, 0.0000, 0.0000) m, the frame of the map" in out
+
+
 def test_leaves_keep_what_their_points_say():
     rng = np.random.default_rng(0)
     leaves = rng.uniform(-4, 4, (20_000, 3))
