@@ -14,7 +14,7 @@ import numpy as np
 from cad import outlines, solids
 from cad.layout.joints import screws
 from cad.layout.layout import Layout
-from cad.layout.modules.ring_cover import BESIDE, NOTCH_HALF, NOTCH_HIGH, PAD_HALF, SCREW, RingCover, cover_of
+from cad.layout.modules.ring_cover import BESIDE, NOTCH_HALF, PAD_HALF, SCREW, RingCover, cover_of
 from cad.layout.names import RING_COVER
 from cad.parts.part_spec import PartSpec, Step
 from cad.solids import building
@@ -59,7 +59,7 @@ def ring_cover(p: RingCover) -> cq.Solid:
         for azimuth in p.azimuths:
             cuts.append(solids.radial(p.hole / 2, azimuth, p.screws))
             cuts.append(solids.radial(SCREW.head_room, azimuth, p.screws, p.seat))
-        notch = outlines.gable(NOTCH_HALF, p.low - 1.0, p.low + NOTCH_HIGH)
+        notch = outlines.gable(NOTCH_HALF, p.low - 1.0, p.ridge)
         cuts.append(solids.prism(notch, -2 * p.outer, 2 * p.outer).moved(solids.location(OUT_Y)))
         return checked(body.cut(*cuts).clean())
 

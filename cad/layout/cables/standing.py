@@ -19,13 +19,14 @@ from cad.layout.cables.standing_room import StandingRoom, standing_room_of
 from cad.layout.cables.ties import foot_ties_of
 from cad.layout.cables.way import Ending, short_way
 from cad.layout.deck import FOOT_THICKNESS, Deck
+from cad.layout.direct.stack import STATOR_EXIT
 from cad.layout.layout import Layout
+from cad.layout.modules.ring_cover import RingCover, cover_of
 from cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from design.arrays import Array
 
 BUNDLED = 1.2  # diameter of a bundle of bundles, over that of one and the root of their number
 LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend
-ABOVE_RING_END = 5.0  # of leads that leave the side of a stator
 ON_FOOT = 1.0  # between foot or deck and a cable that lies on it
 BEYOND = 8.0  # the edge of the foot, where a cable ends
 CLEAR = 1.0  # of what it leaves, beside its own radius
@@ -113,8 +114,10 @@ def _leaving(layout: Layout) -> Iterator[Leaving]:
         yield Leaving(STATOR_LEADS, ring.name, wide, radius, (end,), stack.ring_bottom - layout.drive.mounted.rear)
     else:
         # by a window of the cage, or between the arms of the adapter
-        z, start = stack.ring_bottom + ABOVE_RING_END, stack.ring_radius + 0.2
+        z, start = stack.ring_bottom + STATOR_EXIT, stack.ring_radius + 0.2
+        cover = cover_of(layout.scanner, stack)
         out_of = max(stack.ring_radius, 0.0 if stack.bearing is None else stack.cage_outer)
+        out_of = max(out_of, cover.outer) if isinstance(cover, RingCover) else out_of
         places = tuple((np.array([0.0, side * start, z]), np.array([0.0, side, 0.0])) for side in (-1.0, 1.0))
         yield Leaving(STATOR_LEADS, ring.name, wide, radius, places, out_of - start, stiff=True)
 

@@ -30,6 +30,7 @@ from cad.layout.names import HORN_CUP, SERVO_SHAFT
 from design.arrays import Array
 
 RING_GAP = 3.0
+STATOR_EXIT = 5.0  # over a ring's lower end, of leads that leave the side of its stator
 CUP_GAP = 0.5  # between hub and flange of a cup: the cup's rim carries the hub
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
 # DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts

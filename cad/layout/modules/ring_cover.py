@@ -13,6 +13,7 @@ from cad.layout import names
 from cad.layout.belt.stack import BeltStack
 from cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, adapter_of, arm_top
 from cad.layout.direct.cage import SEAT_GAP, cage_of
+from cad.layout.direct.stack import STATOR_EXIT
 from cad.layout.drive import Stack
 from cad.layout.joints import Joint, inward_axes, round_wall_mm
 from cad.layout.modules.unasked import unasked
@@ -27,7 +28,8 @@ BESIDE = 0.4  # between the tube and what it comes over
 ABOVE = 0.5  # what it stands on
 PAD_HALF = 5.0  # of what fills the gap between the tube and a flat arm, around a screw
 GROOVE_HALF = 3.0  # of the adapter's cable tie
-NOTCH_HALF, NOTCH_HIGH = 7.0, 12.0  # for the stator's leads
+NOTCH_HALF, NOTCH_HIGH = 7.0, 12.0  # for the stator's leads: at least so high
+RIDGE = 6.0  # of a notch, over the middle of the leads that leave by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,7 @@ class RingCover:
         inner: radius.
         low: height of its lower rim.
         high: of its upper rim.
+        ridge: of the notches that its lower rim has at +-y.
         screws: height of its two screws.
         azimuths: of these [rad].
         hole: diameter that they pass.
@@ -51,6 +54,7 @@ class RingCover:
     inner: float
     low: float
     high: float
+    ridge: float
     screws: float
     azimuths: tuple[float, float]
     hole: float
@@ -89,6 +93,7 @@ def cover_of(scanner: Scanner, stack: Stack) -> RingCover | LeftOut:
     if scanner.slip_ring is None:
         return LeftOut(names.RING_COVER, "this scanner has no slip ring", 1, "parts")
     hole, cage = passing_hole(SCREW, scanner.printer), cage_of(scanner, stack)
+    over_leads = stack.ring_bottom + STATOR_EXIT + RIDGE
     if cage is not None:
         low, high = cage.high + ABOVE, stack.cage_roof
         return RingCover(
@@ -96,6 +101,7 @@ def cover_of(scanner: Scanner, stack: Stack) -> RingCover | LeftOut:
             inner=stack.cage_outer + BESIDE,
             low=low,
             high=high,
+            ridge=max(low + NOTCH_HIGH, over_leads),
             screws=(low + high) / 2,
             azimuths=(math.pi / 4, 5 * math.pi / 4),
             hole=hole,
@@ -111,6 +117,7 @@ def cover_of(scanner: Scanner, stack: Stack) -> RingCover | LeftOut:
         inner=math.hypot(outer, ARM_HALF_WIDTH) + BESIDE,
         low=low + ABOVE,
         high=stack.ring_top,
+        ridge=max(low + ABOVE + NOTCH_HIGH, over_leads),
         screws=(stack.ring_bottom + tie - GROOVE_HALF) / 2,
         azimuths=(0.0, math.pi),
         hole=hole,

@@ -13,7 +13,9 @@ import trimesh
 from quick_tests import samples
 from scanners import GROUND_AHEAD, UPRIGHT, scanner_at
 
+from cad.layout.deck import FOOT_THICKNESS
 from cad.layout.layout import mount_offset_mm
+from cad.layout.names import SERVO_CABLE, STATOR_LEADS
 
 # name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo; hundreds more: `python -m benchmarks.cad.parts`
 SETTINGS = {
@@ -184,6 +186,8 @@ def test_everything_stands_clear_of_the_deck(built):
         assert height["servo_case"] == pytest.approx(0, abs=1e-3)
         return
     assert height.pop("base_mount") == pytest.approx(0, abs=1e-3)
+    lying = [height.pop(name) for name in (SERVO_CABLE, STATOR_LEADS) if name in height]
+    assert min(lying, default=np.inf) > FOOT_THICKNESS
     assert min(height.values()) > 8
     # the lidar's sphere misses the foot in every position
     radius = max(np.linalg.norm(built.meshes[n].vertices, axis=1).max() for n in built.meshes if n.startswith("lidar"))

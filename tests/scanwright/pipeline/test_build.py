@@ -55,7 +55,7 @@ FILES = {
     *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
     *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part not in METAL),
     *(f"print/plate_1.{kind}" for kind in ("3mf", "png")),
-    *(f"assembly/step_{number:02d}.png" for number in range(1, 10)),
+    *(f"assembly/step_{number:02d}.png" for number in range(1, 11)),
 }
 
 
