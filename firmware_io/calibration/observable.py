@@ -24,6 +24,7 @@ BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finish
 FLATTEST_FAN_RAD = np.radians(3.0)
 _TWICE = 0.05  # share of the beams
 _ONE_LINE = 0.01  # share of the surface that faces across it
+_JOINED = 0.5  # of the flat patches: three of 100 furnished rooms have 0.57 or 0.58, and none of these is wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,7 @@ def choose_observable(
     if share[0] < _ONE_LINE:
         notes.append(f"{_geometry(tiles, grouping)}; what was found rests on the other surfaces alone")
     joined = tiles.count[grouping.used].sum() / tiles.count.sum()
-    if joined < 0.6:
+    if joined < _JOINED:
         notes.append(f"only {joined:.0%} of the flat patches join surfaces: the result may be worse than it says")
     return Choice(free, tuple(held), tuple(notes))
 
