@@ -312,6 +312,7 @@ def test_the_sdk_reads_several_servos_of_one_bus_at_a_time():
             assert servo.model == "MX-106"
 
 
+@pytest.mark.usefixtures("patient_sdk")
 def test_bytes_take_their_time_and_the_return_delay_is_kept(monkeypatch):
     with ServoTwin("MX-64R", "2.0") as twin:
         twin.memory[9] = 254
