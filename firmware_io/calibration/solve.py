@@ -19,7 +19,7 @@ from jaxtyping import Float64, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Floats, Ints
+from design.arrays import Array, Floats, Ints
 from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
 
 _Q = COUNT
@@ -93,7 +93,20 @@ def sums(
 
 
 @njit(cache=True, nogil=True)
-def _sums(plane, along_m, x, joint, speed, way, bearing, range_m, tile, weight, q, kink):  # type: ignore[no-untyped-def]
+def _sums(
+    plane: Array,
+    along_m: float,
+    x: Array,
+    joint: Array,
+    speed: Array,
+    way: Array,
+    bearing: Array,
+    range_m: Array,
+    tile: Ints,
+    weight: Array,
+    q: Array,
+    kink: float,
+) -> Array:
     tiles = len(q)
     out = np.zeros((tiles, WIDTH, WIDTH))
     row = np.zeros(WIDTH)
@@ -192,7 +205,7 @@ def _summed(values: Floats, label: Ints, labels: int) -> Floats:
 
 
 @njit(cache=True, nogil=True)
-def _add(values, label, out):  # type: ignore[no-untyped-def]
+def _add(values: Array, label: Ints, out: Array) -> None:
     for i in range(label.size):
         if label[i] >= 0:
             out[label[i]] += values[i]

@@ -13,7 +13,7 @@ from jaxtyping import Float64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Floats, Ints
+from design.arrays import Array, Floats, Ints, Mask
 from design.errors import RecordingError
 from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping
@@ -72,7 +72,17 @@ def group(
 
 
 @njit(cache=True, nogil=True)
-def _grown(seed, left, place, point, normal, direction, weight, limit, near_m):  # type: ignore[no-untyped-def]
+def _grown(
+    seed: int,
+    left: Mask,
+    place: Ints,
+    point: Array,
+    normal: Array,
+    direction: Array,
+    weight: Array,
+    limit: Array,
+    near_m: float,
+) -> tuple[Array, float, Mask]:
     """The plane n . p = c that grows from a tile to the ends of its wall, and which tiles that are left lie in it."""
     n, c = normal[seed], _dot(normal[seed], point[seed])
     before = np.zeros(left.size, np.bool_)
@@ -93,12 +103,12 @@ def _grown(seed, left, place, point, normal, direction, weight, limit, near_m): 
 
 
 @njit(inline="always")
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True)
-def _plane(point, normal, weight):  # type: ignore[no-untyped-def]
+def _plane(point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
     """Plane through weighted points; few of them lean on their normals."""
     mean = weight @ point / weight.sum()
     spread = point - mean

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float64, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Floats, Ints
+from design.arrays import Array, Floats, Ints
 from design.errors import RecordingError
 from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
 from firmware_io.samples import AxisCurve
@@ -186,7 +186,7 @@ def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
 
 
 @njit(cache=True, nogil=True)
-def _normal_equations(origin, direction, range_m, start):  # type: ignore[no-untyped-def]
+def _normal_equations(origin: Array, direction: Array, range_m: Array, start: Ints) -> tuple[Array, Array]:
     """Sums of each window: regressors with each other, shape (m, 3, 3), and with 1/r, shape (m, 3)."""
     windows = start.size - 1
     information, right = np.zeros((windows, 3, 3)), np.zeros((windows, 3))
@@ -206,7 +206,7 @@ def _normal_equations(origin, direction, range_m, start):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _misfits(origin, direction, range_m, start, q):  # type: ignore[no-untyped-def]
+def _misfits(origin: Array, direction: Array, range_m: Array, start: Ints, q: Array) -> tuple[Array, Array]:
     """Sums of each window: squares of what its ranges are off its plane, and of the beams' slants to it."""
     square, slants = np.zeros(len(q)), np.zeros(len(q))
     for w in range(len(q)):

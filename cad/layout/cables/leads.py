@@ -58,8 +58,12 @@ class RotorLead:
     @property
     def mass_g(self) -> float:
         """Of the wires between ring and jacket; 0 where there is no way."""
-        section = math.pi / 4 * self.diameter**2
-        return 0.0 if self.path is None else section * self.path.length() * LEAD_G_CM3 / 1000
+        return mass_g(self.path, self.diameter)
+
+
+def mass_g(path: Path | None, diameter: float) -> float:
+    """What a bundle weighs along a path; 0 without one."""
+    return 0.0 if path is None else math.pi / 4 * diameter**2 * path.length() * LEAD_G_CM3 / 1000
 
 
 def leads_of(layout: Layout) -> tuple[RotorLead, ...]:

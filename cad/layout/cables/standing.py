@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import LEAD_G_CM3, SAMPLE
+from cad.layout.cables.leads import SAMPLE, mass_g
 from cad.layout.cables.path import Path
 from cad.layout.cables.standing_room import StandingRoom, standing_room_of
 from cad.layout.cables.ties import foot_ties_of
@@ -59,8 +59,7 @@ class StandingLead:
     @property
     def mass_g(self) -> float:
         """As far as it is drawn; 0 where there is no way."""
-        section = math.pi / 4 * self.diameter**2
-        return 0.0 if self.path is None else section * self.path.length() * LEAD_G_CM3 / 1000
+        return mass_g(self.path, self.diameter)
 
 
 @dataclass(frozen=True, slots=True)
