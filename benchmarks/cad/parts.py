@@ -12,12 +12,16 @@ of one setting of each ten are sliced. Ctrl-C ends a run early and tells what it
 from __future__ import annotations
 
 import shutil
+import signal
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -65,49 +69,74 @@ WORST = {  # what a table holds of all checks of one kind
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What one setting came to.
+
+    Attributes:
+        which: its products.
+        setting: products and angles in words.
+        refused: why it cannot be built; empty where it can.
+        values: masses, and the worst of its checks of each kind.
+        failed: kind and message of each check that failed.
+        warned: kinds of the checks that warn.
+    """
+
+    which: Products
+    setting: str
+    refused: str = ""
+    values: Mapping[str, float] = field(default_factory=dict)
+    failed: tuple[tuple[str, str], ...] = ()
+    warned: frozenset[str] = frozenset()
+
+
 def main(count: int = 300, *products: str) -> None:
     """Build, check, and print the table."""
     combinations: tuple[Products, ...] = ((products[0], products[1], products[2]),) if products else COMBINATIONS
-    rows: list[tuple[Products, dict[str, float]]] = []
-    failed: Counter[str] = Counter()
-    warned: Counter[str] = Counter()
-    built: Counter[Products] = Counter()
-    passed: Counter[Products] = Counter()
-    refused: Counter[Products] = Counter()
-    with suppress(KeyboardInterrupt):
-        for number, scanner in enumerate(scanners_of(combinations, count)):
-            which, start = combinations[number % len(combinations)], time.process_time()
-            setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
-            try:
-                assembly = make_parts(scanner)
-                checks, _ = run_checks(scanner, assembly, lambda _: None)
-            except BuildError as error:
-                refused[which] += 1
-                print(f"refused {setting}: {error}", flush=True)
-                continue
-            values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}
-            if (number // len(combinations)) % SLICED == 0 and shutil.which(slicer.PROGRAM):
-                values |= _sliced(scanner, assembly)
-            rows.append((which, values))
-            faults = [check for check in checks if check.severity == "error"]
-            built[which] += 1
-            passed[which] += not faults
-            failed.update({check.kind for check in faults})
-            warned.update({check.kind for check in checks if check.severity == "warning"})
-            for check in faults:
-                print(f"failed {setting}: {check.message}", flush=True)
+    made: list[Made] = []
+    settings = enumerate(scanners_of(combinations, count))
+    with get_context("spawn").Pool(initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+        with suppress(KeyboardInterrupt):
+            for one in pool.imap(partial(_made, combinations), settings):
+                made.append(one)
+                for kind, text in (*[("refused", one.refused)] * bool(one.refused), *one.failed):
+                    print(f"{len(made)}: {kind}: {one.setting}: {text}", flush=True)
+        pool.terminate()
     for which in combinations:
-        done = built[which] + refused[which]
-        print(
-            f"{' '.join(which)}: {done} settings, {built[which]} built, {passed[which]} pass, {refused[which]} refused"
-        )
-    print(f"{len(rows) + refused.total()} settings, {len(rows)} built, {passed.total()} pass every check")
+        print(f"{' '.join(which)}: {_counts([one for one in made if one.which == which])}")
+    print(_counts(made))
+    built = [one for one in made if not one.refused]
+    failed = Counter(kind for one in built for kind in {kind for kind, _ in one.failed})
     print("  failed: ", ", ".join(f"{kind} {n}" for kind, n in failed.most_common()) or "none")
+    warned = Counter(kind for one in built for kind in one.warned)
     print("  warned: ", ", ".join(f"{kind} {n}" for kind, n in warned.most_common()) or "none")
-    for name in dict.fromkeys(name for _, row in rows for name in row):
-        found = [row[name] for _, row in rows if name in row]
+    for name in dict.fromkeys(name for one in built for name in one.values):
+        found = [one.values[name] for one in built if name in one.values]
         low, middle, high, top = np.quantile(found, [0, 0.5, 0.95, 1])
         print(f"  {name:<22} of {len(found):<3} min {low:8.3f}  median {middle:8.3f}  p95 {high:8.3f}  max {top:8.3f}")
+
+
+def _counts(made: Sequence[Made]) -> str:
+    built = [one for one in made if not one.refused]
+    passed = sum(not one.failed for one in built)
+    return f"{len(made)} settings, {len(built)} built, {passed} pass every check, {len(made) - len(built)} refused"
+
+
+def _made(combinations: tuple[Products, ...], numbered: tuple[int, Scanner]) -> Made:
+    number, scanner = numbered
+    which, start = combinations[number % len(combinations)], time.process_time()
+    setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
+    try:
+        assembly = make_parts(scanner)
+        checks, _ = run_checks(scanner, assembly, lambda _: None)
+    except BuildError as error:
+        return Made(which, setting, refused=str(error))
+    values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}
+    if (number // len(combinations)) % SLICED == 0 and shutil.which(slicer.PROGRAM):
+        values |= _sliced(scanner, assembly)
+    failed = tuple((check.kind, check.message) for check in checks if check.severity == "error")
+    warned = frozenset(check.kind for check in checks if check.severity == "warning")
+    return Made(which, setting, values=values, failed=failed, warned=warned)
 
 
 def scanners_of(combinations: tuple[Products, ...], count: int) -> Iterator[Scanner]:

@@ -29,8 +29,8 @@ ON_DECK = Step(
 )
 LIDAR_STEP = Step(
     "Lidar on its seat",
-    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables over the square "
-    f"notch. {screws(LIDAR_BODY)}",
+    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables to the other side. "
+    f"{screws(LIDAR_BODY)}",
     "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
 )
 RING_STEP = Step(

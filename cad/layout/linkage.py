@@ -36,6 +36,7 @@ CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
+FIN_HALF = 0.06  # half of a sector [rad] in which the neck would stand as a fin
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,16 +167,22 @@ def _grown(box: Box) -> Box:
 
 
 def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
-    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there."""
+    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there.
+
+    What lies between two pieces is no fin: a full fan is closed where it begins and ends.
+    """
     first, last = float(bearings.min()), float(bearings.max())
+    pieces = [(first, last)]
+    if last - first > 2 * (math.pi - FIN_HALF):
+        middle, end = first + math.pi, first + 2 * math.pi
+        pieces = [(first - FIN_HALF, middle + FIN_HALF), (middle - FIN_HALF, end + FIN_HALF)]
     q = stack.R()[2]
     tilt_sine = math.hypot(q[0], q[1])
     cosine = math.cos(stack.shadow_half_angle)
-    if tilt_sine <= cosine:
-        return ((first, last),)
-    half = math.acos(cosine / tilt_sine)
+    half = math.acos(min(1.0, cosine / max(tilt_sine, 1e-12)))
+    if half < FIN_HALF:
+        return tuple(pieces)
     centre = math.atan2(-q[1], -q[0])
-    pieces = [(first, last)]
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):
         low, high = centre + turn - half, centre + turn + half
         pieces = [

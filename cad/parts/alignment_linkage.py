@@ -3,22 +3,25 @@
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore with a flat
 at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all that must stay
 free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT),
-a square notch at its -x below the cables, a groove in the hub at +y (index). Where a bearing holds the shaft, the wires
-of the ring's rotor leave its sleeve through a channel of the hub. Tongues of hub and plate have slots for the ties of
-leads and cables. Under a sub-plate (`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the
-heads of its screws. Where a counterweight balances the rotor, an ear of the hub carries it.
+a groove in the hub at +y (index). Where a bearing holds the shaft, the wires of the ring's rotor leave its sleeve
+through a channel of the hub. Tongues of hub and plate have slots for the ties of leads and cables. Under a sub-plate
+(`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the heads of its screws. Where a
+counterweight balances the rotor, an ear of the hub carries it.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import partial
 
 import cadquery as cq
+import numpy as np
 
 from cad import outlines, solids
 from cad.geometry.mesh import checked_mesh
+from cad.layout.balance.free_space import in_hull
 from cad.layout.belt.stack import BeltStack
 from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, slot_ends
 from cad.layout.joints import screws
@@ -28,9 +31,10 @@ from cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAF
 from cad.parts.fins import FAR, fins_beside
 from cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
 from cad.parts.part_spec import PartSpec, Step
-from cad.parts.sub_plate import plate_marks
+from cad.parts.sub_plate import front_mark
 from cad.screws import Trap
 from cad.solids import building
+from design.arrays import Array
 from design.errors import BuildError
 
 OF_LIDAR = (
@@ -45,7 +49,12 @@ OF_LIDAR = (
     "lidar.cable_straight_mm",
 )
 RETRIES = 5
+WIDER = 0.03  # of the ways of drivers, each time: they may graze the rim of the hub
 TRAP_WAY = 15.0  # below the plate: the neck may begin there
+MARK_WAY = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
+DRIVER_WAY = 150.0
+DRIVER_DEEP = 8.0  # below the plate, where a wall beside a driver's way is measured: the neck tapers
+DRIVER_WALL = 3.0  # what would be less is open
 SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 SEATED_ON_CUP = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
 CUP_WORDS = (
@@ -92,8 +101,9 @@ def linkage_spec(layout: Layout) -> PartSpec:
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     """Make the linkage.
 
-    A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck, and only the neck, is then
-    turned a little and made again, so that the height, and with it the frame chain, stays what the layout said.
+    A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck is then turned a little, the ways
+    of drivers are made wider, and nothing else, so that the height, and with it the frame chain, stays what the layout
+    said.
 
     Raises:
         BuildError: no attempt gave one valid watertight solid.
@@ -118,13 +128,13 @@ class Shapes:
     plate: cq.Shape
     neck: cq.Shape
     room: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
-    beside: list[cq.Shape]  # the fan, and fins of the neck
+    beside: list[cq.Shape]  # the fan, and what would be a fin of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
 
 
 def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
-    """The shapes; `attempt` turns the neck a little.
+    """The shapes; `attempt` turns the neck a little, and widens the ways of drivers.
 
     Raises:
         BuildError: the kernel fails at one.
@@ -133,12 +143,13 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         laser = solids.location(p.stack.R())
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
         corners = neck_corners(p, attempt)
-        beside = [*fan, *fins_beside(p.top, p.body, p.cables, corners @ p.stack.R())]
-        marked = [*_holes(p), *_plate_marks(p), *(slot for tie in p.plate_ties for slot in tie_slots(tie))]
+        neck = corners @ p.stack.R()
+        beside = [*fan, *fins_beside(p.top, p.body, p.cables, neck), *_opened(p, neck)]
+        marked = [*_holes(p), _plate_mark(p, neck), *(slot for tie in p.plate_ties for slot in tie_slots(tie))]
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
-            room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p))],
+            room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p, attempt))],
             beside=[shape.moved(laser) for shape in beside],
             hub=hub(p),
             holes=[*(shape.moved(laser) for shape in marked), *hub_cuts(p)],
@@ -188,12 +199,34 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
     return plate.fuse(solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, p.top)))
 
 
-def _drivers(p: AlignmentLinkage) -> list[cq.Shape]:
+def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
     """Heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
-    return _for_screws(p, p.screw.head_room, low - 150.0, low)
+    return _for_screws(p, p.screw.head_room + WIDER * attempt, low - DRIVER_WAY, low)
+
+
+def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
+    """From the ways of drivers outwards, or of heads, where they run beside the surface: else a skin is left of it."""
+    low, high = p.top - PLATE_THICKNESS - DRIVER_WAY, p.top - PLATE_THICKNESS
+    below = high - DRIVER_DEEP
+    if p.ears is not None:
+        low, high = _pockets(p)
+        below = low
+    opened = []
+    for place in p.holes:
+        out = np.array(place) / math.hypot(*place)
+        beside = np.array([[*(place + (p.screw.head_room + DRIVER_WALL) * out), below]])
+        if not in_hull(beside, neck, 0.0).any():
+            end = place + 2 * max(p.half_x, p.half_y) * out
+            opened.append(solids.slot(p.screw.head_room, place, end.tolist(), low, high))
+    return opened
+
+
+def _pockets(p: AlignmentLinkage) -> tuple[float, float]:
+    """Heights of the pockets for the heads of the lidar's screws, under a sub-plate."""
+    return p.top - p.screw.head_height - 0.5, p.top + 1.0
 
 
 def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> list[cq.Shape]:
@@ -205,7 +238,7 @@ def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
     """Of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
         return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
-    pockets = _for_screws(p, p.screw.head_room, p.top - p.screw.head_height - 0.5, p.top + 1.0)
+    pockets = _for_screws(p, p.screw.head_room, *_pockets(p))
     low = p.top - PLATE_THICKNESS - 1.0
     traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
@@ -218,10 +251,14 @@ def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.
     return solids.prism(outline, low - TRAP_WAY, low + trap.depth)
 
 
-def _plate_marks(p: AlignmentLinkage) -> list[cq.Solid]:
-    """FRONT: a V in the edge at +x; below the cables a square notch at -x. Laser frame; half the plate deep."""
+def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
+    """FRONT: a V in the edge at +x, half the plate deep, and through what the neck has there. Laser frame."""
     x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
-    return [solids.prism(outline, p.top - PLATE_THICKNESS / 2, p.top + 1.0) for outline in plate_marks(x)]
+    low, high = p.top - PLATE_THICKNESS / 2, p.top + 1.0
+    beyond = np.arange(2.0, MARK_WAY, 0.5)
+    ends = np.array(list(itertools.product(x + beyond, (-4.0, 0.0, 4.0), (low, high))))
+    free = ~in_hull(ends, neck, 0.1).reshape(len(beyond), -1).any(axis=1)
+    return solids.prism(front_mark(x, float(beyond[np.argmax(free)])), low, high)
 
 
 def _largest(shape: cq.Shape) -> cq.Shape:

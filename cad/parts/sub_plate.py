@@ -73,14 +73,12 @@ def sub_plate(scanner: Scanner, stack: Stack, axis: Axis) -> cq.Solid:
         ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.mount_holes_mm]
         cuts = [solids.slot(hole, *each, low - 1.0, high + 1.0) for each in ends]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
-        marks = plate_marks(half_x + (EAR_REACH if axis == "x" else 0.0))
-        cuts += [solids.prism(outline, low - 1.0, high + 1.0) for outline in marks]
+        front = front_mark(half_x + (EAR_REACH if axis == "x" else 0.0))
+        cuts.append(solids.prism(front, low - 1.0, high + 1.0))
         body = checked(body.cut(*cuts).clean())
     return body.moved(solids.location(stack.R()))
 
 
-def plate_marks(x: float) -> tuple[Array, Array]:
-    """Outlines cut from a plate that ends at +-x: FRONT, a V at +x; a square notch at -x, below the cables."""
-    front = np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + 1.0, 4.0]])
-    rear = np.array([[-x - 2.0, -4.0], [3.0 - x, -4.0], [3.0 - x, 4.0], [-x - 2.0, 4.0]])
-    return front, rear
+def front_mark(x: float, beyond: float = 2.0) -> Array:
+    """FRONT: outline of a V that is cut from a plate where it ends at x, and goes on beyond."""
+    return np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + beyond, -4.0], [x + beyond, 4.0], [x + 1.0, 4.0]])

@@ -35,7 +35,7 @@ BESIDE_EAR = math.radians(60.0)
 GAP = 0.5
 BEAM = 4.0  # around the scan plane: a tongue may stand before the window beside its beams
 STEP = 1.5  # of the points that stand for a tongue
-PLATE_LOW = 5.0  # thickness of a tongue of the plate
+PLATE_LOW, BELOW_SEAT = 5.0, 0.5  # lower and upper face of a tongue of the plate, below the plate's
 FOOT_ROOM = 5.5  # half of the room between the slots of the foot: two leads lie side by side
 FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 
@@ -51,7 +51,7 @@ def plate_ties_of(lidar: Lidar, p: AlignmentLinkage) -> tuple[TieSeat, ...] | Le
             inner=p.half_x - 2.0,
             first=p.half_x + FROM_SIDE,
             low=p.top - PLATE_LOW,
-            high=p.top,
+            high=p.top - BELOW_SEAT,
             half=lidar.cable_diameter_mm / 2 + 0.2,
         )
         for y in lidar.cable_y_mm

@@ -87,6 +87,23 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     assert len(linkage_of(scanner, stack).cross_azimuths) == 2
 
 
+SKINS = {  # where one stood, of 10 to 420 mm2
+    "between the slots of a tie and a mark": (45.63, 6.87, "UST-10LX"),
+    "of the neck beyond the mark": (55.09, 23.46, "UST-10LX"),
+    "beside the ways of drivers": (-33.87, -13.8, "URG-04LX"),
+    "beside the lidar": (22.23, 49.8, "UTM-30LX"),
+    "where a full fan begins": (2.89, -69.14, "LD19"),
+    "beside pockets under a sub-plate": (-22.28, -14.23, "UTM-30LX"),
+}
+
+
+@pytest.mark.parametrize("where", SKINS)
+def test_no_skin_stays_between_what_is_cut(where):
+    scanner = scanner_for(*SKINS[where])
+    walls = thin_walls(draft_linkage(layout_of(scanner).linkage), scanner.printer.min_wall_mm)
+    assert walls.area_mm2 < 5.0, f"{where}: {walls.thinnest_mm:.2f} mm at {walls.at}"
+
+
 COVERED = [(25.5, -21.4, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]
 
 
