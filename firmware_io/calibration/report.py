@@ -15,7 +15,6 @@ from firmware_io.calibration.entropy import Witness
 from firmware_io.calibration.estimate import Estimate
 from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
-from firmware_io.calibration.unrest.drift import Drift
 from firmware_io.calibration.unrest.second_looks import SecondLooks, second_looks
 
 _WALLS = 3
@@ -101,7 +100,7 @@ def calibration_report(
         "held": [{"names": list(held.names), "words": held.words, "why": held.why} for held in found.choice.held],
         "notes": [
             *found.choice.notes,
-            *_unrest(found.drifts, looks, fit["after"].residual_m, found.tiles.noise_m),
+            *_unrest(found, looks, beams, fit["after"].residual_m),
             *([_LESS_CRISP] if witness.less_crisp else []),
         ],
         "drift": [
@@ -137,10 +136,10 @@ def calibration_report(
     }
 
 
-def _unrest(found: tuple[Drift, ...], looks: SecondLooks, residual_m: float, noise_m: float) -> list[str]:
+def _unrest(found: Estimate, looks: SecondLooks, beams: ReturnedBeams, residual_m: float) -> list[str]:
     """What a person should know of it, one line each."""
-    said = []
-    for drift in found:
+    said, noise_m = [], found.tiles.noise_m
+    for drift in found.drifts:
         if drift.sure:
             mm_s, deg_s = 1e3 * np.linalg.norm(drift.velocity_m_s), np.degrees(np.linalg.norm(drift.turn_rad_s))
             said.append(
@@ -148,9 +147,15 @@ def _unrest(found: tuple[Drift, ...], looks: SecondLooks, residual_m: float, noi
                 f"{deg_s:.2g} deg/s: do not trust this calibration; scan again with the scanner held still"
             )
     if looks.seen_through > _FEW:
+        taken_for_one = len(beams.curves) > 1 and not beams.place.any()
+        causes = [
+            "somebody walked",
+            "something was moved",
+            *["the scanner itself was, in spite of --one-place"] * taken_for_one,
+        ]
         said.append(
             f"{looks.seen_through:,} of {looks.compared:,} beams ended where another look, at another time, went "
-            "through: somebody walked, or something was moved"
+            f"through: {', '.join(causes[:-1])}, or {causes[-1]}"
         )
     if residual_m > _RESIDUAL * noise_m:
         said.append(
