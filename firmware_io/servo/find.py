@@ -45,6 +45,7 @@ def find_servo(
         raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; known: {known}")
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
+    met: set[str] = set()
     for wait_s in (PING_S, _PATIENT_PING_S):  # adapter or servo may still be starting, or this computer be busy
         strangers = []
         for unit in _answering(bus, model, servo_id, baud, wait_s):
@@ -68,9 +69,10 @@ def find_servo(
                 )
             elif unit.table.can_be_mute:
                 mute = here
-        if strangers:
+        if any(stranger in met for stranger in strangers):  # not once: a late answer may be taken for another one's
             known = ", ".join(f"{table.number} {table.model}" for table in all_tables())
             raise DeviceError(f"{bus.port}: {', '.join(strangers)}, which is unknown; known: {known}")
+        met |= set(strangers)
     who = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
     speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _ways(model, baud)))
     raise DeviceTimeoutError(f"{bus.port}: {who} at {speeds} baud: look at its power, its cable, its id")

@@ -277,6 +277,21 @@ def test_a_servo_that_nobody_knows_is_asked_in_every_way_and_told_nothing(bus):
     assert len({request for request in wire.sent if len(request) > 1}) < 10
 
 
+def test_a_number_that_is_read_but_once_makes_no_stranger(bus):
+    """On a busy computer the late answer to one question was taken for that to another: 8705 in place of 310."""
+    memory, late = bytes([0x36, 0x01, 41, 1]), [bytes([0x01, 0x22])]
+
+    def reply(request):
+        if request[4] != 2:
+            return status("1.0", 1, 0, b"")
+        at, count = request[5], request[6]
+        return status("1.0", 1, 0, late.pop() if at == 0 and late else memory[at : at + count].ljust(count, b"\0"))
+
+    line, _ = bus("1.0", reply)
+    found = find_servo(line, None, 1, baud=57_600)
+    assert not late and (found.table.model, found.id) == ("MX-64R", 1)
+
+
 def test_an_echo_alone_is_no_answer_and_before_one_is_dropped(bus):
     answer = b""
     line, wire = bus("1.0", lambda request: request + answer)
