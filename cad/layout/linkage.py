@@ -36,6 +36,7 @@ CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
+BACK = 6.0  # and behind its lower half: it carries the lidar like a bracket, thick at its foot
 FIN_HALF = 0.06  # half of a sector [rad] in which the neck would stand as a fin
 
 
@@ -146,18 +147,20 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     outline = outlines.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
     for z in (p.top - 0.2, p.top - PLATE_THICKNESS + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
-    layers.append(_heel(np.concatenate(layers[2:]), stack))
+    layers.append(_foot(np.concatenate(layers[2:]), stack))
     return np.concatenate(layers)
 
 
-def _heel(plate: Array, stack: Stack) -> Array:
-    """The lower half of the plate's corners, moved down: else a lying plate hangs on a wedge that ends in an edge."""
+def _foot(plate: Array, stack: Stack) -> Array:
+    """The lower half of the plate's corners, moved down, and back: else a lying plate hangs on a wedge with an edge."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
         return plate
-    tilt_sine = math.hypot(stack.R()[2, 0], stack.R()[2, 1])
-    room = float(lower[:, 2].min()) - stack.shoulder - 2.0
-    return lower - [0.0, 0.0, max(0.0, min(HEEL * tilt_sine**2, room))]
+    normal = stack.R()[:, 2]
+    lying = math.hypot(normal[0], normal[1]) ** 2
+    room = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
+    heel = lower - [0.0, 0.0, min(HEEL * lying, room)]
+    return np.concatenate([heel, lower - min(BACK * lying, room / max(normal[2], 1e-6)) * normal])
 
 
 def _grown(box: Box) -> Box:
