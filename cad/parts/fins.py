@@ -1,7 +1,6 @@
 """Fins: what a convex neck, tapering to an edge, leaves beside what is cut out of it. Laser frame, mm.
 
-Skins are no walls, and the claws outside of cables carry nothing, though thicker: without those of 7 mm a linkage on
-its back bends 1 % more and is 3 % lighter.
+Skins are no walls, and the claws outside of the cables of a lying lidar carry nothing, though they are thicker.
 """
 
 from __future__ import annotations
