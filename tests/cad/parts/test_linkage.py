@@ -104,6 +104,18 @@ def test_no_skin_stays_between_what_is_cut(where):
     assert walls.area_mm2 < 5.0, f"{where}: {walls.thinnest_mm:.2f} mm at {walls.at}"
 
 
+def test_a_lying_plate_is_thick_at_its_foot():
+    """A bracket, not a board: measured through the plate, beside its screws, below and above its middle."""
+    p = layout_of(scanner_for(0, 80)).linkage
+    drawn = draft_linkage(p)
+    body = trimesh.Trimesh(drawn.vertices @ p.stack.R(), drawn.faces, process=False)
+    down = np.sign(p.stack.R()[2, 0])  # along x, where the hub is
+    seat = np.array([[-down * 15.0, 0.0, p.top - 0.1], [down * 15.0, 0.0, p.top - 0.1]])
+    places, ray, _ = body.ray.intersects_location(seat, np.tile([0.0, 0.0, -1.0], (2, 1)), multiple_hits=False)
+    foot, top = p.top - places[np.argsort(ray), 2]
+    assert top < 9.5 and foot > 11.0
+
+
 COVERED = [(25.5, -21.4, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "UST-10LX")]
 
 
