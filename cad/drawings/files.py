@@ -107,9 +107,7 @@ def _notes(scanner: Scanner, part: Part, said: OnSheet, how: str, making: list[s
         x, y, z = (number(float(c)) for c in pattern.centre - [0.0, 0.0, part.datum])
         bare = replace(pattern, heads=0.0, holds="")
         notes.append(f"Middle of {bare.words()}, lower ends: X {x}, Y {y}, Z {z}.")
-        faces = planes_across(part.solid, pattern.direction)
-        if len(faces) >= 2:
-            notes.append(f"The two largest faces across them are {number(abs(faces[0] - faces[1]))} apart.")
+        notes.append(f"What they pass, without recesses for heads, is {number(pattern.holes[0].length)} thick.")
     if part.lidar_axis is not None:
         normal = part.lidar_axis
         tilt = math.degrees(math.acos(min(1.0, float(normal[2]))))

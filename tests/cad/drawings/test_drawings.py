@@ -122,15 +122,23 @@ def test_every_hole_that_holds_a_screw_says_by_what(sheets, made):
 
 
 def test_the_thickness_of_an_inclined_plate_is_told(sheets):
+    """Measured through the mesh, beside each hole."""
     for name in ("base_mount", "alignment_linkage"):
         mesh = sheets[name].mesh
         normals, areas = mesh.facets_normal, mesh.facets_area
-        normal = normals[np.argmax(np.where(np.abs(normals @ Z) < 0.999, areas, 0))]
-        along = np.flatnonzero(np.abs(normals @ normal) > 1 - 1e-6)
-        first, second = along[np.argsort(areas[along])[::-1][:2]]
-        apart = abs((mesh.facets_origin[first] - mesh.facets_origin[second]) @ normal)
-        (said,) = [text for text in sheets[name].said if "faces across them are" in text]
-        assert float(re.search(r"are ([\d.]+) apart", said)[1]) == pytest.approx(apart, abs=0.02), name
+        largest = np.argmax(np.where(np.abs(normals @ Z) < 0.999, areas, 0))
+        normal, face = normals[largest], mesh.facets_origin[largest]
+        (hole,) = [re.search(r"Middle of (\d)x Ø([\d.]+)", text) for text in sheets[name].said if "Middle of" in text]
+        count, radius = int(hole[1]), float(hole[2]) / 2
+        circles = circles_in(mesh, face - normal, normal)
+        middles = [centre for diameter, centre in circles if abs(diameter / 2 - radius) < 0.02]
+        assert len(middles) == count
+        aside = np.cross(normal, Z) / np.linalg.norm(np.cross(normal, Z)) * (radius + 0.4)
+        (said,) = [text for text in sheets[name].said if "thick" in text]
+        for middle in middles:
+            places, *_ = mesh.ray.intersects_location([middle + aside + 2 * normal], [-normal])
+            near, far = np.sort((places - face) @ -normal)[:2]
+            assert float(re.search(r"is ([\d.]+) thick", said)[1]) == pytest.approx(far - near, abs=0.02), name
 
 
 def test_linkage_angle_seat_and_holes(sheets, made):
