@@ -6,7 +6,7 @@ Angle pairs of the lidar are `default_rng(1).uniform(-90, 90, (300, 2))`, those 
 a random place of the axis, and without products in its turn one of six combinations of them. For each setting: all
 parts and all checks of `scanwright check`; a failed check counts with its kind, a setting that cannot be built with its
 reason. A part or a check that only some settings have is counted over these. Where PrusaSlicer is installed, the parts
-of one setting of each ten are sliced. Ctrl-C ends a run early and tells what it has measured.
+of one setting of each twenty-five are sliced. Ctrl-C ends a run early and tells what it has measured.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ COMBINATIONS: tuple[Products, ...] = (
     ("UTM-30LX", "XM540-W270", CAPSULE),
     ("UST-10LX", "MX-28", CAPSULE),
 )
-SLICED = 10  # one setting of so many
+SLICED = 25  # one setting of so many of each combination
 WORST = {  # what a table holds of all checks of one kind
     "wall": max,
     "islands": max,
