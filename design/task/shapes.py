@@ -27,7 +27,8 @@ def _divides_the_half_circle(step: float) -> float:
     return step
 
 
-Length = Annotated[Number, Field(ge=1e-3, le=1e4)]
+LEAST_M, MOST_M = 1e-3, 1e4
+Length = Annotated[Number, Field(ge=LEAST_M, le=MOST_M)]
 Far = Annotated[Number, Field(ge=-1e4, le=1e4)]
 THINNEST_DEG = 1e-3
 HEADINGS = {0.0: " ahead", 90.0: " to the left", 180.0: " behind", 270.0: " to the right"}

@@ -45,6 +45,7 @@ from design.task.shapes import (
 )
 
 SHIPPED = Path(__file__).parent / "shipped"
+SMALLEST_BALL_DEG = 0.01
 
 T = TypeVar("T")
 
@@ -61,7 +62,7 @@ class DensityRules(Record):
     """How density is counted and judged; see `docs/definitions.md`, Density and Objective."""
 
     ball_radius_deg: Number = Field(
-        default=2.0, ge=0.01, le=90, description="beams this near to a direction count for it"
+        default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="beams this near to a direction count for it"
     )
     objective: Literal["log", "kl", "required", "homogeneity", "worst"] = Field(
         default="log", description="what J is; see Definitions"
@@ -205,18 +206,19 @@ class LoadedTask:
         return digest.hexdigest()
 
 
-def load_task(source: Path | str | Mapping[str, Any]) -> LoadedTask:
+def load_task(source: Path | str | Mapping[str, Any], folder: Path = Path()) -> LoadedTask:
     """Read a task file, a shipped task by its name, or a table with the keys of a task file.
 
     Args:
-        source: the file, the name, or the table; files that a table names lie in the working folder.
+        source: the file, the name, or the table.
+        folder: where the files are that a table names; those that a file names lie beside it.
 
     Raises:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
             cannot do the motion.
     """
     if isinstance(source, Mapping):
-        return _load(dict(source), Path("task"))
+        return _load(dict(source), folder / "task")
     return _load(*named_table(Path(source), SHIPPED, "task"))
 
 

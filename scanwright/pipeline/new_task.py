@@ -14,8 +14,9 @@ from cad.layout.layout import drive_of
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import Catalogue
 from design.catalogue.products import Lidar, Servo, SlipRing
-from design.errors import BuildError, ScanwrightError, TaskError
+from design.errors import BuildError, TaskError
 from design.scanner import scanner_of
+from design.task.shapes import LEAST_M, MOST_M
 from design.task.task import load_task
 from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
 
@@ -80,6 +81,8 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     """
     lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
     _require_strength(lidar, servo)
+    if not LEAST_M <= answers.height_m <= MOST_M:
+        raise TaskError(f"--height-m {answers.height_m:g}: from {LEAST_M:g} to {MOST_M:g} m over the ground")
     wishes = [parse_wish(each) for each in answers.see]
     if not wishes:
         raise TaskError(f"--see: nothing is to be seen: {known_wishes()}")
@@ -213,11 +216,12 @@ def check_answers(answers: Answers, products: Catalogue) -> None:
 
 
 def write_task_file(path: Path, text: str) -> list[str]:
-    """Write a task file where there is none, and read it back: its warnings.
+    """Write a task file where there is none: its warnings.
 
     Raises:
         TaskError: the file exists or cannot be written, or an answer makes no task; then there is no file.
     """
+    warnings = load_task(tomllib.loads(text), path.parent).warnings()
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -225,8 +229,4 @@ def write_task_file(path: Path, text: str) -> list[str]:
         raise TaskError(f"{path}: exists already: take another name, or another file with -o") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
-        return load_task(path).warnings()
-    except ScanwrightError:
-        path.unlink()
-        raise
+    return warnings

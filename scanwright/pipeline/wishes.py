@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Sequence
 
+from pydantic import TypeAdapter, ValidationError
+
 from design.errors import TaskError, suggest
+from design.record import faults_of
+from design.task.shapes import Region
+from design.task.task import SMALLEST_BALL_DEG, Task
 
 Numbers = tuple[float, ...]
+_REGION: TypeAdapter[Region] = TypeAdapter(Region)
 
 SEEN: dict[str, tuple[str, Numbers]] = {
     "ground": ("ground:FROM:TO:WIDTH, in metres ahead", (0.5, 5.0, 4.0)),
@@ -48,7 +55,7 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
     """The ball in which beams are counted, of half the width of the smallest thing that must not be missed.
 
     Raises:
-        TaskError: a size or a distance is not above 0.
+        TaskError: a size or a distance is not above 0, or the thing is too small for a ball.
     """
     if not things:
         return []
@@ -56,6 +63,9 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
     if not (size_m > 0 and distance_m > 0):
         raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: a size and a distance above 0")
     radius_deg = math.degrees(math.atan2(size_m / 2, distance_m))
+    if radius_deg < SMALLEST_BALL_DEG:
+        looks = f"looks {2 * radius_deg:.2g} deg wide, at least {2 * SMALLEST_BALL_DEG:g}"
+        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: {looks}")
     return [
         f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
         f"ball_radius_deg = {radius_deg:.2g}",
@@ -67,8 +77,18 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
 
 
 def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
-    """The lines of a task file that ask for it; `height_m` is that of the scanner over the ground."""
-    return ["[[weight]]", *_REGIONS[word](numbers, height_m), ""]
+    """The lines of a task file that ask for it; `height_m` is that of the scanner over the ground.
+
+    Raises:
+        TaskError: there is no such region.
+    """
+    lines = _REGIONS[word](numbers, height_m)
+    try:
+        _REGION.validate_python(tomllib.loads("\n".join(lines)))
+    except ValidationError as error:
+        wish = ":".join([word, *(f"{each:g}" for each in numbers)])
+        raise TaskError(f"--see {wish}: {'; '.join(map(str, faults_of(error, Task)))}") from error
+    return ["[[weight]]", *lines, ""]
 
 
 def _ground(numbers: Numbers, height_m: float) -> list[str]:

@@ -86,6 +86,10 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
         (["--see", "ceiling:1:2"], "1 numbers at most"),
         (["--see", "ceiling:0.2"], "ceiling_m = 0.2 is not above height_m = 0.4"),
         (["--see", "thing:0:3"], "a size and a distance above 0"),
+        (["--see", "thing:0.001:100"], "scanwright: --see thing:0.001:100: looks 0.00057 deg wide, at least 0.02"),
+        (["--see", "wall:0:0"], "scanwright: --see wall:0:0: distance_m = 0: Input should be greater than or equal"),
+        (["--height-m", "-1"], "scanwright: --height-m -1: from 0.001 to 10000 m over the ground"),
+        (["--height-m", "-1", "--see", "all"], "--height-m -1: from 0.001"),
         (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
         (["--robot", "box:1"], "box:LENGTH:WIDTH:HEIGHT"),
         (["--robot", "box:1:1:0.5"], "is not over it"),
@@ -98,6 +102,7 @@ def test_an_answer_that_makes_no_sense_is_one_line_and_no_file(command, here, ch
     code, _, complaints = command("new", "dog", *DOG, *change)
     assert (code, len(complaints)) == (2, 1)
     assert told in complaints[0]
+    assert ".toml:" not in complaints[0]  # no line of a file that is not there
     assert not list(here.iterdir())
 
 
