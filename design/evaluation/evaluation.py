@@ -228,7 +228,7 @@ def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 
 
 def _cap(cap: BlindCone) -> str:
     x, y, z = cap.axis_world
-    return f"{cap.half_angle_deg:.2f} deg about ({x:.3f}, {y:.3f}, {z:.3f})"
+    return f"{cap.half_angle_deg:.2f} deg about ({x:z.3f}, {y:z.3f}, {z:z.3f})"
 
 
 def _parse_lever(text: str) -> tuple[float, float, float]:

@@ -58,7 +58,7 @@ class Hole:
         if self.inner_deg == 0 and self.half_angle_deg < 20:
             wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm across for each metre away"
         return (
-            f"blind {heading(np.array(self.centre))}: {angle} about ({x:.3f}, {y:.3f}, {z:.3f}){wide}, "
+            f"blind {heading(np.array(self.centre))}: {angle} about ({x:z.3f}, {y:z.3f}, {z:z.3f}){wide}, "
             f"{percent(self.weight)} of the weight"
         )
 

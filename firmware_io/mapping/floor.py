@@ -45,12 +45,12 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
     area_m2 = _inner(squares[on_level]) * _CELL_M**2
     if area_m2 < _LEAST_M2:
         raise RecordingError(
-            f"floor: what lies lowest shares no level: {area_m2:.2g} m2 at z = {low_m:.2f} m, {_LEAST_M2:g} m2 at "
+            f"floor: what lies lowest shares no level: {area_m2:.2g} m2 at z = {low_m:z.2f} m, {_LEAST_M2:g} m2 at "
             f"least: {_GIVE_IT}"
         )
     if (below := float(np.mean(points_m[:, 2] < low_m - _THICK_M))) > _MOST_BELOW:
         raise RecordingError(
-            f"floor: {below:.0%} of the points lie below the widest level, z = {low_m:.2f} m, which is no floor then: "
+            f"floor: {below:.0%} of the points lie below the widest level, z = {low_m:z.2f} m, which is no floor then: "
             f"{_GIVE_IT}"
         )
     layer = points_m[np.abs(points_m[:, 2] - np.median(points_m[on_level, 2])) <= _THICK_M / 2]

@@ -108,7 +108,7 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource) -> tuple
     first = turned[0].as_quat()
     if np.linalg.norm(first[:3] - (first[:3] @ axis) * axis) < math.sin(ACROSS_RAD / 2):
         return angle + 2 * np.arctan2(first[:3] @ axis, first[3]), ""
-    named = ", ".join(f"{part:.3f}" for part in axis)
+    named = ", ".join(f"{part:z.3f}" for part in axis)
     return angle, f"{source}: angles count from the first one, about the axis ({named}) of {source.child}"
 
 

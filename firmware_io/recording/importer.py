@@ -67,8 +67,8 @@ class ImportSummary:
         return [
             *(f"warning: {warning}" for warning in self.warnings),
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
-            f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:.2f} to "
-            f"{high:.2f} deg, {self.duration_s:.1f} s, to {self.out}",
+            f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
+            f"{high:z.2f} deg, {self.duration_s:.1f} s, to {self.out}",
         ]
 
 

@@ -266,4 +266,4 @@ def _weakest(rows: Floats) -> Floats:
 
 def _axis(direction: Float64[ndarray, " 3"]) -> str:
     x, y, z = direction * np.sign(direction[np.argmax(np.abs(direction))]) + 0.0
-    return f"({x:.2f}, {y:.2f}, {z:.2f})"
+    return f"({x:z.2f}, {y:z.2f}, {z:z.2f})"

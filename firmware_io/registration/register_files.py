@@ -64,7 +64,7 @@ class RegisteredFiles:
             sigma_mm = 1e3 * np.sqrt(covariance[3:, 3:].trace())
             sigma_deg = np.degrees(np.sqrt(covariance[:3, :3].trace()))
             sure = f"sigma {sigma_mm:.2f} mm and {sigma_deg:.4f} deg" if covariance.any() else "the frame of the map"
-            lines.append(f"{name}: at ({x:.4f}, {y:.4f}, {z:.4f}) m, {sure}")
+            lines.append(f"{name}: at ({x:z.4f}, {y:z.4f}, {z:z.4f}) m, {sure}")
         return [*lines, f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}"]
 
 

@@ -8,7 +8,7 @@ import pytest
 from design.catalogue.catalogue import load_catalogue
 from design.density.beams import blind_zones, simulated_scan
 from design.density.spin import ball_search
-from design.objective.holes import heading, holes, percent
+from design.objective.holes import Hole, heading, holes, percent
 from design.objective.problem import problem_of
 from design.sphere.directions import weighted_samples
 from design.task.task import LoadedTask, Task
@@ -76,3 +76,7 @@ def test_a_direction_in_words(direction, words):
 @pytest.mark.parametrize("share, words", [(0, "0%"), (1e-7, "below 0.0001%"), (0.000195, "0.019%"), (0.134, "13.4%")])
 def test_a_share_that_is_there_is_never_written_as_nothing(share, words):
     assert percent(share) == words
+
+
+def test_a_direction_has_no_negative_zero():
+    assert "about (-0.819, 0.000, 0.574)" in Hole((-0.819, -1e-4, 0.574), 30.0, 0.0, 0.1).words()
