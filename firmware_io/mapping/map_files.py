@@ -47,13 +47,14 @@ class MapSummary:
         """The same in words."""
         grid, heights = self.grid, self.heights
         rows, columns = grid.cells.shape
+        kinds = (("occupied", OCCUPIED), ("free", FREE))
+        told = [f"{grid.count(kind):,} {word} ({grid.area_m2(kind):.2f} m2)" for word, kind in kinds]
         return [
             *(f"note: {line}" for line in self.said),
             *([f"left out {self.moved:,} points: another cloud was seen through them"] if self.moved else []),
-            f"floor at z = {heights.floor_m:.3f} m, obstacles from {heights.from_m:g} to {heights.to_m:g} m above it",
-            f"{columns} x {rows} cells of {grid.resolution_m:g} m: {grid.area_m2(OCCUPIED):.2f} m2 occupied, "
-            f"{grid.area_m2(FREE):.2f} m2 free",
-            f"wrote {self.points:,} points to {', '.join(str(path) for path in self.wrote)}",
+            f"floor at z = {heights.floor_m:z.3f} m, obstacles from {heights.from_m:g} to {heights.to_m:g} m above it",
+            f"mapped {self.points:,} points: {columns} x {rows} cells of {grid.resolution_m:g} m, {', '.join(told)}",
+            f"wrote {', '.join(str(path) for path in self.wrote)}",
         ]
 
 

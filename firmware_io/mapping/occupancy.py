@@ -61,9 +61,13 @@ class OccupancyGrid:
     resolution_m: float
     origin_m: Float64[ndarray, " 2"]
 
+    def count(self, value: int) -> int:
+        """How many cells have a value."""
+        return int(np.count_nonzero(self.cells == value))
+
     def area_m2(self, value: int) -> float:
         """Area of all cells of a value."""
-        return int(np.count_nonzero(self.cells == value)) * self.resolution_m**2
+        return self.count(value) * self.resolution_m**2
 
 
 def check_resolution(resolution_m: float) -> None:
@@ -111,7 +115,7 @@ def occupancy_grid(
     if not ends_m.size:
         raise RecordingError(
             f"no point and no beam between {heights.from_m:g} and {heights.to_m:g} m above the floor at "
-            f"z = {heights.floor_m:.2f} m: set --floor-m, --from-m or --to-m"
+            f"z = {heights.floor_m:z.2f} m: set --floor-m, --from-m or --to-m"
         )
     first = np.floor(ends_m.min(axis=0) / resolution_m) - 1
     columns, rows = (np.floor(ends_m.max(axis=0) / resolution_m) - first + 2).astype(np.int64)

@@ -60,8 +60,11 @@ def test_a_cloud_becomes_a_map(run, shop):
     assert (code, complaints) == (0, [])
     lines = told.splitlines()
     assert lines[0] == "floor at z = -0.900 m, obstacles from 0.1 to 1.8 m above it"
-    assert lines[-1].endswith("points to room.yaml, room.pgm")
     pixels = np.asarray(Image.open(shop / "room.pgm"))
+    occupied, free = (int((pixels == grey).sum()) for grey in (0, 254))
+    told_cells = f"{occupied:,} occupied ({occupied * 0.05**2:.2f} m2), {free:,} free ({free * 0.05**2:.2f} m2)"
+    assert lines[1].startswith("mapped ") and lines[1].endswith(told_cells)
+    assert lines[-1] == "wrote room.yaml, room.pgm"
     assert set(np.unique(pixels)) == {0, 205, 254}
     assert 10 < (pixels == 254).sum() * 0.05**2 < 7.2 * 5.6
     assert "free_thresh: 0.196" in (shop / "room.yaml").read_text()
