@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import tomllib
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -28,6 +30,23 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
+def read_text(path: Path) -> str:
+    """The text of a file in UTF-8, also where it begins with a byte order mark, as Windows' Notepad writes it.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is not UTF-8.
+    """
+    data = path.read_bytes()
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise ValueError("UTF-16 text: save it as UTF-8")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError("not UTF-8 text") from error
+    return io.StringIO(text, newline=None).read()
+
+
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The table of a TOML file.
 
@@ -35,7 +54,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         TaskError: the file cannot be read or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(read_text(path))
     except OSError as error:
         raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
     except RecursionError as error:
@@ -203,7 +222,7 @@ def _key_lines(path: Path) -> dict[tuple[str, ...], int]:
     table: tuple[str, ...] = ()
     statement, begun = "", 1
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, ValueError):
         return lines
     for number, line in enumerate(text.split("\n"), 1):

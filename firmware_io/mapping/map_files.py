@@ -18,7 +18,7 @@ from firmware_io.mapping.floor import find_floor
 from firmware_io.mapping.map_server import check_map_place, write_map
 from firmware_io.mapping.occupancy import FREE, OCCUPIED, Heights, OccupancyGrid, check_resolution, occupancy_grid
 from firmware_io.mapping.seen_through import Stand, seen_through
-from firmware_io.registration.poses import read_poses
+from firmware_io.registration.poses import cloud_names, read_poses
 
 _COUNT = "count"  # of points in a voxel, as `merge` of the registration writes it
 
@@ -76,7 +76,8 @@ def map_files(
         paths: files of clouds, z up.
         out: YAML file to write; the image goes beside it.
         scanner: angle set that all clouds were assembled with: its optical centre is where they were seen from.
-        poses: TUM file, a line for each cloud; without it the poses in the files.
+        poses: TUM file, a line for each cloud, by the names in its comments or in the order of the clouds; without it
+            the poses in the files.
         floor_m: height of the floor in the map; None to find it.
         from_m: above the floor; what is lower is driven over.
         to_m: above the floor; what is higher is driven under.
@@ -113,12 +114,13 @@ def _stands(
 ) -> tuple[list[Stand], list[str]]:
     """All clouds of all files in the frame of the map, and lines about what was not read."""
     named: list[tuple[Path, Cloud]] = []
-    said: list[str] = []
+    counts, said = [], []
     for path in paths:
         read, lines = read_clouds(path)
         said += lines
+        counts.append((path, len(read)))
         named += [(path, cloud) for cloud in read]
-    given = None if poses is None else read_poses(poses, len(named))
+    given = None if poses is None else read_poses(poses, cloud_names(counts))
     stands = []
     for k, (path, cloud) in enumerate(named):
         say(f"{path.name}: {len(cloud.points_m):,} points")

@@ -12,6 +12,7 @@ from numpy import ndarray
 from design.arrays import Pose
 from design.atomic_file import whole_file
 from design.errors import RecordingError
+from design.record import read_text
 from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
 from firmware_io.foreign import foreign, of_file
 
@@ -41,18 +42,41 @@ def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndar
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def read_poses(path: Path, count: int) -> list[Pose]:
-    """Poses of `count` clouds, one TUM line for each in their order.
+def cloud_names(clouds: Sequence[tuple[Path, int]]) -> list[str]:
+    """What clouds are called, by their files and how many each of these holds: no name is two clouds'."""
+    names = []
+    for path, count in clouds:
+        names += [path.stem] if count == 1 else [f"{path.stem}_{k}" for k in range(1, count + 1)]
+    if len(set(names)) < len(names):
+        return [f"{number}_{name}" for number, name in enumerate(names, 1)]
+    return names
+
+
+def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
+    """Poses of clouds, one TUM line for each: by the names in the comments above the lines, or in the clouds' order.
 
     Raises:
-        RecordingError: the file does not hold that.
+        RecordingError: the file does not hold that, or its comments name other clouds.
     """
-    text = foreign(f"{path}: cannot read", path.read_text, encoding="utf-8")
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if len(lines) != count:
-        raise RecordingError(f"{path}: {len(lines)} poses for {count} clouds; one line for each, in their order")
+    text = foreign(f"{path}: cannot read", read_text, path)
+    lines, said = [], []
+    above = ""
+    for line in map(str.strip, text.splitlines()):
+        if line and not line.startswith("#"):
+            lines.append(line)
+            said.append(above)
+        above = line[1:].strip() if line.startswith("#") and "qw" not in line.split() else ""
+    if len(lines) != len(names):
+        raise RecordingError(f"{path}: {len(lines)} poses for {len(names)} clouds; one line for each, in their order")
     rows = foreign(f"{path}: a line is time x y z qx qy qz qw", np.loadtxt, lines, ndmin=2)
-    if rows.shape != (count, 8) or not np.isfinite(rows).all():
+    if rows.shape != (len(names), 8) or not np.isfinite(rows).all():
         raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers")
+    if all(said):
+        if sorted(said) != sorted(names):
+            raise RecordingError(
+                f"{path}: its comments name {', '.join(said)}, the clouds are {', '.join(names)}: "
+                "leave the comments out where the order is the same"
+            )
+        rows = rows[[said.index(name) for name in names]]
     with of_file(path):
         return [pose_matrix(row[1:]) for row in rows]

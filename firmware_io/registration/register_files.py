@@ -15,7 +15,7 @@ from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from firmware_io.registration.merge import merge
 from firmware_io.registration.overlap_picture import overlap_picture
 from firmware_io.registration.pairwise import Pair
-from firmware_io.registration.poses import read_poses, write_covariances, write_poses
+from firmware_io.registration.poses import cloud_names, read_poses, write_covariances, write_poses
 from firmware_io.registration.register import Registration, register
 from firmware_io.registration.sensor_view import make_view
 
@@ -84,7 +84,8 @@ def register_files(
         paths: files of clouds, at least two clouds in all.
         out: the map, in any format.
         poses: TUM file to write; `.cov.csv` goes beside it.
-        start: TUM file of start poses; without it the poses in the files, if there are any, are the start.
+        start: TUM file of start poses, by the names in its comments or in the order of the clouds; without it the poses
+            in the files, if there are any, are the start.
         spacing_m: between the points that are registered.
         map_spacing_m: edge of the voxels of the map.
         scanner: angle set that all clouds were assembled with: what its covariance means for the poses is part of
@@ -100,14 +101,15 @@ def register_files(
             raise RecordingError(f"{name} {value} m: must be above 0")
     check_target(out)
     check_place(poses, RecordingError)
-    names, clouds, said = [], [], []
+    counts, clouds, said = [], [], []
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
             raise RecordingError(f"{path}: named twice; a cloud tells nothing of its own place")
         read, lines = read_clouds(path)
-        names += [path.stem] if len(read) == 1 else [f"{path.stem}_{k}" for k in range(1, len(read) + 1)]
+        counts.append(len(read))
         clouds += read
         said += lines
+    names = cloud_names(list(zip(paths, counts, strict=True)))
     if len(clouds) < 2:
         raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
     if scanner is None and all("joint_rad" in cloud.columns for cloud in clouds):
@@ -118,10 +120,8 @@ def register_files(
                 raise RecordingError(
                     f"{names[k]}: the very points of {names[i]}; a cloud tells nothing of its own place"
                 )
-    if len(set(names)) < len(names):
-        names = [f"{number}_{name}" for number, name in enumerate(names, 1)]
     if start is not None:
-        given = read_poses(start, len(clouds))
+        given = read_poses(start, names)
     else:
         given = [cloud.T_world_cloud for cloud in clouds] if any(cloud.placed for cloud in clouds) else []
     views = []

@@ -311,7 +311,7 @@ def test_given_poses_stay_in_their_world(command, tmp_path):
         *("--start", tmp_path / "start.tum", "--poses", tmp_path / "poses.tum"),
     )
     assert code == 0, out
-    found = read_poses(tmp_path / "poses.tum", 2)
+    found = read_poses(tmp_path / "poses.tum", ["a", "b"])
     np.testing.assert_allclose(found[0], truth[0], atol=1e-8)
     assert off_by(found[1], truth[1])[0] < 2e-3
     (merged,), _ = read_clouds(tmp_path / "map.e57")
@@ -371,7 +371,7 @@ def test_the_real_room_from_no_start(command, data, tmp_path):
     code, out, _ = command("register", *paths, "-o", tmp_path / "map.ply")
     assert code == 0, out
     assert "the sigmas take" not in out  # nobody knows whose angles they were
-    _, T = read_poses(tmp_path / "map.tum", 2)
+    _, T = read_poses(tmp_path / "map.tum", ["room_scan1", "room_scan2"])
     one, two = (read_clouds(path)[0][0].points_m.astype(float) for path in paths)
     start = frames.rigid(frames.Rz(0.6931), [1.79387, 0.720047, 0])
     (target, tree), (source, _) = (small_gicp.preprocess_points(points, 0.1, 20, 1) for points in (one, two))
@@ -388,5 +388,17 @@ def test_tum_lines_bring_poses_back(tmp_path):
     poses = [pose(30, 1, -2, 3, tilt_deg=5), pose_matrix([4, 5, 6, 0.5, 0.5, 0.5, -0.5])]
     clouds = [Cloud(np.zeros((1, 3)), start_ns=1_763_000_000_000_000_001), Cloud(np.zeros((1, 3)))]
     write_poses(tmp_path / "p.tum", ["a", "b"], clouds, np.array(poses))
-    np.testing.assert_allclose(read_poses(tmp_path / "p.tum", 2), poses, atol=1e-8)
+    np.testing.assert_allclose(read_poses(tmp_path / "p.tum", ["a", "b"]), poses, atol=1e-8)
     assert "1763000000.000000001 1.000000000" in (tmp_path / "p.tum").read_text()
+
+
+def test_poses_go_to_the_clouds_that_the_comments_name(tmp_path):
+    path = tmp_path / "p.tum"
+    poses = [pose(30, 1, -2, 3), pose(60, 4, 5, 6)]
+    write_poses(path, ["a", "b"], [Cloud(np.zeros((1, 3)))] * 2, np.array(poses))
+    np.testing.assert_allclose(read_poses(path, ["b", "a"]), poses[::-1], atol=1e-8)
+    with pytest.raises(RecordingError, match=r"p\.tum: its comments name a, b, the clouds are a, c: leave"):
+        read_poses(path, ["a", "c"])
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("# ") or "qw" in line]
+    path.write_text("\n".join(lines), encoding="utf-8-sig")
+    np.testing.assert_allclose(read_poses(path, ["b", "a"]), poses, atol=1e-8)
