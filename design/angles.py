@@ -28,7 +28,7 @@ from design import frames
 from design.arrays import Pose, Rotation, Setting, Vector
 from design.errors import TaskError
 from design.motion import Motion
-from design.record import Record, explain
+from design.record import Record, explain, read_text
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
@@ -115,9 +115,11 @@ def load_angles(path: str | Path) -> AngleSet:
         TaskError: the file is missing, is not JSON, or is not an angle set.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise TaskError(f"{path}: cannot read the angle set: {_reason(error)}") from error
+        text = read_text(Path(path))
+    except OSError as error:
+        raise TaskError(f"{path}: cannot read the angle set: {error.strerror}") from error
+    except ValueError as error:
+        raise TaskError(f"{path}: cannot read the angle set: {error}") from error
     try:
         found = AngleSet.model_validate_json(text, strict=True)
     except ValidationError as error:
@@ -157,7 +159,3 @@ def angles_in_use(folder: Path) -> AnglesInUse:
     if mounts[0] != mounts[1]:
         return AnglesInUse(path, designed, f"frames as designed: {calibrated} is of another mount than {path.name}")
     return AnglesInUse(calibrated, found, f"frames as calibrated, {calibrated}")
-
-
-def _reason(error: OSError | UnicodeDecodeError) -> str:
-    return error.strerror or str(error) if isinstance(error, OSError) else "not UTF-8 text"

@@ -9,7 +9,7 @@ import numpy as np
 
 from design.arrays import Array
 from design.errors import TaskError
-from design.record import read_npy
+from design.record import read_npy, read_text
 
 _MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg a pixel
 
@@ -24,6 +24,8 @@ def read_map(path: Path) -> Array:
         table = _map_table(path)
     except TaskError:
         raise
+    except OSError as error:
+        raise TaskError(f"{path}: cannot read the map: {error.strerror or error}") from error
     except Exception as error:  # pictures that are damaged fail in a dozen ways
         raise TaskError(f"{path}: cannot read the map: {error}") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
@@ -39,7 +41,7 @@ def _map_table(path: Path) -> Any:
     if path.suffix == ".npy":
         return read_npy(path, TaskError)
     if path.suffix == ".csv":
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         return np.loadtxt(text.splitlines(), delimiter=",", ndmin=2) if text.strip() else np.empty((0, 0))
     if path.suffix == ".png":
         from matplotlib.image import imread

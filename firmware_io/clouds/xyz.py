@@ -8,6 +8,7 @@ import numpy as np
 
 from design.atomic_file import whole_file
 from design.errors import RecordingError
+from design.record import read_text
 from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
 from firmware_io.foreign import foreign
 
@@ -17,7 +18,7 @@ _TYPES = {"|i1", "|u1", *(f"<{kind}{size}" for kind in "iu" for size in (2, 4, 8
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file of three or more numbers in a line; columns that the file does not name are numbered."""
-    text = foreign(f"{path}: cannot read", path.read_text, encoding="utf-8")
+    text = foreign(f"{path}: cannot read", read_text, path)
     lines = text.replace(",", " ").splitlines()
     comments = [line.lstrip("#/ ") for line in lines if line.startswith(("#", "//"))]
     numbers = [line for line in lines if line.strip() and not line.startswith(("#", "//"))]

@@ -15,7 +15,9 @@ from design.angles import AngleSet
 from design.arrays import Pose
 from design.camera import Camera
 from design.errors import RecordingError
+from design.record import read_text
 from firmware_io.assembly.axis_curve import axis_curve
+from firmware_io.foreign import foreign
 from firmware_io.poses.trajectory import Trajectory
 from firmware_io.recording.recording import Recording
 from firmware_io.samples import AxisCurve, straight
@@ -85,21 +87,18 @@ class _Shot:
 
 
 def _listed(path: Path) -> Iterator[_Shot]:
+    table = csv.DictReader(foreign(f"{path}: cannot read", read_text, path).splitlines(), skipinitialspace=True)
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            table = csv.DictReader(stream, skipinitialspace=True)
-            names = table.fieldnames or []
-            if "file" not in names or not {"time_ns", "joint_deg"} & set(names):
-                told = ", ".join(names) or "nothing"
-                raise RecordingError(f"{path}: columns {told}: one is `file`, another `time_ns` or `joint_deg`")
-            for number, row in enumerate(table, 2):
-                time_ns = int(row["time_ns"]) if "time_ns" in names else None
-                joint_rad = float(np.radians(float(row["joint_deg"]))) if "joint_deg" in names else None
-                if not row["file"]:
-                    raise RecordingError(f"{path}:{number}: no file named")
-                yield _Shot(path.parent / row["file"], time_ns, joint_rad)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot read: {error.strerror}") from error
+        names = table.fieldnames or []
+        if "file" not in names or not {"time_ns", "joint_deg"} & set(names):
+            told = ", ".join(names) or "nothing"
+            raise RecordingError(f"{path}: columns {told}: one is `file`, another `time_ns` or `joint_deg`")
+        for number, row in enumerate(table, 2):
+            time_ns = int(row["time_ns"]) if "time_ns" in names else None
+            joint_rad = float(np.radians(float(row["joint_deg"]))) if "joint_deg" in names else None
+            if not row["file"]:
+                raise RecordingError(f"{path}:{number}: no file named")
+            yield _Shot(path.parent / row["file"], time_ns, joint_rad)
     except (ValueError, TypeError) as error:
         raise RecordingError(f"{path}: not a number: {error}; time_ns is whole nanoseconds since 1970") from error
 
@@ -131,4 +130,4 @@ def opened(path: Path, camera: Camera) -> Iterator[Image.Image]:
                 )
             yield image
     except (OSError, ValueError) as error:  # pillow's own are OSErrors
-        raise RecordingError(f"{path}: cannot read the image: {error}") from error
+        raise RecordingError(f"{path}: cannot read the image: {getattr(error, 'strerror', None) or error}") from error

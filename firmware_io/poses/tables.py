@@ -9,6 +9,7 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from design.errors import RecordingError
+from design.record import read_text
 from firmware_io.foreign import foreign
 
 Row = tuple[int, Sequence[float]]
@@ -74,7 +75,7 @@ def lines_of(path: Path) -> list[str]:
     Raises:
         RecordingError: the file cannot be read.
     """
-    return foreign(f"{path}: cannot read", path.read_text, encoding="utf-8").splitlines()
+    return foreign(f"{path}: cannot read", read_text, path).splitlines()
 
 
 def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from design.arrays import Floats, Times
 from design.errors import RecordingError, suggest
+from design.record import read_text
 from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.bags import Source, number_at
@@ -122,7 +123,7 @@ def read_table(text: str) -> tuple[Times, Floats]:
     """
     name, _, column = text.partition(":")
     path = Path(name)
-    lines = foreign(f"{path}: cannot read the angles", path.read_text, encoding="utf-8").splitlines()
+    lines = foreign(f"{path}: cannot read the angles", read_text, path).splitlines()
     header = [word.strip().lstrip("#").strip() for word in next(csv.reader(lines[:1]), [])]
     when = _column(path, header, (*SECONDS, *NANOSECONDS), "time")
     angle = _column(path, header, (column,) if column else ANGLES, "angle")

@@ -21,6 +21,7 @@ from design.angles import AngleSet
 from design.arrays import Array, Pose
 from design.atomic_file import whole_file
 from design.errors import RecordingError
+from design.record import read_text
 
 URDF = "scanner.urdf"
 _RANGE_M = 10.0
@@ -154,10 +155,11 @@ def read_urdf(path: Path) -> str:
         RecordingError: it cannot be read.
     """
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise RecordingError(f"{path}: cannot read: {reason}") from error
+        return read_text(path)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot read: {error.strerror}") from error
+    except ValueError as error:
+        raise RecordingError(f"{path}: cannot read: {error}") from error
 
 
 def calibrated_urdf_place(out: Path) -> Path:

@@ -192,6 +192,12 @@ def test_of_a_malformed_file_each_line_names_the_file_and_one_the_field(tmp_path
         assert word in message
 
 
+def test_a_byte_order_mark_is_left_out(tmp_path):
+    path = tmp_path / "angles.json"
+    path.write_text(angle_set().to_json(), encoding="utf-8-sig")
+    assert load_angles(path) == angle_set()
+
+
 def test_an_unreadable_file_is_one_line(tmp_path):
     (tmp_path / "latin.json").write_bytes(b"\xff\xfe")
     for path, reason in [

@@ -145,7 +145,7 @@ def photograph(folder, of, column, shots):
         Image.fromarray(PAINT[face].reshape(SIZE[1], SIZE[0], 3)).save(folder / f"{k}.png")
         lines.append(f"{k}.png,{value}")
         taken.append((T, face.reshape(SIZE[::-1])))
-    (folder / "shots.csv").write_text("\n".join(lines) + "\n")
+    (folder / "shots.csv").write_text("\n".join(lines) + "\n", encoding="utf-8-sig")
     return taken
 
 

@@ -36,8 +36,9 @@ def assert_two_poses(trajectory):
 
 @pytest.mark.parametrize(("name", "text"), [("poses.txt", TUM), ("poses.tum", TUM), ("e.csv", EUROC), ("p.csv", PLAIN)])
 def test_a_file_is_read_to_the_nanosecond(tmp_path, name, text):
-    (tmp_path / name).write_text(text)
-    assert_two_poses(load_trajectory(str(tmp_path / name), tmp_path / "none.mcap"))
+    for encoding in ("utf-8", "utf-8-sig"):  # the latter with the mark of Windows' Notepad
+        (tmp_path / name).write_text(text, encoding=encoding)
+        assert_two_poses(load_trajectory(str(tmp_path / name), tmp_path / "none.mcap"))
 
 
 def topic_file(path, topic, kind, messages):

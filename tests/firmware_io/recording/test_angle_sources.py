@@ -72,7 +72,7 @@ def test_a_table_keeps_every_nanosecond(tmp_path, words):
     for time_ns, angle in rows:
         when = str(time_ns) if "ns" in words else f"{time_ns // SECOND}.{time_ns % SECOND:09d}"
         lines.append(",".join([when, *(["x"] if "note" in words else []), repr(angle)]))
-    (tmp_path / "log.csv").write_text("\n".join([*lines, "", ""]))
+    (tmp_path / "log.csv").write_text("\n".join([*lines, "", ""]), encoding="utf-8-sig")
     time_ns, angle = read_table(str(tmp_path / "log.csv"))
     assert list(zip(time_ns.tolist(), angle.tolist(), strict=True)) == rows
 
