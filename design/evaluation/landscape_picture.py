@@ -45,16 +45,20 @@ class LandscapePanel:
     label: str
 
 
-def landscape_picture(path: Path, result: SearchResult, title: str) -> None:
+def landscape_picture(path: Path, result: SearchResult, title: str) -> Path:
     """Map of J over alpha_laser, beta_laser and over alpha_rot, beta_rot; a curve where one of a pair is fixed.
 
     Args:
-        path: PNG to write.
+        path: PNG to write; `.png` is added to a name without a suffix.
         result: of the search. Scan planes that cannot win carry a lower bound of their J.
         title: line above all.
 
+    Returns:
+        The file.
+
     Raises:
         TaskError: the task fixes all four angles.
+        BuildError: the file cannot be written, or its suffix is of no picture.
     """
     best = result.best[0].angles_deg
     panels = [
@@ -73,11 +77,15 @@ def landscape_picture(path: Path, result: SearchResult, title: str) -> None:
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     figure.suptitle(title, fontsize=11)
+    file = path if path.suffix else path.with_suffix(".png")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110, metadata={"Software": None})
-    except (OSError, ValueError) as error:  # no such place, or no picture by its suffix
-        raise BuildError(f"{path}: cannot write the picture: {error}") from error
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file, dpi=110, metadata={"Software": None})
+    except OSError as error:
+        raise BuildError(f"{file}: cannot write the picture: {error.strerror or error}") from error
+    except ValueError as error:  # no picture by its suffix
+        raise BuildError(f"{file}: cannot write the picture: {error}") from error
+    return file
 
 
 def draw_landscape(axis: Axes, of: LandscapePanel) -> None:

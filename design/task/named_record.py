@@ -53,4 +53,13 @@ def _found(path: Path, shipped: Path, what: str) -> Path:
     named = shipped / f"{path}.toml"
     if path.parent == Path() and named.exists():
         return named
+    within = path / f"{what}.toml"
+    if within.is_file():
+        raise TaskError(f"{path}: this is a folder: name {within}")
+    if path.is_dir():
+        raise TaskError(f"{path}: this is a folder without a {within.name}, not a {what} file")
+    if path.exists():
+        raise TaskError(f"{path}: this is no regular file, so no {what} file")
+    if path.is_symlink():
+        raise TaskError(f"{path}: this is a link that leads to no file")
     raise TaskError(f"{path}: no such {what} file, and no shipped {what} of that name: {', '.join(names_in(shipped))}")

@@ -31,7 +31,7 @@ def optimise(
     if picture is not None:
         from design.evaluation.landscape_picture import landscape_picture
 
-        landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
+        picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
     from design.evaluation.metres import on_planes
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
@@ -39,6 +39,8 @@ def optimise(
         show_json(optimum.facts() | {"planes": [plane.facts() for plane in planes]})
     else:
         show([*optimum.lines(), *(f"one full scan, {plane.words()}" for plane in planes)])
+        if picture is not None:
+            print(f"wrote {picture}")
         hint(f"next: `scanwright build {task}` makes it")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from design.errors import TaskError
+from design.errors import BuildError, TaskError
 from design.evaluation.landscape_picture import landscape_picture
 from design.objective.problem import problem_of
 from design.search.search import search
@@ -63,4 +63,13 @@ def test_optimise_draws_it(command, tmp_path):
     code, out, _ = command("optimise", "ceiling", "--picture", tmp_path / "new/J.png")
     assert code == 0
     assert "covered 1,369 settings" in out
+    assert f"wrote {tmp_path / 'new/J.png'}" in out.splitlines()
     assert imread(tmp_path / "new/J.png").std() > 0.1
+
+
+def test_a_name_without_a_suffix_is_a_png_and_a_place_where_none_can_be_is_one_line(fixed, tmp_path):
+    curve = replace(fixed, axes=grid(lambda a, b: a + b, (0, 0), (-90, 90))[:13])
+    assert landscape_picture(tmp_path / "J", curve, "a curve") == tmp_path / "J.png"
+    assert [path.name for path in tmp_path.iterdir()] == ["J.png"]
+    with pytest.raises(BuildError, match=r"J\.png/no\.png: cannot write the picture: (Not a directory|File exists)$"):
+        landscape_picture(tmp_path / "J.png" / "no.png", curve, "a curve")

@@ -1,6 +1,7 @@
 """The task file: what is wrong in it is one clear line; what is right is written out and read back the same."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -165,6 +166,7 @@ WRONG = {
     "map is an archive": (a_map("archive.npy"), ["archive.npy"]),
     "map of no bytes": (a_map("blank.npy"), ["blank.npy"]),
     "table of words": (a_map("words.csv"), ["words.csv", "cannot read the map"]),
+    "table missing": (a_map("none.csv"), ["none.csv: cannot read the map: No such file or directory"]),
     "table with a short row": (a_map("ragged.csv"), ["ragged.csv", "cannot read the map"]),
     "table of no rows": (a_map("blank.csv"), ["blank.csv"]),
     "picture that is none": (a_map("fake.png"), ["fake.png", "cannot read the map"]),
@@ -224,24 +226,48 @@ def test_a_missing_file_a_folder_and_bytes_are_one_line(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+def test_a_byte_order_mark_is_no_statement_and_utf_16_is_named(tmp_path):
+    path = tmp_path / "task.toml"
+    path.write_text(BASE, encoding="utf-8-sig")  # as Notepad saves it
+    assert load_task(path).task.name == "mine"
+    path.write_text("nmae = 1\n" + BASE, encoding="utf-8-sig")
+    with pytest.raises(TaskError, match=r"task\.toml:1: nmae: unknown key"):
+        load_task(path)
+    path.write_text(BASE, encoding="utf-16")
+    with pytest.raises(TaskError, match=r"task\.toml: not a TOML file: UTF-16 text: save it as UTF-8$"):
+        load_task(path)
+
+
 def test_an_unknown_task_name_lists_the_shipped_ones(tmp_path):
     with pytest.raises(TaskError, match="ceiling, ground_ahead, indoor_urg, low_cost, pitching, rolling, uniform"):
         load_task(tmp_path.relative_to(tmp_path.parent) / "ground")
+
+
+def test_what_is_there_and_is_no_task_file_is_called_what_it_is(tmp_path):
+    loop, built = tmp_path / "loop", tmp_path / "built"
+    loop.symlink_to(loop)
+    built.mkdir()
+    for path, says in (
+        (loop, "loop: this is a link that leads to no file"),
+        (Path("/dev/null"), "/dev/null: this is no regular file, so no task file"),
+        (built, "built: this is a folder without a task.toml, not a task file"),
+    ):
+        with pytest.raises(TaskError, match=re.escape(says)):
+            load_task(path)
+    (built / "task.toml").write_text(BASE)
+    with pytest.raises(TaskError, match=re.escape(f"{built}: this is a folder: name {built / 'task.toml'}")):
+        load_task(built)
 
 
 def test_a_build_folder_of_the_same_name_does_not_hide_a_shipped_task(tmp_path, monkeypatch):
     """`scanwright build ground_ahead --out .` makes a folder ground_ahead; the next command still means the task."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ground_ahead").mkdir()
-    from pathlib import Path
-
     assert load_task(Path("ground_ahead")).task.name == "ground_ahead"
 
 
 @pytest.fixture
 def load_shipped():
-    from pathlib import Path
-
     return {name: load_task(Path(name)) for name in shipped_tasks()}
 
 
