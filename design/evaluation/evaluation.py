@@ -22,6 +22,7 @@ from design.objective.holes import Hole, holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.objective.tolerance import rise_words, sensitivity
+from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
 
 
@@ -201,11 +202,14 @@ def angles_in(text: str) -> tuple[float, float, float, float]:
     """
     try:
         alpha_rot, beta_rot, alpha_laser, beta_laser = (float(part) for part in text.split(","))
-        setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
-    except (ValueError, TaskError) as error:
+    except ValueError as error:
         raise TaskError(
             f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling"
         ) from error
+    try:
+        setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
+    except TaskError as error:
+        raise TaskError(f"--angles = '{text}': {error}") from error
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
@@ -215,8 +219,11 @@ def setting_rad(angles_deg: Sequence[float]) -> Setting:
     Raises:
         TaskError: these are not four angles.
     """
-    if len(angles_deg) != 4 or not all(abs(angle) <= 360 for angle in angles_deg):
+    if len(angles_deg) != len(NAMES):
         raise TaskError(f"angles_deg = {tuple(angles_deg)}: four numbers in degrees, such as (0, 90, 0, -90)")
+    for name, angle_deg in zip(NAMES, angles_deg, strict=True):
+        if not abs(angle_deg) <= 360:
+            raise TaskError(f"{name} = {angle_deg:g} deg: from -360 to 360")
     return np.radians(angles_deg)
 
 

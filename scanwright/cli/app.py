@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 from typing import Annotated, Any
 
@@ -67,7 +68,9 @@ def run() -> None:
         with own_voice():
             sys.exit(app(prog_name="scanwright", standalone_mode=False))
     except USAGE_ERROR as error:
-        complain(f"{error.format_message()} (see `{_named(error)} --help`)")
+        number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
+        advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
+        complain(f"{error.format_message().removesuffix('.')}{advice} (see `{_named(error)} --help`)")
         sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):
