@@ -38,6 +38,7 @@ Per = Literal["recording", "turn", "half"]
 _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
+_LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
 
@@ -205,7 +206,7 @@ def assemble_recording(
         height=source.beams.size,
         padding=width * source.beams.size - beam_count if width else 0,
         left_out=_left_out(counts),
-        said=(said, *_about_poses(poses), *_about_own_body(own_body, source)),
+        said=(said, *_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
     )
 
 
@@ -245,6 +246,17 @@ def _by_cloud(found: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Ite
 
 def _left_out(counts: Counter[int]) -> dict[str, int]:
     return {reason.name.lower(): counts[reason] for reason in Verdict if reason and counts[reason]}
+
+
+def _about_gaps(source: Recording) -> Iterator[str]:
+    """Time that is missing; scans that were left out on the way between two stops are not."""
+    usual_s = float(np.median(np.diff(source.stamp_ns))) / 1e9 if source.stamp_ns.size > 1 else math.inf
+    known_ns = np.union1d(source.stamp_ns, source.joint_log.time_ns) if source.held else source.stamp_ns
+    gap_s = np.diff(known_ns) / 1e9
+    if long := int(np.sum(gap_s > _LONG_GAP * usual_s)):
+        longest, at_s = gap_s.max(), (known_ns[gap_s.argmax()] - source.start_ns) / 1e9
+        others = f", and {long - 1} more such gaps" if long > 1 else ""
+        yield f"warning: {longest:.1f} s without a scan at {at_s:.1f} s (usually {usual_s:.3f} s apart){others}"
 
 
 def _about_poses(poses: Trajectory | None) -> Iterator[str]:

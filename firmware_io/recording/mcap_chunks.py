@@ -1,4 +1,4 @@
-"""The messages of an MCAP file, a chunk at a time.
+"""The messages of an MCAP file, read and written a chunk at a time.
 
 The layout is https://mcap.dev/spec. The `mcap` package reads the summary and unpacks the chunks; the records inside a
 chunk are cut here, because its reader makes an object of each record, which takes longer than all the rest.
@@ -11,24 +11,46 @@ from collections.abc import Collection, Iterator
 from contextlib import closing
 from operator import itemgetter
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.records import Chunk, ChunkIndex
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
+from mcap.writer import Writer
 
 from design.concurrency.ahead import ahead
 from design.errors import RecordingError
 from firmware_io.foreign import foreign
 
+CHUNK_S = 0.25
+"""What damage may cost: a chunk holds no more."""
 _MAGIC = b"\x89MCAP"
 _MESSAGE = 0x05
 _RECORD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 _Timed = tuple[int, int, str, bytes]  # log time [ns], place of the chunk, topic, bytes
+
+
+class TimedChunks(Writer):
+    """Ends a chunk of messages where the next one of their topics comes `CHUNK_S` after the first, or before it.
+
+    Each topic is timed by itself: clocks of two topics may have nothing in common.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        super().__init__(stream)
+        self._first_ns: dict[int, int] = {}  # of each channel in the chunk
+
+    def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
+        """As `Writer`."""
+        if abs(log_time - self._first_ns.get(channel_id, log_time)) >= CHUNK_S * 1e9:
+            self.flush()  # type: ignore[no-untyped-call]
+            self._first_ns.clear()
+        self._first_ns.setdefault(channel_id, log_time)
+        super().add_message(channel_id, log_time, data, publish_time, sequence)
 
 
 def read_topics(path: Path) -> dict[str, str]:

@@ -32,7 +32,7 @@ from design.errors import RecordingError, suggest
 from firmware_io.foreign import foreign
 from firmware_io.recording import ros_messages
 from firmware_io.recording.arrays import RecordingArrays, arrays_of
-from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
+from firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
 from firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
 from firmware_io.recording.metadata import NOTE, held_by
 from firmware_io.recording.ros_messages import Beams
@@ -64,10 +64,20 @@ class MessageWriter:
         RecordingError: a time is one that ROS cannot hold (before 1970, after 2038).
     """
 
-    def __init__(self, stream: Sink, path: Path, note: Mapping[str, str], attached: Mapping[str, str]) -> None:
-        """Args as for `RecordingWriter`; `attached` holds files (name -> text) that explain the messages."""
+    def __init__(
+        self,
+        stream: Sink,
+        path: Path,
+        note: Mapping[str, str],
+        attached: Mapping[str, str],
+        writer: type[Writer] = TimedChunks,
+    ) -> None:
+        """Args as for `RecordingWriter`; `attached` holds files (name -> text) that explain the messages.
+
+        Chunks end by the messages' times; `writer` is a plain one where `flush` ends them.
+        """
         self._path = path
-        self._writer = Writer(cast(Any, stream))  # it asks for no more than a Sink
+        self._writer = writer(cast(Any, stream))  # it asks for no more than a Sink
         self._writer.start(profile="ros2", library="scanwright")
         self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():

@@ -18,11 +18,12 @@ from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
+from mcap.writer import Writer
+
 from design.errors import RecordingError
+from firmware_io.recording.mcap_chunks import CHUNK_S
 from firmware_io.recording.recording import MessageWriter
 from firmware_io.samples import Scan
-
-CHUNK_S = 0.25
 
 
 class Recorder:
@@ -50,7 +51,7 @@ class Recorder:
             self._file = _WholeWrites(self._path)
         except OSError as error:
             raise self._error(error, "") from error
-        self._messages = MessageWriter(self._file, self._path, self._note, self._attached)
+        self._messages = MessageWriter(self._file, self._path, self._note, self._attached, Writer)
         self._thread = threading.Thread(target=self._keep, name="recorder", daemon=True)
         self._thread.start()
         return self

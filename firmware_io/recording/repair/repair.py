@@ -12,18 +12,18 @@ A file is called whole only when all of that holds, indexes say what they index,
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
-from mcap.writer import Writer
 
 from design.atomic_file import check_place, whole_file
 from design.errors import RecordingError
 from firmware_io.foreign import foreign
-from firmware_io.recording.mcap_chunks import read_messages
+from firmware_io.recording.mcap_chunks import TimedChunks, read_messages
 from firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages
 
 
@@ -48,22 +48,27 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
     data = foreign(f"{path}: cannot read", np.memmap, path, np.uint8, "r").data if size else memoryview(b"")
     found = survey(data)
     summary = found.summary
-    for message in whole_messages(data, found):
+    lost_before = 0
+    for at, message in whole_messages(data, found):
         topic = found.topic(message)
         if topic is None:
             summary.lost_messages += 1
             continue
         first, last = summary.times_ns
         summary.messages[topic] += 1
+        if lost_before < (lost_before := bisect(found.lost_at, at)):
+            summary.misses(last or found.said_ns[0], message.log_time)
         summary.times_ns = min(first, message.log_time), max(last, message.log_time)
     if not summary.messages:
         raise RecordingError(f"{path}: no whole message in it, there is nothing to save (is it an MCAP recording?)")
+    if lost_before < len(found.lost_at):
+        summary.misses(summary.times_ns[1], found.said_ns[1])
     summary.lost_messages = max(summary.lost_messages, found.announced - summary.messages.total())
     if summary.whole and not _read_alike(path, summary.messages):
         summary.mended["what readers stumble over"] += 1
     if not summary.whole:
         with whole_file(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
-            _write(Writer(stream), data, found)
+            _write(TimedChunks(stream), data, found)
     return summary
 
 
@@ -95,7 +100,7 @@ def _read_alike(path: Path, messages: Counter[str]) -> bool:
         return False
 
 
-def _write(writer: Writer, data: memoryview, found: Survey) -> None:
+def _write(writer: TimedChunks, data: memoryview, found: Survey) -> None:
     """Everything anew, schemas and channels under numbers of their own."""
     header = found.header or mcap.Header("ros2", "scanwright")
     writer.start(header.profile, header.library)
@@ -105,7 +110,7 @@ def _write(writer: Writer, data: memoryview, found: Survey) -> None:
         else:
             writer.add_attachment(extra.create_time, extra.log_time, extra.name, extra.media_type, extra.data)
     numbers: dict[int, int] = {}
-    for message in whole_messages(data, found):
+    for _, message in whole_messages(data, found):
         if found.topic(message) is None:
             continue
         if message.channel_id not in numbers:

@@ -27,6 +27,9 @@ from firmware_io.recording.repair.salvage import (
     unpacked_at,
 )
 
+_LEAST_GAP_NS = 50_000_000  # a shorter one is printed as nothing
+_MOST_TOLD = 8  # gaps
+
 
 @dataclass(slots=True)
 class RepairSummary:
@@ -39,6 +42,7 @@ class RepairSummary:
         lost_bytes: what is in no record that can be read, damaged chunks among it.
         mended: what else is damaged and is made anew -> how often.
         times_ns: log times of the first and of the last message.
+        missing_ns: log times before and after what is lost, where both are known.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
@@ -47,6 +51,12 @@ class RepairSummary:
     lost_bytes: int = 0
     mended: Counter[str] = field(default_factory=Counter)
     times_ns: tuple[int, int] = (2**64, 0)
+    missing_ns: list[tuple[int, int]] = field(default_factory=list)
+
+    def misses(self, before_ns: int, after_ns: int) -> None:
+        """Bytes are lost between messages of these times; 0 where one is not known."""
+        if before_ns and after_ns - before_ns >= _LEAST_GAP_NS:
+            self.missing_ns.append((before_ns, after_ns))
 
     @property
     def whole(self) -> bool:
@@ -63,11 +73,26 @@ class RepairSummary:
         if self.lost_bytes or self.lost_messages:
             chunks = f"{self.damaged_chunks} damaged chunks, {self.lost_messages:,} messages known to be lost"
             found.append(f"left out {self.lost_bytes:,} bytes that are not whole ({chunks})")
+            found += self._missing()
         else:
             found.append("every message is whole")
         if self.mended:
             found.append(f"made anew: {', '.join(f'{what} ({count})' for what, count in sorted(self.mended.items()))}")
         return [*found, f"wrote {out}"]
+
+    def _missing(self) -> list[str]:
+        """Where it has gaps, counted from its first message, in a line."""
+        if not self.missing_ns:
+            return []
+        begin_ns = min(self.times_ns[0], self.missing_ns[0][0])
+        gaps = [
+            f"{(after_ns - before_ns) / 1e9:.1f} s missing at {(before_ns - begin_ns) / 1e9:.1f} s"
+            for before_ns, after_ns in self.missing_ns[:_MOST_TOLD]
+        ]
+        if len(self.missing_ns) > _MOST_TOLD:
+            all_s = sum(after_ns - before_ns for before_ns, after_ns in self.missing_ns) / 1e9
+            gaps.append(f"and so on: {len(self.missing_ns)} gaps, {all_s:.1f} s in all")
+        return [", ".join(gaps)]
 
 
 @dataclass(slots=True)
@@ -82,6 +107,8 @@ class Survey:
     chunks: list[WholeChunk] = field(default_factory=list)
     loose: list[tuple[int, int]] = field(default_factory=list)  # where messages outside of chunks begin and end
     announced: int = 0
+    said_ns: tuple[int, int] = (0, 0)  # log times of the first and of the last message, by the index at the end
+    lost_at: list[int] = field(default_factory=list)  # where bytes are lost, increasing
 
     def learn(self, records: Iterable[Any]) -> None:
         """Keep schemas and channels, the first of each number."""
@@ -103,7 +130,10 @@ def survey(data: memoryview) -> Survey:
     lost, mended = found.summary, found.summary.mended
     index, end_of_data = index_at_the_end(data)
     chunk_indexes = {record.chunk_start_offset: record for record in index if isinstance(record, mcap.ChunkIndex)}
-    found.announced = sum(record.message_count for record in index if isinstance(record, mcap.Statistics))
+    for record in index:
+        if isinstance(record, mcap.Statistics):
+            found.announced = record.message_count
+            found.said_ns = (record.message_start_time, record.message_end_time)
     found.learn(index)
     mended["the index at the end"] += not index
     mended["the first or last bytes"] += not between_magics(data)
@@ -131,6 +161,7 @@ def survey(data: memoryview) -> Survey:
         elif isinstance(record, mcap.Chunk):
             lost.damaged_chunks += 1
             lost.lost_bytes += end - at
+            found.lost_at.append(at)
         elif isinstance(record, mcap.MessageIndex):
             if due is None:
                 lost.lost_messages += len(record.records)
@@ -142,11 +173,13 @@ def survey(data: memoryview) -> Survey:
             end = min(next_record(data, at, end, noted), end_of_data)
             lost.damaged_chunks += noted is not None
             lost.lost_bytes += end - at
+            found.lost_at.append(at)
         elif isinstance(record, mcap.Message):
             # any bytes are a message: one of a damaged length ends where nothing begins, and others begin within it
             begins = end if record_at(data, end)[0] is not None else next_record(data, at, at, None)
             if begins < end:
                 lost.lost_bytes += begins - at
+                found.lost_at.append(at)
                 end = begins
             else:
                 found.loose.append((at, end))
@@ -172,16 +205,16 @@ def survey(data: memoryview) -> Survey:
     return found
 
 
-def whole_messages(data: memoryview, found: Survey) -> Iterator[mcap.Message]:
-    """The whole messages as they stand in the file, whether their topic is known or not."""
+def whole_messages(data: memoryview, found: Survey) -> Iterator[tuple[int, mcap.Message]]:
+    """The whole messages as they stand in the file, behind the place of their chunk, of a known topic or not."""
     places: list[tuple[int, WholeChunk | None]] = [(chunk.begin, chunk) for chunk in found.chunks]
     places += [(at, None) for at, _ in found.loose]
     for at, chunk in sorted(places, key=itemgetter(0)):
         if chunk is None:
-            yield record_at(data, at)[0]
+            yield at, record_at(data, at)[0]
             continue
         unpacked, _ = unpacked_at(data, chunk.begin, chunk.end, chunk.packing)
         sure = len(unpacked) - 4 * chunk.doubtful
         for place, item in inside_of(unpacked):
             if isinstance(item, mcap.Message) and place + RECORD_HEAD.size + 22 + len(item.data) <= sure:
-                yield item
+                yield at, item

@@ -351,6 +351,26 @@ def test_the_steps_of_the_encoder_are_smoothed_unless_the_motor_stopped_or_one_a
     assert off_m["asked"] == off_m["held"] > 0.012
 
 
+@pytest.mark.parametrize("hold", ["true", "false"])
+def test_time_without_a_scan_is_said_but_not_the_way_between_two_stops(tmp_path, hold):
+    """Scans of 0.1 s; 2 s without one, in which angles came or did not."""
+    times_s = [0.1 * k for k in range(30) if not 10 <= k < 29]
+    for stops in (True, False):
+        joints_s = np.arange(-0.1, 3, 0.01) if stops else np.array([-0.1, *times_s, 3])
+        log = JointLog(START + np.rint(joints_s * 1e9).astype(np.int64), 0.1 * joints_s)
+        with RecordingWriter(tmp_path / "r.mcap", {"hold": hold}) as writer:
+            for sample in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
+                writer.joint(*sample)
+            for k, time_s in enumerate(times_s):
+                writer.scan(a_scan(k, stamp_ns=START + round(time_s * 1e9)))
+        summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply")
+        told = [line for line in summary.said if "without a scan" in line]
+        expected = (
+            [] if stops and hold == "true" else ["warning: 2.0 s without a scan at 0.9 s (usually 0.100 s apart)"]
+        )
+        assert told == expected
+
+
 def test_a_recording_without_a_single_point_is_refused(tmp_path):
     recording = write(tmp_path / "r.mcap", [a_scan(stamp_ns=START + 2 * 10**9)], a_log(0, 1))
     with pytest.raises(RecordingError, match="none of the 50 beams becomes a point: 50 outside_joint_log"):

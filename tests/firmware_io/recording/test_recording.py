@@ -236,6 +236,18 @@ def test_a_broken_recording_is_one_line(tmp_path, broken):
     assert "\n" not in str(caught.value)
 
 
+def test_a_chunk_holds_a_quarter_of_a_second_of_each_topic_whatever_its_clock(tmp_path):
+    with RecordingWriter(tmp_path / "r.mcap", {}) as writer:
+        for k in range(200):  # 40 a second, and angles of a clock that is years behind
+            writer.joint(k * 25_000_000, 0.1 * k)
+            writer.scan(a_scan(10**18 + k * 25_000_000))
+    with (tmp_path / "r.mcap").open("rb") as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes
+    assert len(chunks) == 20
+    assert {chunk.message_end_time - chunk.message_start_time for chunk in chunks} == {10**18 + 225_000_000}
+    assert [chunk.message_start_time for chunk in chunks] == [k * 250_000_000 for k in range(20)]
+
+
 def test_reading_holds_no_more_than_a_chunk_or_two(tmp_path):
     rng = np.random.default_rng(0)
 
@@ -248,7 +260,7 @@ def test_reading_holds_no_more_than_a_chunk_or_two(tmp_path):
         tracemalloc.stop()
         return peak_bytes
 
-    # one chunk is 1 MB and 6000 scans are 26 MB
+    # a chunk of 1 MB at most, and 6000 scans are 26 MB
     assert peak(6000) < peak(1500) + 3_000_000
 
 

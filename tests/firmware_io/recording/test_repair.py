@@ -221,6 +221,46 @@ def test_the_command_writes_beside_the_file_and_says_what_it_kept(tmp_path, jour
         assert (code, complaints) == (2, [f"scanwright: {tmp_path / other}: {says}"])
 
 
+def a_minute(path, lost_s):
+    """A recording of 60 s, 4 scans a second in chunks of a second or more, damaged where a list of times is."""
+    stream, ends = BytesIO(), [0]
+    writer = MessageWriter(stream, Path("minute"), {}, {}, Writer)
+    for number in range(240):
+        writer.scan(a_scan(EPOCH_NS + number * 250_000_000))
+        if number % 4 == 3:
+            writer.flush()
+            ends.append(stream.tell())
+    writer.finish()
+    data = bytearray(stream.getvalue())
+    for second in lost_s:
+        data[ends[second] + 70] ^= 0xFF
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("lost_s", "says"),
+    [
+        ([12], "1.2 s missing at 11.8 s"),
+        ([12, 13, 40], "2.2 s missing at 11.8 s, 1.2 s missing at 39.8 s"),
+        ([1], "1.2 s missing at 0.8 s"),
+        ([59], "1.0 s missing at 58.8 s"),
+        (range(2, 30, 2), "1.2 s missing at 15.8 s, and so on: 14 gaps, 17.5 s in all"),
+    ],
+)
+def test_what_is_missing_is_said_with_its_place(tmp_path, lost_s, says):
+    path = tmp_path / "r.mcap"
+    a_minute(path, lost_s)
+    lines = repair(path).lines(path, repaired_place(path))
+    assert lines[2].endswith(says), lines
+    again = repaired_place(path)
+    with again.open("rb") as stream:
+        spans = [
+            index.message_end_time - index.message_start_time
+            for index in make_reader(stream).get_summary().chunk_indexes
+        ]
+    assert max(spans) < 250_000_000
+
+
 @pytest.mark.parametrize("content", [b"", b"no recording" * 99, None])
 def test_what_is_no_recording_is_one_line(tmp_path, command, content):
     path = tmp_path / "r.mcap"

@@ -12,10 +12,11 @@ import pytest
 from mcap.reader import make_reader
 
 from design.errors import RecordingError
+from firmware_io.recording.mcap_chunks import CHUNK_S
 from firmware_io.recording.recording import MessageWriter, open_recording
 from firmware_io.recording.repair.repair import repair, repaired_place
 from firmware_io.samples import Scan
-from firmware_io.scan.recorder import CHUNK_S, Recorder
+from firmware_io.scan.recorder import Recorder
 
 
 def a_scan(stamp_ns, beams=5):
