@@ -16,7 +16,8 @@ _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
 def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Int64[ndarray, " turns"]:
     """Times at which the axis has turned by a further `whole_rad`, or turns back, increasing.
 
-    The first turn begins at `begin_ns`, and each way anew at its turning point.
+    The first turn begins at `begin_ns`, and each way anew at its turning point: a full scan of a sweep, there and back,
+    is two of them, as its ways see the same directions twice.
     """
     begin_ns = int(np.clip(begin_ns, log.time_ns[0], log.time_ns[-1]))
     later = log.time_ns > begin_ns

@@ -99,7 +99,8 @@ def assemble(
             several.
         organised: keep beam i of every scan in its row i, NaN where it became no point; else only points.
         lag_s: time by which the angle log is late.
-        per: one cloud for the recording, or for each (half) turn.
+        per: one cloud for the recording, or for each (half) turn, which ends where the axis turns back, too: a full
+            scan of a sweep, there and back, is two.
         poses: where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).
         imu: how it turned between two poses: a topic of `sensor_msgs/Imu`, or a CSV file with the gyro's wx wy wz.
         imu_rpy_deg: roll, pitch and yaw of the IMU on the platform that the poses are of; from /tf_static of the

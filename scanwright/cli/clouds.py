@@ -86,7 +86,11 @@ def assemble(
     organised: Organised = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
     per: Annotated[
-        Per, typer.Option(help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ...")
+        Per,
+        typer.Option(
+            help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ... A turn ends "
+            "where the axis turns back, too: of a sweep each way is one, and a full scan is two."
+        ),
     ] = Per.recording,
     poses: Annotated[
         str | None,
