@@ -66,7 +66,9 @@ def run() -> None:
     """Entry point: a line for each fault and exit 2 for what a person can mend, a traceback for a bug."""
     try:
         with own_voice():
-            sys.exit(app(prog_name="scanwright", standalone_mode=False))
+            code = app(prog_name="scanwright", standalone_mode=False)
+            sys.stdout.flush()  # what cannot be written is told here, not by Python at its end
+            sys.exit(code)
     except USAGE_ERROR as error:
         number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
         advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
@@ -82,5 +84,16 @@ def run() -> None:
     except OSError as error:
         if error.errno not in _OF_THE_SYSTEM:
             raise
-        complain(f"{error.filename or 'a file'}: {error.strerror}")
+        complain(f"{error.filename or _unnamed(error)}: {error.strerror}")
         sys.exit(2)
+
+
+def _unnamed(error: OSError) -> str:
+    """What the system refused and does not name: standard output, where that refuses one more line as well."""
+    try:
+        print(flush=True)  # what it refused before may have left its buffer
+    except OSError as again:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries again at its end
+        if again.errno == error.errno:
+            return "standard output"
+    return "a file"

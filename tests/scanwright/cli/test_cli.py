@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -174,6 +175,20 @@ def test_import_and_assemble_a_real_recording(command, data, tmp_path):
     assert "467,596 points of 589,065 beams" in out
     assert "left out 121,469 beams: no return" in out
     assert len(trimesh.load(cloud).vertices) == 467_596
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("words", [["--version"], ["catalogue"]])
+def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuffered):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "scanwright", *words],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        )
+    assert (done.returncode, done.stderr) == (2, "scanwright: standard output: No space left on device\n")
 
 
 def test_a_bug_shows_its_traceback(command, monkeypatch):
