@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
@@ -17,6 +18,7 @@ from cad.checks.remarks import products_of
 from cad.drawings.files import drawing_number
 from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.words import tied_at
 from cad.layout.drive import DriveLayout
 from cad.layout.joints import Joint
 from cad.screws import INSERT_LENGTH, SCREWS
@@ -109,6 +111,7 @@ def items_of(
     items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
     items += _wiring(scanner, assembly.layout.drive.switch)
+    items += _ties(assembly)
     items += _electrics(scanner, assembly.layout.drive.switch)
     items += _with_it(assembly.layout.drive, joints)
     items = [_ranged(item) for item in items]
@@ -203,9 +206,14 @@ def _wiring(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomI
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
-        ties = 2 + len(scanner.lidar.cable_y_mm)
-        note = "hub, plate and foot of the mount; price unknown"
-        yield BomItem("wiring", "cable tie, 2.5 mm", quantity=ties, source="assembly.md", note=note)
+
+
+def _ties(assembly: Assembly) -> Iterator[BomItem]:
+    """Cable ties, one for each place that the steps name."""
+    places = Counter(tied_at(assembly.layout, assembly.leads))
+    if places:
+        note = f"{', '.join(f'{count} at the {place}' for place, count in places.items())}; price unknown"
+        yield BomItem("wiring", "cable tie, 2.5 mm", quantity=places.total(), source="assembly.md", note=note)
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
@@ -254,9 +262,8 @@ def _electrics(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[B
     for branch in network.branches:
         blades[branch.fuse_a] = blades.get(branch.fuse_a, 0) + 1
     for amps, count in sorted(blades.items()):
-        yield BomItem(
-            "wiring", f"blade fuse, {amps:g} A", "ISO 8820-3", count, source=source, note="and one spare of each"
-        )
+        note = f"{count} in use, 1 spare"
+        yield BomItem("wiring", f"blade fuse, {amps:g} A", "ISO 8820-3", count + 1, source=source, note=note)
     main = next(box for box in network.boxes if box.name == "switch")
     yield BomItem("wiring", "main fuse with holder", "ISO 8820-3", 1, source=source, note=main.lines[0])
     yield BomItem("wiring", "switch, 12 V DC", quantity=1, source=source, note=main.lines[0])

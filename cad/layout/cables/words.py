@@ -11,6 +11,7 @@ from cad.layout.cables.standing import StandingLead
 from cad.layout.layout import Layout
 
 SPARE = 15.0  # mm more than its way, so that a joint can be made once again
+HUB, SHAFT, NECK, PLATE, FOOT = "hub", "shaft", "neck", "plate", "foot of the mount"  # where cables are tied
 
 
 def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
@@ -34,20 +35,30 @@ def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
     return " ".join(said)
 
 
+def tied_at(layout: Layout, leads: Sequence[RotorLead]) -> list[str]:
+    """Where cables are tied, a place for each tie: leads without a way, which a person lays, as those that have one."""
+    seat, found = layout.linkage.hub_tie, [PLATE] * len(layout.linkage.plate_ties)
+    if seat is not None and all(tied_mm(lead, seat) is not None for lead in leads if lead.path is not None):
+        found.insert(0, HUB)
+    elif leads:
+        found.insert(0, SHAFT if isinstance(layout.stack, BeltStack) else NECK)
+    return found if layout.deck.flat else [*found, FOOT]
+
+
 def _ties(layout: Layout, laid: Sequence[RotorLead]) -> list[str]:
     """How they are tied."""
-    seat, said = layout.linkage.hub_tie, []
-    if seat is not None and laid and all(tied_mm(lead, seat) is not None for lead in laid):
+    seat, places, said = layout.linkage.hub_tie, tied_at(layout, laid), []
+    if seat is not None and HUB in places:
         way = "in the groove of the tongue, under the bar" if seat.grooved else "over the tongue"
         said.append(
             "Pull a cable tie through the two slots of the hub's tongue, "
             f"{way}, and close it around what leaves the ring below: a pull on it ends there."
         )
-    elif isinstance(layout.stack, BeltStack) and laid:
+    elif SHAFT in places:
         said.append("Close a cable tie around shaft and bundles, just below the hub: a pull on them ends there.")
-    elif laid:
+    elif NECK in places:
         said.append("A cable tie around bundle and neck takes the pull off the ring.")
-    if layout.linkage.plate_ties:
+    if PLATE in places:
         said.append(
             "Another through the two slots of each tongue behind the plate, crossed between tongue and cable, holds "
             "the jacket of the lidar's cable."

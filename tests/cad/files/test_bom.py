@@ -75,6 +75,22 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
     assert all(row["number"] or row["supplier"] for row in rows if row["kind"] in ("bought", "screw", "nut"))
 
 
+def test_a_spare_of_each_fuse_is_counted_and_paid(rows, made):
+    wiring = (made.folder / "wiring.md").read_text(encoding="utf-8")
+    for row in rows:
+        if "blade fuse" in row["part"]:
+            used = len(re.findall(rf"^- F\d+, .*fuse {row['part'].removeprefix('blade fuse, ')},", wiring, re.M))
+            assert (int(row["quantity"]), row["note"].split(";")[0]) == (used + 1, f"{used} in use, 1 spare")
+            assert float(row["low_usd"]) == pytest.approx(0.3 * (used + 1))
+
+
+def test_there_is_a_cable_tie_for_every_place_that_the_layout_has(rows, made):
+    (row,) = [row for row in rows if row["part"] == "cable tie, 2.5 mm"]
+    layout = made.result.assembly.layout
+    assert layout.linkage.hub_tie is not None and not layout.linkage.plate_ties
+    assert (row["quantity"], row["note"].split(";")[0]) == ("2", "1 at the hub, 1 at the foot of the mount")
+
+
 def test_what_the_paper_asks_for_is_there(rows):
     wiring = [row["part"] for row in rows if row["kind"] == "wiring"]
     assert sum("USB" in part for part in wiring) == 2

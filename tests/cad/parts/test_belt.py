@@ -333,8 +333,9 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert rows["counterweight"].kind == "sawn" and "2 threads M4" in rows["counterweight"].note
     assert rows["main_shaft"].kind == "turned" and "main_shaft.step" in rows["main_shaft"].note
     assert any("soft tube" in part for part in rows)
-    ways = sum(lead.path is not None for lead in assembly.leads)
-    assert [row.quantity for part, row in rows.items() if "cable tie" in part] == [2 * ways]  # the capsule needs none
+    (tie,) = [row for part, row in rows.items() if "cable tie" in part]  # the capsule needs none
+    assert (tie.quantity, tie.note.split(";")[0]) == (2, "1 at the shaft, 1 at the foot of the mount")
+    assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):

@@ -9,8 +9,9 @@ from cad.checks.remarks import left_out_of
 from cad.layout.cables.leads import tied_mm
 from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
 from cad.layout.cables.ties import foot_ties_of
+from cad.layout.cables.words import tied_at
 from cad.layout.deck import FOOT_THICKNESS
-from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, HUB_TIE
+from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, HUB_TIE, PLATE_TIE
 
 TIE = (2.5, 1.1)  # width and thickness
 
@@ -74,6 +75,13 @@ def test_the_leads_leave_the_ring_under_the_tongue_near_enough_to_be_pulled_up(t
 def test_the_bar_of_a_counterweight_lies_on_the_ear_and_not_on_the_tie(parts_of):
     seat = parts_of(scanner_at(GROUND_AHEAD)).layout.linkage.hub_tie
     assert seat.grooved and seat.high - GROOVE + TIE[1] < seat.high
+
+
+def test_a_tie_is_counted_for_every_tongue_and_for_the_foot_of_a_mount(tied):
+    layout, left_out = tied.layout, {entry.what for entry in left_out_of(tied)}
+    plates = 0 if PLATE_TIE in left_out else len(layout.scanner.lidar.cable_y_mm)
+    foot = 0 if layout.deck.flat else 1
+    assert tied_at(layout, tied.leads) == ["hub"] + plates * ["plate"] + foot * ["foot of the mount"]
 
 
 def test_what_has_no_tongue_is_told(parts_of):
