@@ -10,6 +10,7 @@ from design.angles import load_angles
 from design.task.task import load_task
 from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
 from scanwright.pipeline.build import Build, build_task
+from scanwright.pipeline.manifest import require_as_built
 
 if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
@@ -56,13 +57,16 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
 def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
     """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
 
+    The parts are made again from `task.toml` and `angles.json`; a folder may hold these two alone.
+
     Raises:
         InstallError: the CAD kernel is not installed.
         TaskError: the folder has no angle set or no task.
-        BuildError: a part cannot be made.
+        BuildError: a file of the build is gone or was edited, or a part cannot be made.
     """
     require_kernel("check")
     folder = Path(folder)
+    require_as_built(folder)
     scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
     from cad.checks.run import check_scanner
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,11 +18,15 @@ from scanwright.cli.console import (
     Voice,
     complain,
     hint,
+    notes_of,
     show,
     show_json,
     voice,
 )
 from scanwright.cli.help import Commands
+
+if TYPE_CHECKING:
+    from cad.checks.check import Severity
 
 app = Commands("Parts")
 
@@ -46,7 +51,11 @@ def build(
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
 
-    built = api.build(task, out, say=Progress())
+    try:
+        built = api.build(task, out, say=Progress())
+    except KeyboardInterrupt as stop:
+        complain("; ".join(("stopped", *notes_of(stop))))
+        raise typer.Exit(130) from None
     show(built.lines(in_full=voice() is Voice.VERBOSE))
     hint(f"next: open {built.folder / 'report.html'}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
 
@@ -71,7 +80,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
     else:
         show(f"{entry.severity:7} {entry.message}" for entry in checks)
-        print(f"{len(checks) - len(failed)} of {len(checks)} without a failure")
+        print(_tally(Counter(entry.severity for entry in checks)))
     raise typer.Exit(1 if failed else 0)
 
 
@@ -103,3 +112,10 @@ def study(
     except KeyboardInterrupt:
         complain("stopped; the same command goes on where it was")
         raise typer.Exit(130) from None
+
+
+def _tally(found: Counter[Severity]) -> str:
+    """How many checks came to what, as the report says it."""
+    named = ("error", "warning", "note")
+    counts = [f"{found[severity]} {severity}{'' if found[severity] == 1 else 's'}" for severity in named]
+    return ", ".join([*counts, f"{found['pass']} passed"])

@@ -14,7 +14,7 @@ from design.angles import standard_settings
 from design.concurrency.processes import Packed, processes_beside
 from design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
-from scanwright.pipeline.manifest import first_difference, is_current, listed_files, write_manifest
+from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
 from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
@@ -122,9 +122,14 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
         InstallError: the CAD kernel is not installed.
         TaskError: no direction has a weight, or no setting keeps the limits.
         BuildError: no setting can be built, or the folder cannot be written.
+        KeyboardInterrupt: with a note of what became of the folder.
     """
     require_kernel("build")
-    made = None if is_current(target, loaded) else _make(loaded, target, say)
+    try:
+        made = None if is_current(target, loaded) else _made_again(loaded, target, say)
+    except KeyboardInterrupt as stop:
+        stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
+        raise
     return Build(target, listed_files(target), tuple(loaded.warnings()), made)
 
 
@@ -218,6 +223,14 @@ def _at(say: Say, stage: str) -> Say:
     """Progress that tells how much of the whole build is behind it."""
     share = BEHIND[stage]
     return lambda line: say(f"{line} ({share:.0%})")
+
+
+def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:
+    """Make a folder that is not current, and say whose work is lost by that."""
+    found = changes(target)
+    if found:
+        say(f"{target}: {found.words()}: making it again")
+    return _make(loaded, target, say)
 
 
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from design.concurrency.processes import ctrl_c_held_back
 from design.errors import BuildError
 from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
 
@@ -40,7 +41,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
                     shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
                     work.mkdir()
                 yield work
-                with _told_of(target):
+                with _told_of(target), ctrl_c_held_back():  # a folder is as it was, or finished
                     _refuse_what_is_in_the_way(work, target)
                     _move(work, target, moving)
             finally:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
@@ -20,6 +21,29 @@ from design.task.task import LoadedTask
 MANIFEST = "manifest.json"
 _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
 _ROOMS = ("design", "cad", "scanwright")
+_NAMED = 3  # files of a kind in one line; of more their number
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What became of the files of a build folder since its manifest was written.
+
+    Attributes:
+        gone: files that are no more.
+        edited: files with other bytes.
+    """
+
+    gone: tuple[str, ...]
+    edited: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        """Whether any file is not as it was built."""
+        return bool(self.gone or self.edited)
+
+    def words(self) -> str:
+        """The same in words, such as "a.stl is gone, b.csv was edited"."""
+        told = (self.gone, "is gone", "are gone"), (self.edited, "was edited", "were edited")
+        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in told if names)
 
 
 @cache
@@ -67,6 +91,31 @@ def inside(name: str) -> bool:
     return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name
 
 
+def changes(folder: Path, but: str | None = None) -> Changes:
+    """What is gone or was edited of a build folder, `but` left out; nothing where there is no manifest to tell."""
+    manifest = read_manifest(folder)
+    if not manifest and (folder / MANIFEST).exists():
+        return Changes((), (MANIFEST,))
+    files = {name: facts for name, facts in manifest.get("files", {}).items() if name != but}
+    here = {name: facts for name, facts in files.items() if inside(name) and (folder / name).is_file()}
+    gone = tuple(name for name in files if name not in here)
+    return Changes(gone, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
+
+
+def require_as_built(folder: Path, but: str | None = None) -> None:
+    """Refuse a build folder whose files are no longer of one build, `but` left out; one without a manifest passes.
+
+    Raises:
+        BuildError: a file is gone or was edited.
+    """
+    found = changes(folder, but)
+    if found:
+        raise BuildError(
+            f"{folder}: {found.words()} since it was built: build the folder again, or copy angles.json and task.toml, "
+            "with the files that it names, to a folder of their own"
+        )
+
+
 def is_current(folder: Path, loaded: LoadedTask) -> bool:
     """Whether a folder holds the finished build of this very task by this very program, every file as it was made."""
     manifest = read_manifest(folder)
@@ -75,7 +124,7 @@ def is_current(folder: Path, loaded: LoadedTask) -> bool:
         return False
     if manifest.get("versions") != versions() or manifest.get("code") != code_digest():
         return False
-    return all(inside(name) and _is_as_written(folder / name, facts) for name, facts in files.items())
+    return not changes(folder)
 
 
 def first_difference(folder: Path, again: Path) -> str | None:
@@ -140,7 +189,14 @@ def _version(name: str) -> str:
 
 
 def _is_as_written(path: Path, facts: Any) -> bool:
-    return path.is_file() and isinstance(facts, dict) and _sha256(path) == facts.get("sha256")
+    return isinstance(facts, dict) and _sha256(path) == facts.get("sha256")
+
+
+def _some(names: tuple[str, ...]) -> str:
+    """A few names, and how many there are beside them."""
+    if len(names) > _NAMED:
+        return f"{', '.join(names[:_NAMED])} and {len(names) - _NAMED} more"
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _facts(path: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import MapRegion, MeshRegion
 from design.task.task import LoadedTask, Task
-from scanwright.pipeline.manifest import enter, write_json
+from scanwright.pipeline.manifest import enter, require_as_built, write_json
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
@@ -60,10 +60,11 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
-        BuildError: another file is not as a build writes it.
+        BuildError: another file is gone, was edited, or is not as a build writes it.
     """
     from scanwright.report.page import REPORT, report_html
 
+    require_as_built(folder, but=REPORT)
     (folder / REPORT).write_text(report_html(folder, begin), encoding="utf-8")
     enter(folder, REPORT)
     return folder / REPORT

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -19,9 +20,10 @@ from design.errors import BuildError
 from design.search.optimum import find_optimum, rounded_to_error
 from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
+from scanwright.pipeline import build as pipeline
 from scanwright.pipeline.build import Build, Made
 from scanwright.pipeline.folder import fresh_folder
-from scanwright.pipeline.manifest import first_difference, is_current
+from scanwright.pipeline.manifest import first_difference, is_current, require_as_built
 
 METAL = ("servo_shaft", "journal_sleeve", "counterweight")
 PARTS = ("alignment_linkage", "slip_ring_adapter", "bearing_cage", "base_mount", *METAL)
@@ -122,6 +124,67 @@ def test_a_touched_file_is_no_current_build(tilted):
     assert not is_current(tilted, loaded)
     table.write_bytes(kept)
     assert is_current(tilted, loaded)
+
+
+def test_a_folder_of_two_designs_is_neither_checked_nor_reported(tilted, tmp_path, command):
+    folder = shutil.copytree(tilted, tmp_path / "mine")
+    shutil.rmtree(folder / "print")
+    (folder / "parts/servo_shaft.stl").unlink()
+    (folder / "angles.json").write_text((folder / "angles.json").read_text().replace("-20", "-25"))
+    report = (folder / "report.html").read_bytes()
+    for name in ("check", "report"):
+        code, out, (complaint,) = command(name, folder)
+        assert (code, out) == (2, "")
+        assert f"{folder}: parts/servo_shaft.stl, " in complaint
+        assert " more are gone, angles.json was edited since it was built: build the folder again" in complaint
+    assert (folder / "report.html").read_bytes() == report
+
+
+def test_angles_and_task_alone_are_no_build_that_could_have_changed(tilted, tmp_path):
+    for name in ("angles.json", "task.toml"):
+        shutil.copy(tilted / name, tmp_path)
+    require_as_built(tmp_path)
+    (tmp_path / "manifest.json").write_text("{")
+    with pytest.raises(BuildError, match=r"manifest\.json was edited since it was built"):
+        require_as_built(tmp_path)
+
+
+def test_a_build_says_whose_work_it_replaces_and_ctrl_c_what_became_of_it(tilted, tmp_path, command, monkeypatch):
+    folder, said = shutil.copytree(tilted, tmp_path / "tilted"), []
+    (folder / "parts/servo_shaft.stl").unlink()
+    (folder / "bom.csv").write_text("mine")
+
+    def stopped(_loaded, _target, _say):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "_make", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        pipeline.build_task(load_task(folder / "task.toml"), folder, said.append)
+    assert said == [f"{folder}: parts/servo_shaft.stl is gone, bom.csv was edited: making it again"]
+    code, out, complaints = command("build", folder / "task.toml", "--out", tmp_path)
+    assert (code, out, complaints) == (130, "", [f"scanwright: stopped; {folder} is as it was"])
+
+    def stopped_late(_loaded, target, _say):
+        shutil.copytree(tilted, target, dirs_exist_ok=True)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline, "_make", stopped_late)
+    _, _, complaints = command("build", folder / "task.toml", "--out", tmp_path)
+    assert complaints == [f"scanwright: stopped; {folder} is finished"]
+
+
+def test_ctrl_c_waits_until_all_files_are_moved(tmp_path, monkeypatch):
+    _build_of(tmp_path / "task", ["a.txt"])
+    replace = Path.replace
+
+    def interrupted(path, target):
+        os.kill(os.getpid(), signal.SIGINT)
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        _build_of(tmp_path / "task", ["b.txt", "c.txt"])
+    assert _files(tmp_path) == ["task/b.txt", "task/c.txt", "task/manifest.json"]
 
 
 REBUILD = """
