@@ -39,12 +39,15 @@ class Check:
     message: str
 
 
-def at_most(kind: str, value: float, limit: float, unit: str, where: str, what: str) -> Check:
-    """A check that fails above its limit."""
-    fails = value > limit
+def at_most(
+    kind: str, value: float, limit: float, unit: str, where: str, what: str, doubt: float | None = None
+) -> Check:
+    """A check that fails above its limit, and warns where `doubt` of the value reaches above it."""
+    fails, may_fail = value > limit, value + (doubt or 0.0) > limit
+    severity: Severity = "error" if fails else "warning" if may_fail else "pass"
     relation = "over" if fails else "of"
-    message = f"{where}: {what}: {value:.3g} {unit}, {relation} {limit:.3g}"
-    return Check(kind, "error" if fails else "pass", tidy(value), tidy(limit), unit, where, message)
+    message = f"{where}: {what}: {doubted(value, doubt)} {unit}, {relation} {limit:.3g}"
+    return Check(kind, severity, tidy(value), tidy(limit), unit, where, message)
 
 
 def at_least(kind: str, value: float, limit: float, unit: str, where: str, what: str) -> Check:
@@ -54,9 +57,9 @@ def at_least(kind: str, value: float, limit: float, unit: str, where: str, what:
     return Check(kind, "error" if fails else "pass", tidy(value), tidy(limit), unit, where, message)
 
 
-def note(kind: str, value: float | None, unit: str, where: str, what: str) -> Check:
-    """A value to know."""
-    shown = "not known" if value is None else f"{value:.3g} {unit}"
+def note(kind: str, value: float | None, unit: str, where: str, what: str, doubt: float | None = None) -> Check:
+    """A value to know, within its doubt."""
+    shown = "not known" if value is None else f"{doubted(value, doubt)} {unit}"
     return Check(kind, "note", None if value is None else tidy(value), None, unit, where, f"{where}: {what}: {shown}")
 
 
@@ -71,6 +74,11 @@ def horn_check(scanner: Scanner, moment_nm: float, what: str) -> Check:
     """The tilt moment on the servo's horn against its rating."""
     by = f", rated {scanner.servo.radial_load_n:g} N at {RATED_AT_MM:g} mm" if scanner.servo.radial_load_n else ""
     return rated("tilt_moment", moment_nm, rated_moment_nm(scanner), "N m", SERVO, what, by)
+
+
+def doubted(value: float, doubt: float | None) -> str:
+    """A value, and how far it may be off where that is told."""
+    return f"{value:.3g}" if doubt is None else f"{value:.3g} +- {doubt:.1g}"
 
 
 def spot(point: Array) -> str:

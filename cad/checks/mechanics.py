@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from cad.assembly.masses import rotor_of, rotor_weight
-from cad.checks.check import Check, Severity, at_most, note, tidy
+from cad.assembly.masses import LIDAR_DOUBT_MM, off_axis_doubt_m, rotor_of, rotor_weight
+from cad.checks.check import Check, Severity, at_most, doubted, note, tidy
 from cad.checks.loads.belt import belt_loads
 from cad.checks.loads.direct import direct_loads
 from cad.geometry.inertia import Inertial
@@ -32,10 +32,12 @@ def mechanics_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inerti
         bodies: of `masses.link_bodies`.
     """
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
+    doubt_m = off_axis_doubt_m(bodies)
+    off = "centre of mass off the axis"
     return [
-        note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", "centre of mass off the axis"),
-        *_torques(scanner, rotor, weight),
-        _flanks(scanner, rotor, weight),
+        note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * doubt_m),
+        *_torques(scanner, rotor, weight, weight.across_n * doubt_m),
+        _flanks(scanner, rotor, weight, doubt_m),
         *load_checks(scanner, stack, bodies),
     ]
 
@@ -48,15 +50,16 @@ def load_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) 
     return direct_loads(scanner, stack, weight)
 
 
-def _torques(scanner: Scanner, rotor: Inertial, weight: Weight) -> list[Check]:
+def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_nm: float) -> list[Check]:
     servo = scanner.servo
     limit = servo.lasting_torque_nm
     static = weight.across_n * weight.off_axis_m
     spin_up = spin_up_nm(scanner, rotor, weight)
     what = f"of {servo.name}, a fifth of its stall torque"
+    holds, spins = f"torque that holds the imbalance, {what}", f"torque to full speed in {SPIN_UP_S:g} s, {what}"
     return [
-        at_most("static_torque", static, limit, "N m", SERVO, f"torque that holds the imbalance, {what}"),
-        at_most("spin_up_torque", spin_up, limit, "N m", SERVO, f"torque to full speed in {SPIN_UP_S:g} s, {what}"),
+        at_most("static_torque", static, limit, "N m", SERVO, holds, doubt_nm),
+        at_most("spin_up_torque", spin_up, limit, "N m", SERVO, spins, doubt_nm),
     ]
 
 
@@ -69,18 +72,28 @@ def spin_up_nm(scanner: Scanner, rotor: Inertial, weight: Weight) -> float:
     return weight.across_n * weight.off_axis_m + about_axis * 2 * math.pi / period / SPIN_UP_S
 
 
-def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight) -> Check:
+def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_m: float) -> Check:
     """Where gravity swings the load from one flank of the gears to the other by the play between them.
 
-    The friction of ring and bearing, which would hold one flank, is in no data sheet: taken for none.
+    The friction of ring and bearing, which would hold one flank, is in no data sheet: taken for `RUBS_NM`.
     """
-    servo, torque = scanner.servo, weight.across_n * weight.off_axis_m
-    if torque <= RUBS_NM:
-        message = f"{SERVO}: gravity turns it with {torque:.1g} N m, no more than ring and bearing rub with"
+    servo, torque, doubt = scanner.servo, weight.across_n * weight.off_axis_m, weight.across_n * doubt_m
+    turns = f"with {doubted(torque, doubt)} N m"
+    severity: Severity = "warning" if play_matters(scanner) else "note"
+    if torque + doubt <= RUBS_NM:
+        message = f"{SERVO}: gravity turns it {turns}, no more than ring and bearing rub with"
         return Check("flanks", "pass", tidy(torque), RUBS_NM, "N m", SERVO, message)
-    if keeps_flank(scanner, rotor.centre_m[:2]):
-        message = f"{SERVO}: gravity turns it with {torque:.2g} N m, one way all over the sweep"
+    if keeps_flank(scanner, rotor.centre_m[:2], doubt_m):
+        message = f"{SERVO}: gravity turns it {turns}, one way all over the sweep"
         return Check("flanks", "pass", tidy(torque), None, "N m", SERVO, message)
+    if torque <= RUBS_NM:
+        message = (
+            f"{SERVO}: gravity turns {servo.name} {turns}, of {RUBS_NM:g} that ring and bearing rub with: nobody tells "
+            f"where the centre of mass of {scanner.lidar.name} is, within {LIDAR_DOUBT_MM:g} mm of the middle of its "
+            "body or so; look at the ripple that `scanwright scan` prints, and slide the counterweight, where there is "
+            "one, to the least"
+        )
+        return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", SERVO, message)
     grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
     x, y = rotor.centre_m[:2]
     azimuth = round(math.degrees(math.atan2(-y, -x))) % 360
@@ -89,9 +102,8 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight) -> Check:
         off = math.radians(servo.backlash_deg) * FAR_MM
         play = f"by {servo.backlash_deg:g} deg of play ({off:.0f} mm at 10 m)"
     message = (
-        f"{SERVO}: gravity turns {servo.name} with {torque:.2g} N m to and fro and changes the flank of its gears, "
+        f"{SERVO}: gravity turns {servo.name} {turns} to and fro and changes the flank of its gears, "
         f"{play}: an encoder on the output shaft sees that, one on the motor does not; {grams:.0f} g at "
         f"{BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x, would balance it"
     )
-    severity: Severity = "warning" if play_matters(scanner) else "note"
     return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", SERVO, message)

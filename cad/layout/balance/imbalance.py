@@ -54,8 +54,14 @@ def torque_nm(scanner: Scanner, moment: float) -> float:
     return moment * 1e-6 * STANDARD_GRAVITY * tilt_sine(scanner)
 
 
-def keeps_flank(scanner: Scanner, moment: Array) -> bool:
-    """Whether a sweep stays where gravity turns the rotor one way only, and so keeps the gears on one flank."""
+def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:
+    """Whether a sweep stays where gravity turns the rotor one way only, and so keeps the gears on one flank.
+
+    Args:
+        scanner: angles and products.
+        moment: mass times distance from the axis, shape (2,), or the distance alone: any unit.
+        doubt: how far that may be off in any direction, same unit.
+    """
     motion = scanner.angles.motion
     if not isinstance(motion, Sweep):
         return False
@@ -64,7 +70,8 @@ def keeps_flank(scanner: Scanner, moment: Array) -> bool:
     x = np.cos(gamma) * moment[0] - np.sin(gamma) * moment[1]
     y = np.sin(gamma) * moment[0] + np.cos(gamma) * moment[1]
     torque = x * down[1] - y * down[0]
-    return bool((torque > 0).all() or (torque < 0).all())
+    least = doubt * math.hypot(down[0], down[1])
+    return bool((torque > least).all() or (torque < -least).all())
 
 
 def play_matters(scanner: Scanner) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cad.checks.run as room
+from cad.assembly import masses
 from cad.checks.check import at_least, at_most, checks_text
 from cad.checks.clearance import together_check, turning_check
 from cad.checks.islands import islands_check, islands_of
@@ -19,10 +21,12 @@ from cad.checks.printing import printing_checks, thin_walls
 from cad.geometry.inertia import Inertial
 from cad.geometry.mesh import TriMesh, mesh_of
 from cad.geometry.print_pose import print_pose
+from cad.layout.balance.imbalance import keeps_flank
 from cad.layout.direct.sizing import direct_stack
 from cad.solids import box, location, upright
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
+from design.motion import Sweep
 from design.scanner import scanner_of
 
 
@@ -206,6 +210,46 @@ def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
     assert found.severity == "note"
 
 
+def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypatch):
+    scanner = scanner_for(0, 90, 30, -30)
+    turned = scanner.angles.T_rot_laser()
+    inertia = 1e-6 * np.eye(3)
+    lidar = Inertial(0.4, np.linalg.inv(turned)[:3, 3], inertia)  # on the axis
+
+    def found(x_m):
+        given = {"rot": Inertial(0.1, np.array([x_m, 0.0, -0.03]), inertia), "laser": lidar}
+        return {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), given)}
+
+    # 0.4 kg that may be 2 mm off, across a level axis; of 0.5 kg that turn it is 1.6 mm
+    static = found(0.001)["static_torque"]
+    assert static.severity == "pass" and f"{0.1 * 9.80665 * 0.001:.3g} +- 0.008 N m" in static.message
+    assert found(0.001)["centre_of_mass"].message.endswith("0.2 +- 2 mm")
+    flanks = found(0.001)["flanks"]
+    assert (flanks.severity, flanks.limit) == ("warning", 0.005)
+    assert "nobody tells where the centre of mass of UTM-30LX is" in flanks.message
+    assert "to and fro" in found(0.006)["flanks"].message
+    monkeypatch.setattr(masses, "LIDAR_DOUBT_MM", 0.5)
+    assert found(0.001)["flanks"].severity == "pass"
+
+
+def test_a_sweep_keeps_a_flank_only_if_no_doubt_turns_it():
+    scanner = scanner_for(0, 90, 30, -30)
+    swept = replace(
+        scanner, angles=scanner.angles.model_copy(update={"motion": Sweep(limits_deg=(-30, 30), period_s=4)})
+    )
+    down = -swept.angles.T_world_rot(0.0)[2, :2]
+    moment = np.array([down[1], -down[0]])  # turned most at the middle of the sweep, half of that at 60 deg
+    assert keeps_flank(swept, moment, 0.86)  # cos 30 deg
+    assert not keeps_flank(swept, moment, 0.87)
+
+
+def test_a_limit_within_the_doubt_of_a_value_warns():
+    found = at_most("k", 1.0, 1.5, "mm", "w", "what", 0.6)
+    assert (found.severity, found.message) == ("warning", "w: what: 1 +- 0.6 mm, of 1.5")
+    assert at_most("k", 1.0, 1.5, "mm", "w", "what", 0.5).severity == "pass"
+    assert at_most("k", 1.6, 1.5, "mm", "w", "what", 0.5).severity == "error"
+
+
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
     found = {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.3, -0.03))}
@@ -252,7 +296,10 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     code, out, _ = command("check", tmp_path)
     assert code == 0, out
     lines = out.splitlines()
-    assert lines[-1].endswith("without a failure") and any(line.startswith("pass") for line in lines)
+    found = Counter(line.split()[0] for line in lines[:-1])
+    assert found["pass"] > 20 and found["note"] > 5  # the report counts them apart as well
+    warned = f"{found['warning']} warning{'' if found['warning'] == 1 else 's'}"
+    assert lines[-1] == f"0 errors, {warned}, {found['note']} notes, {found['pass']} passed"
     assert any("sub_plate" in line for line in lines)
     assert sum(" mm at 10 m), " in line and "bend" in line and "+-" in line for line in lines) == 2
 
