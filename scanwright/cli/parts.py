@@ -116,6 +116,6 @@ def study(
 
 def _tally(found: Counter[Severity]) -> str:
     """How many checks came to what, as the report says it."""
-    named = ("error", "warning", "note")
+    named: tuple[Severity, ...] = ("error", "warning", "note")
     counts = [f"{found[severity]} {severity}{'' if found[severity] == 1 else 's'}" for severity in named]
     return ", ".join([*counts, f"{found['pass']} passed"])
