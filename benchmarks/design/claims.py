@@ -30,6 +30,7 @@ from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.objective.stated_error import error_words
 from design.scene.surface import Surface, cell_directions
 from design.search.constraints import Requirements
 from design.search.families import EQUAL, Family
@@ -245,9 +246,12 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
     verdict = "BEATEN" if result.beaten_by > 0 else "unbeaten"
     once = "each family once" if result.once else "A FAMILY TWICE"
     print(f"{loaded.task.name}: {verdict}, {once}")
-    print(f"  {best.angles_deg}: J = {best.score.J:.6f} +- {best.score.J_error:.0e} {best.word}")
+    print(f"  {best.angles_deg}: J = {best.score.J:.6f} +- {error_words(best.score.J, best.score.J_error)} {best.word}")
     for name, (setting, rival) in result.rivals.items():
-        print(f"  {setting.round(2).tolist()}: J = {rival.J:.6f} +- {rival.J_error:.0e} {name}", flush=True)
+        print(
+            f"  {setting.round(2).tolist()}: J = {rival.J:.6f} +- {error_words(rival.J, rival.J_error)} {name}",
+            flush=True,
+        )
 
 
 def print_evolution(tasks: range, seed: int) -> None:
@@ -267,7 +271,8 @@ def print_evolution(tasks: range, seed: int) -> None:
         word = f"BEATEN by {result.beaten_by:.1e}" if result.beaten_by > 0 else "unbeaten"
         best, task = result.best.score, loaded.task
         print(
-            f"task {i}, {task.motion.mode}, {task.density.objective}: {best.J:.5f} +- {best.J_error:.0e} {word}",
+            f"task {i}, {task.motion.mode}, {task.density.objective}: "
+            f"{best.J:.5f} +- {error_words(best.J, best.J_error)} {word}",
             flush=True,
         )
         if result.beaten_by > 0:

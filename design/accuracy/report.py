@@ -17,6 +17,7 @@ from design.accuracy.work_precision import MethodsMeasured, best_points, measure
 from design.evaluation.picture_files import save_picture
 from design.motion import Shortest
 from design.objective.problem import problem_of
+from design.objective.stated_error import error_words
 from design.search.optimum import find_optimum
 from design.task.task import LoadedTask
 
@@ -119,7 +120,7 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
     work_precision_picture(folder / "work_precision.png", measured, f"{loaded.task.name}: {optimum.title}")
     lines = [
         this_machine(),
-        f"reference J = {truth.J:.9f} +- {truth.J_error:.0e}; the worst and the median error of "
+        f"reference J = {truth.J:.9f} +- {error_words(truth.J, truth.J_error)}; the worst and the median error of "
         f"{len(measured.truths)} settings, this one and others of its ranges; times of this one",
     ]
     for point, front in zip(points, best_points(points, measured.floor), strict=True):

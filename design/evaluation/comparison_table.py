@@ -9,6 +9,7 @@ from pathlib import Path
 from design.catalogue.products import Multibeam
 from design.evaluation.comparison import SCANNERS, ComparisonRow
 from design.objective.holes import percent
+from design.objective.stated_error import error_words
 from design.task.task import LoadedTask
 
 
@@ -22,11 +23,11 @@ def table(rows: list[ComparisonRow]) -> list[str]:
     ]
     for row in rows:
         lines.append(
-            f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f} {row.J_error:6.0e}"
-            f" {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13} {row.gap_deg:9.3f} {row.layers:6}"
-            f" {row.points_per_s:9,.0f} {_known(row.range_m, ',g'):>9} {_known(row.range_sigma_mm, 'g'):>10}"
-            f" {_known(row.beams_per_ball, '.4g'):>7} {_known(row.beams_per_ball_per_usd, '.3g'):>8}"
-            f" {_known(row.cost_usd, ',.0f'):>7}"
+            f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f}"
+            f" {error_words(row.J, row.J_error):>6} {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13}"
+            f" {row.gap_deg:9.3f} {row.layers:6} {row.points_per_s:9,.0f} {_known(row.range_m, ',g'):>9}"
+            f" {_known(row.range_sigma_mm, 'g'):>10} {_known(row.beams_per_ball, '.4g'):>7}"
+            f" {_known(row.beams_per_ball_per_usd, '.3g'):>8} {_known(row.cost_usd, ',.0f'):>7}"
         )
     return lines
 

@@ -21,6 +21,7 @@ from design.objective.ball_search import BallScore, ball_score
 from design.objective.holes import Hole, holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.objective.stated_error import error_words, rounded_to_error
 from design.objective.tolerance import rise_words, sensitivity
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
@@ -111,9 +112,9 @@ class Evaluation:
                 [f"hole           {hole.words()}" for hole in self.holes]
                 or [f"holes          none: every direction that matters has beams within {ball_deg:g} deg"]
             ),
-            f"J              {J.J:.5f} +- {J.J_error:.1e}   mean of g(true count) over the start phase",
-            f"J_lower        {J.J_lower:.5f}             g of the mean count: a lower bound",
-            f"J_ball         {ball.J:.5f} +- {ball.J_error:.1e}   ball search over 8 simulated scans",
+            f"J              {J.J:.5f} +- {error_words(J.J, J.J_error)}   mean of g(true count) over the start phase",
+            f"J_lower        {J.J_lower:.5f}           g of the mean count: a lower bound",
+            f"J_ball         {ball.J:.5f} +- {error_words(ball.J, ball.J_error)}   ball search over 8 simulated scans",
             f"blind          {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
             "weight",
             f"masked         {seen.masked_fraction:.2%} of the sphere",
@@ -130,7 +131,8 @@ class Evaluation:
         if self.hit is not None:
             for found in self.hit.chances:
                 beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
-                chance = f"{found.chance:.2%} +- {found.error:.2%}"
+                _, error = rounded_to_error(100 * found.chance, 100 * found.error)
+                chance = f"{found.chance:.2%} +- {error:g}%"
                 lines.append(f"pole           {chance} get at least {beams} ({self.hit.stands} azimuths)")
         if self.surfaces is not None:
             low, middle = self.surfaces["lowest_points_per_m2"], self.surfaces["median_points_per_m2"]

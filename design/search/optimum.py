@@ -16,6 +16,7 @@ from design.motion import Shortest
 from design.objective.holes import holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.objective.stated_error import error_words, rounded_to_error
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.search import SearchResult, search
@@ -141,13 +142,14 @@ class Optimum:
                 gain = math.exp(other.J - best.J)
                 lines.append(f"beams per ball over the weighted region: {gain:.2f} x {name} (J = {other.J:.4f})")
             else:
-                lines.append(f"J = {other.J:.4f} +- {other.J_error:.0e} for {name}")
+                lines.append(f"J = {other.J:.4f} +- {error_words(other.J, other.J_error)} for {name}")
         return lines
 
 
 def _row(family: Family) -> str:
     angles = "".join(f"{a:{width}.2f}" for a, width in zip(family.angles_deg, (11, 10, 13, 12), strict=True))
-    return f"{angles} {family.score.J:9.4f}   {family.score.J_error:.0e} {family.members:9} {family.word}"
+    J, J_error = family.score.J, error_words(family.score.J, family.score.J_error)
+    return f"{angles} {J:9.4f}   {J_error} {family.members:9} {family.word}"
 
 
 def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
@@ -193,14 +195,3 @@ def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
             "versions": {"scanwright": version("scanwright")},
         }
     )
-
-
-def rounded_to_error(value: float, error: float) -> tuple[float, float]:
-    """A value rounded to one digit of its error, and the error rounded up to hold the rounding too."""
-    if not error > 0:
-        return value, error
-    digits = -int(np.floor(np.log10(error)))
-    unit = 10.0**-digits
-    rounded = round(value, digits)
-    total = error + abs(value - rounded)
-    return rounded, round(float(np.ceil(total / unit - 1e-9)) * unit, digits)

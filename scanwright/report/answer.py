@@ -13,8 +13,8 @@ from design.evaluation.gaps import gaps
 from design.objective.holes import holes
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.objective.stated_error import rounded_to_error
 from design.objective.tolerance import sensitivity
-from design.search.optimum import rounded_to_error
 from design.shadow import Shadow
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask

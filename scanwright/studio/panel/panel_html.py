@@ -8,6 +8,7 @@ from html import escape
 
 from design.evaluation.metres import PlaneFigures
 from design.objective.holes import percent
+from design.objective.stated_error import error_words
 from scanwright.serving.style import COLOUR_STOPS
 from scanwright.studio.panel.facts import WALL_M, Facts
 from scanwright.studio.view.coloured_sphere import LEAST_OF_HIGHEST
@@ -20,7 +21,7 @@ def facts_html(facts: Facts, log: bool) -> str:
     """The facts of the present setting; `log`: J is the mean of -ln(1 + d), whose differences are ratios."""
     state = "exact" if facts.exact else "dragging"
     rows = [
-        ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {facts.J_error:.0e}, {state}"),
+        ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}"),
         *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.standard.items()),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),

@@ -8,6 +8,7 @@ import pytest
 from design.catalogue.catalogue import load_catalogue
 from design.objective.problem import problem_of
 from design.objective.score import score_on
+from design.objective.stated_error import error_words, rounded_to_error
 from design.task.task import LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [60, 140], "phi_deg": [-50, 50]}
@@ -59,3 +60,20 @@ def test_a_lowest_count_is_at_least_one_uncertain(motion):
     p = problem(motion | {"period_s": 20.0}, objective="worst", ball_radius_deg=4.0)
     found = score_on(p, np.radians([0.0, 0.0, 90.0, 0.0]), 1600)
     assert found.least > 1 and found.J_error >= np.log1p(found.least) - np.log1p(found.least - 1)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [(-6.128414, 5.5e-5, (-6.12841, 6e-5)), (1.0, 0.0, (1.0, 0.0)), (-5.29596, 9.96e-5, (-5.29596, 1e-4))],
+)
+def test_a_figure_is_rounded_to_its_error(value, error, expected):
+    assert rounded_to_error(value, error) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "told"),
+    [(-6.12764, 1.486e-4, "2e-04"), (-6.12764, 4.9e-4, "6e-04"), (0.0, 0.0, "0e+00"), (-5.823463, 7.01e-5, "8e-05")],
+)
+def test_a_bound_is_never_told_smaller_than_it_is(value, error, told):
+    assert error_words(value, error) == told
+    assert float(told) >= error

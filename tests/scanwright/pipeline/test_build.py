@@ -17,7 +17,7 @@ from patience import BOUND_S
 from cad.findings import PartFinding
 from design.angles import load_angles
 from design.errors import BuildError
-from design.search.optimum import find_optimum, rounded_to_error
+from design.search.optimum import find_optimum
 from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
 from scanwright.pipeline import build as pipeline
@@ -379,14 +379,6 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BuildError, match="cannot write the build folder"), fresh_folder(tmp_path / "file" / "task"):
         pass
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "expected"),
-    [(-6.128414, 5.5e-5, (-6.12841, 6e-5)), (1.0, 0.0, (1.0, 0.0)), (-5.29596, 9.96e-5, (-5.29596, 1e-4))],
-)
-def test_a_figure_is_rounded_to_its_error(value, error, expected):
-    assert rounded_to_error(value, error) == pytest.approx(expected, abs=1e-12)
 
 
 def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
