@@ -229,7 +229,7 @@ def _layers(loaded: LoadedTask) -> tuple[list[_Layer], list[_Layer]]:
         else:
             painted = np.where(one.holds(d), one.value_at(d), painted)
     lidar = loaded.lidar
-    reach = (lidar.range_practical_mm or lidar.range_max_mm) / 1000
+    reach = lidar.practical_range_m
     in_range = (surface.range_m >= lidar.range_min_mm / 1000) & (surface.range_m <= reach)
     hidden = np.zeros(len(d), dtype=bool)
     for one in masks:

@@ -131,6 +131,16 @@ class Lidar(Product):
             raise ValueError(f"range_min_mm {self.range_min_mm} is not below range_max_mm {self.range_max_mm}")
         return self
 
+    @property
+    def stated_range_m(self) -> float:
+        """The farthest that it sees, as its maker states it."""
+        return self.range_max_mm / 1000
+
+    @property
+    def practical_range_m(self) -> float:
+        """The farthest that its users get where that is known, else as stated: what a scanner can count on."""
+        return (self.range_practical_mm or self.range_max_mm) / 1000
+
     def bearings_rad(self) -> Float[ndarray, " beams"]:
         """Angle of every beam about the scan-plane normal, 0 to the front, shape (beams,) (SCIP 2.0, p. 5)."""
         steps = np.arange(self.first_step, self.last_step + 1)

@@ -40,7 +40,8 @@ MASS, PRICE = _of("mass g", "mass_g"), _of("price USD", "price_usd")
 _STEPS = ("steps_per_turn", "first_step", "last_step")
 FIGURES: dict[type[Product], tuple[Figure, ...]] = {
     Lidar: (
-        Figure("range m", ("range_practical_mm", "range_max_mm"), lambda p: range_m(p)),
+        _of("stated m", "range_max_mm", 1 / 1000),
+        _of("practical m", "range_practical_mm", 1 / 1000),
         Figure("from m", ("range_min_mm",), lambda p: p.range_min_mm / 1000),
         Figure("field deg", _STEPS, lambda p: (p.last_step - p.first_step) * 360 / p.steps_per_turn),
         Figure("step deg", _STEPS[:1], lambda p: 360 / p.steps_per_turn),
@@ -107,11 +108,6 @@ FIGURES: dict[type[Product], tuple[Figure, ...]] = {
 }
 
 
-def range_m(lidar: Lidar) -> float:
-    """How far a lidar really sees: what its users get where that is known, else what its maker says."""
-    return (lidar.range_practical_mm or lidar.range_max_mm) / 1000
-
-
 def chosen(
     products: Iterable[Product],
     *,
@@ -120,7 +116,10 @@ def chosen(
     max_mass_g: float | None = None,
     max_price_usd: float | None = None,
 ) -> list[Product]:
-    """The products that keep every bound that is given; a product whose figure nobody knows keeps none on it."""
+    """The products that keep every bound that is given; a product whose figure nobody knows keeps none on it.
+
+    `min_range_m` is asked of the practical range, which is the stated one where nobody knows better.
+    """
 
     def at_most(product: Product, field: str, most: float | None) -> bool:
         held = getattr(product, field, None)
@@ -130,7 +129,7 @@ def chosen(
         product
         for product in products
         if (kind is None or product.kind == kind)
-        and (min_range_m is None or (isinstance(product, Lidar) and range_m(product) >= min_range_m))
+        and (min_range_m is None or (isinstance(product, Lidar) and product.practical_range_m >= min_range_m))
         and at_most(product, "mass_g", max_mass_g)
         and at_most(product, "price_usd", max_price_usd)
     ]

@@ -85,7 +85,7 @@ def parse_pole(text: str, lidar: Lidar) -> Pole:
         width_mm = height_mm = range_m = np.nan
     if not (0 < width_mm < np.inf and 0 < height_mm < np.inf and 0 < range_m < np.inf):
         raise TaskError(f"--pole = '{text}': WIDTH_MM,HEIGHT_MM,RANGE_M, all above 0, such as --pole=20,1000,5")
-    low, high = lidar.range_min_mm / 1000, lidar.range_max_mm / 1000
+    low, high = lidar.range_min_mm / 1000, lidar.practical_range_m
     if not low <= range_m <= high:
         raise TaskError(f"--pole = '{text}': range_m = {range_m:g}: the {lidar.name} sees from {low:g} to {high:g} m")
     if width_mm / 1000 >= 2 * range_m:

@@ -174,7 +174,7 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
         painted = np.where(here >= 0, weight_of(region) * np.maximum(here, 0.0), painted)
     robot = _paint(_layers(loaded.task.mask, maps, value_of), flat, 0.0).reshape(shape) > 0
     lidar = loaded.lidar
-    seen = surface.within(lidar.range_min_mm / 1000, (lidar.range_practical_mm or lidar.range_max_mm) / 1000)
+    seen = surface.within(lidar.range_min_mm / 1000, lidar.practical_range_m)
     hidden = MapRegion(shape="map", file="")
     weight = _layers([hidden], [np.where(robot | ~seen, 0.0, painted)], value_of)
     return Field(weight, _layers([hidden], [(robot | ~seen).astype(float)], value_of), 0.0)

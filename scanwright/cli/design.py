@@ -155,7 +155,10 @@ class Kind(Enum):
 def catalogue(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
     kind: Annotated[Kind | None, typer.Option(help="Only products of this kind.")] = None,
-    min_range_m: Annotated[float | None, typer.Option(metavar="M", help="Only lidars that see as far.")] = None,
+    min_range_m: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Only lidars that see as far: in practice where known, else as stated."),
+    ] = None,
     max_mass_g: Annotated[float | None, typer.Option(metavar="G", help="Only what is as light.")] = None,
     max_price_usd: Annotated[float | None, typer.Option(metavar="USD", help="Only what is as cheap.")] = None,
     as_json: AsJson = False,

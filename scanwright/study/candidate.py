@@ -104,7 +104,7 @@ def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
 
 def of_lidar(lidar: Lidar) -> dict[str, float | None]:
     """Columns that the lidar alone decides."""
-    return {"range_m": lidar.range_max_mm / 1000, "range_sigma_mm": lidar.range_sigma_mm}
+    return {"range_m": lidar.stated_range_m, "range_sigma_mm": lidar.range_sigma_mm}
 
 
 def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | None]:

@@ -233,7 +233,7 @@ def test_the_table_has_a_row_for_every_product_and_a_mark_for_every_doubt(shippe
     assert set(FIGURES) == set(KINDS.values())
     rows = {line.split("  ")[0]: line for line in lines}
     assert {product.name for product in shipped} <= set(rows)
-    assert rows["UTM-30LX"].split()[:9] == ["UTM-30LX", "15", "0.1", "270", "0.25", "40", "10", "370", "5,000"]
+    assert rows["UTM-30LX"].split()[:9] == ["UTM-30LX", "30", "15", "0.1", "270", "0.25", "40", "10", "370"]
     assert "price_usd" in shipped.named("VLP-16").unverified() and "8,000?" in rows["VLP-16"]
     assert table_lines([]) == ["no product of the catalogue is like that"]
 
@@ -248,6 +248,8 @@ def test_a_filter_keeps_what_is_known_to_keep_it(shipped):
     cheap = chosen(shipped, max_price_usd=1e9)
     assert all(p.price_usd is not None for p in cheap) and "MX-28" not in {p.name for p in cheap}
     assert {p.kind for p in chosen(shipped, min_range_m=15)} == {"lidar"}
+    far = {p.name for p in chosen(shipped, min_range_m=20)}
+    assert "UTM-30LX-EW" in far and "UTM-30LX" not in far, "its users get 15 m"
     assert len(chosen(shipped)) == len(shipped.products)
 
 

@@ -125,7 +125,7 @@ def test_a_pole_outside_the_region_stands_anywhere_that_is_not_hidden():
         ("20,x,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
         ("20,-1,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
         ("nan,1000,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
-        ("20,1000,50", "sees from 0.1 to 30 m"),
+        ("20,1000,50", "sees from 0.1 to 15 m"),
         ("9000,1000,5", None),
         ("10000,1000,5", "in the pole"),
     ],
