@@ -42,7 +42,7 @@ from design.evaluation.gaps import gaps
 from design.objective.ball_search import SETS
 from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import NODES, Problem, with_scanner
-from design.objective.score import Score, score, score_on
+from design.objective.score import Score, blind_share, score, score_on
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.search import search
@@ -77,7 +77,8 @@ class ComparisonRow:
         gap_deg: widest distance between neighbouring scan lines or layers, across them.
         layers: circles about the axis on which beams run: beams of the 2D lidar, lasers of a multibeam.
         points_per_s: measurements per second; as the maker states it for a multibeam.
-        range_m: farthest, as the maker of the lidar states it; None for a multibeam, whose catalogue has none.
+        range_stated_m: farthest, as the maker of the lidar states it; None for a multibeam, whose catalogue has none.
+        range_practical_m: farthest that users of the lidar get, as stated where nobody knows; None likewise.
         range_sigma_mm: noise of one range; None likewise.
         beams_per_ball: exp(-J) - 1, the geometric mean; None for an objective that is no logarithm.
         beams_per_ball_per_usd: None as well where a price is not known.
@@ -95,7 +96,8 @@ class ComparisonRow:
     gap_deg: float
     layers: int
     points_per_s: float
-    range_m: float | None
+    range_stated_m: float | None
+    range_practical_m: float | None
     range_sigma_mm: float | None
     beams_per_ball: float | None
     beams_per_ball_per_usd: float | None
@@ -126,7 +128,7 @@ def compare(
         rows.append(_rotating(name, loaded, problem, family.angles_rad, family.score))
     for name in SCANNERS:
         other = load_task(Path(name))
-        if _bought(other) != _bought(loaded):
+        if bought(other) != bought(loaded):
             progress(name)
             on_other = with_scanner(problem, other.lidar, other.task.motion)
             family = search(on_other, other.task.angles).best[0]
@@ -161,7 +163,8 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRo
         gap_deg=float(np.diff(product.elevations_deg).max()),
         layers=len(product.elevations_deg),
         points_per_s=product.points_per_second,
-        range_m=None,
+        range_stated_m=None,
+        range_practical_m=None,
         range_sigma_mm=None,
         **_value(problem, J, product.price_usd),
     )
@@ -203,7 +206,7 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
                 upper.append(moment.g(found).mean(axis=0) @ share)
                 lower.append(moment.g(found.mean(axis=0)) @ share)
             if moment is problem.objective.moments[0]:
-                blind.append(float((found.max(axis=0) == 0) @ share))
+                blind.append(blind_share(samples.weights, found.max(axis=0) == 0))
         uppers.append(float(problem.objective.join(np.array(upper))))
         lowers.append(float(problem.objective.join(np.array(lower))) if turns > 1 else uppers[-1])
     sphere = spiral(BLIND_DIRECTIONS)
@@ -219,7 +222,7 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
 
 
 def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score) -> ComparisonRow:
-    prices = [product.price_usd for product in _bought(loaded)]
+    prices = [product.price_usd for product in bought(loaded)]
     known = [price for price in prices if price is not None]
     return ComparisonRow(
         name=name,
@@ -233,13 +236,15 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setti
         gap_deg=gaps(problem, angles_rad).line_gap_deg,
         layers=len(problem.bearings_rad),
         points_per_s=loaded.lidar.scan_rate_hz * len(problem.bearings_rad),
-        range_m=loaded.lidar.range_max_mm / 1000,
+        range_stated_m=loaded.lidar.stated_range_m,
+        range_practical_m=loaded.lidar.practical_range_m,
         range_sigma_mm=loaded.lidar.range_sigma_mm,
         **_value(problem, judged.J, sum(known) if len(known) == len(prices) else None),
     )
 
 
-def _bought(loaded: LoadedTask) -> list[Lidar | Servo | SlipRing]:
+def bought(loaded: LoadedTask) -> list[Lidar | Servo | SlipRing]:
+    """The products of a task whose prices are its cost."""
     ring = loaded.task.slip_ring
     return [loaded.lidar, loaded.servo, *([loaded.products.get(ring, SlipRing)] if ring else [])]
 

@@ -6,11 +6,13 @@ import csv
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from design.catalogue.products import Multibeam
-from design.evaluation.comparison import SCANNERS, ComparisonRow
+from design.catalogue.products import Multibeam, Product
+from design.evaluation.comparison import SCANNERS, ComparisonRow, bought
 from design.objective.holes import percent
 from design.objective.stated_error import error_words
-from design.task.task import LoadedTask
+from design.task.task import LoadedTask, load_task
+
+IN_THE_TABLE = ("scan_rate_hz", "range_max_mm", "range_practical_mm", "range_sigma_mm", "price_usd")
 
 
 def table(rows: list[ComparisonRow]) -> list[str]:
@@ -18,24 +20,30 @@ def table(rows: list[ComparisonRow]) -> list[str]:
     width = max(len(row.name) for row in rows)
     lines = [
         f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>7}"
-        f" {'of weight':>13} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'range [m]':>9}"
+        f" {'of weight':>13} {'gap [deg]':>9} {'layers':>6} {'points/s':>9} {'range [m]':>9} {'practical':>9}"
         f" {'noise [mm]':>10} {'beams':>7} {'per USD':>8} {'USD':>7}"
     ]
     for row in rows:
         lines.append(
             f"{row.name:{width}}  {row.setting:26} {row.time_s:8.2f} {row.turns:5} {row.J:8.4f}"
             f" {error_words(row.J, row.J_error):>6} {percent(row.blind_fraction):>7} {percent(row.blind_weight):>13}"
-            f" {row.gap_deg:9.3f} {row.layers:6} {row.points_per_s:9,.0f} {_known(row.range_m, ',g'):>9}"
-            f" {_known(row.range_sigma_mm, 'g'):>10} {_known(row.beams_per_ball, '.4g'):>7}"
-            f" {_known(row.beams_per_ball_per_usd, '.3g'):>8} {_known(row.cost_usd, ',.0f'):>7}"
+            f" {row.gap_deg:9.3f} {row.layers:6} {row.points_per_s:9,.0f} {_known(row.range_stated_m, ',g'):>9}"
+            f" {_known(row.range_practical_m, ',g'):>9} {_known(row.range_sigma_mm, 'g'):>10}"
+            f" {_known(row.beams_per_ball, '.4g'):>7} {_known(row.beams_per_ball_per_usd, '.3g'):>8}"
+            f" {_known(row.cost_usd, ',.0f'):>7}"
         )
     return lines
 
 
-def notes(loaded: LoadedTask) -> list[str]:
-    """What the columns mean, and which numbers of the ready-made scanners nobody has verified."""
+def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
+    """What the columns mean, whose J says nothing, and which numbers of all that is compared nobody has verified."""
     ball = loaded.task.density.ball_radius_deg
-    doubts = [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam) and p.unverified()]
+    names = {row.name for row in rows}
+    blind = dict.fromkeys(row.name for row in rows if row.blind_weight == 1)
+    others = [load_task(Path(name)) for name in SCANNERS if name in names]
+    products = dict.fromkeys(product for task in (loaded, *others) for product in bought(task))
+    doubts = [(product.name, _doubted(product)) for product in products]
+    doubts += [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam)]
     return [
         "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
         f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
@@ -43,10 +51,12 @@ def notes(loaded: LoadedTask) -> list[str]:
         "gap: widest between neighbouring scan lines or layers, inside of what is seen",
         "beams: within the ball, exp(-J) - 1, the geometric mean; per USD: over the price; ? for another objective",
         "range, noise: of the 2D lidar as its maker states them, one standard deviation; ? for ready-made scanners",
+        "practical: the range [m] that users of the 2D lidar get; the stated one where nobody knows",
         "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
         "ready-made scanners stand upright; Bonn takes the twist, pitch only the pitch, that suits this task best",
         f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
-        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts),
+        *(f"{name} sees nothing of the weight: its J is that of no beam, and has no error" for name in blind),
+        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts if fields),
     ]
 
 
@@ -56,6 +66,11 @@ def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
+
+
+def _doubted(product: Product) -> list[str]:
+    """Values in the table that nobody has verified."""
+    return [field for field in product.unverified() if field in IN_THE_TABLE]
 
 
 def _known(value: float | None, layout: str) -> str:

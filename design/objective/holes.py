@@ -12,7 +12,7 @@ from design.arrays import Setting, Vector
 from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.quadrature import polar_rule
-from design.objective.score import blind_to_sweep
+from design.objective.score import blind_share, blind_to_sweep
 from design.sphere.directions import weighted_samples
 
 NO_BLIND_WEIGHT = 1e-9  # share of the weight: what a fan and a region reach is rounded
@@ -79,7 +79,7 @@ def _of_spin(problem: Problem, angles_rad: Setting) -> list[Hole]:
     out = []
     for low, high in problem.blind_zones(beam_polar):
         inside = (low < rule.polar_rad) & (rule.polar_rad < high)
-        weight = float(rule.fine[inside].sum() / rule.fine.sum())
+        weight = blind_share(rule.fine, inside)
         about_back = low > 0 and np.pi - low < high  # the nearer end of the axis
         inner, outer = (np.pi - high, np.pi - low) if about_back else (low, high)
         out.append(
@@ -98,7 +98,7 @@ def _of_sweep(problem: Problem, angles_rad: Setting) -> list[Hole]:
     if not length > 0:
         return []
     off = np.arccos(np.clip(samples.directions[blind] @ middle / length, -1, 1))
-    share = float(samples.weights[blind].sum() / samples.weights.sum())
+    share = blind_share(samples.weights, blind)
     return [Hole(_three(middle / length), float(np.degrees(off.max())), 0.0, share)]
 
 

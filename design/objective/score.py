@@ -95,13 +95,18 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool 
         J_error=J_error,
         J_lower=J_lower,
         least=min(m.least for _, m in spoken),
-        blind_weight=sum(share * m.blind for share, m in spoken),
+        blind_weight=min(1.0, sum(share * m.blind for share, m in spoken)),
     )
 
 
 def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """J alone, as `score` computes it: for searches that call it often."""
     return score_on(problem, angles_rad, nodes, stated=False).J
+
+
+def blind_share(weights: Float[ndarray, " n"], blind: Bool[ndarray, " n"]) -> float:
+    """Share of weights (n,) that is blind, 0 .. 1: both sums are made alike, so all of it is 1 and no part is more."""
+    return float(np.where(blind, weights, 0.0).sum() / weights.sum())
 
 
 def blind_to_sweep(
@@ -145,7 +150,7 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
         return _highest(moment, z, moment.g(z.mean), rule.fine, blind)
     total = rule.fine.sum()
     share = rule.fine / total
-    found = _Found(float(share @ z.mean_g), int(z.least[share > 0].min()), float(share @ blind))
+    found = _Found(float(share @ z.mean_g), int(z.least[share > 0].min()), blind_share(rule.fine, blind))
     if not stated:
         return found
     by_segment = np.bincount(rule.segment, (share - rule.coarse / total) * z.mean_g)
@@ -174,7 +179,8 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
             found.append(_highest(moment, z.of(own), lower[own], samples.weights, blind[own]))
         else:
             share = samples.weights / samples.weights.sum()
-            value, bound, hidden = (float(share @ of[own]) for of in (z.mean_g, lower, blind))
+            value, bound = (float(share @ of[own]) for of in (z.mean_g, lower))
+            hidden = blind_share(samples.weights, blind[own])
             found.append(_Found(value, int(z.least[own].min()), hidden, lower=bound))
     values, least = np.array([f.value for f in found]), min(f.least for f in found)
     gather = np.max if moment.gathered == "highest" else np.mean
@@ -211,7 +217,7 @@ def _highest(
         error=max(MISSED_AGAIN * (value - float(np.mean(thirds))), _one_less(moment, least)),
         lower=float(lower[fine > 0].max()),
         least=least,
-        blind=float(fine @ blind / fine.sum()),
+        blind=blind_share(fine, blind),
     )
 
 

@@ -107,8 +107,8 @@ class Optimum:
             *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
         ]
 
-    def hole_lines(self) -> list[str]:
-        """Where the answer is blind, or what it costs that it is not."""
+    def hole_lines(self, tabled: bool = True) -> list[str]:
+        """Where the answer is blind, or what it costs that it is not; `tabled`: they stand below `table`."""
         best, plain, least = self.search.best[0], self.search.plain, self.search.least_blind
         found = [hole.words() for hole in holes(self.problem, best.angles_rad)]
         if least is not None:
@@ -118,8 +118,9 @@ class Optimum:
         seen = f"every direction that matters has beams within {np.degrees(self.problem.ball_rad):g} deg"
         if found or plain is None:
             return found or [seen]
+        taken = "the last row of the table" if tabled else _told(plain)
         return [
-            f"{seen}; J alone, not asked for that, would take the last row of the table",
+            f"{seen}; J alone, not asked for that, would take {taken}",
             *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
             f"what has no hole costs {self._price(best.score.J, plain.score.J)} against it",
         ]
@@ -144,6 +145,11 @@ class Optimum:
             else:
                 lines.append(f"J = {other.J:.4f} +- {error_words(other.J, other.J_error)} for {name}")
         return lines
+
+
+def _told(family: Family) -> str:
+    angles = ", ".join(f"{angle:g}" for angle in np.round(family.angles_deg, 2) + 0.0)
+    return f"({angles}) with J = {family.score.J:.4f}"
 
 
 def _row(family: Family) -> str:

@@ -26,8 +26,8 @@ class Comparison:
         """The same in words."""
         return [
             *table(self.rows),
-            *(f"optimum: {line}" for line in self.optimum.hole_lines()),
-            *notes(self.optimum.loaded),
+            *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),
+            *notes(self.optimum.loaded, self.rows),
             f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
         ]
 

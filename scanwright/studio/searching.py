@@ -56,7 +56,7 @@ class Searching:
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
             self._move(bare, step)
             found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
-            blind = optimum.hole_lines()
+            blind = optimum.hole_lines(tabled=False)
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
             self._say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
             with processes_beside() as begin:

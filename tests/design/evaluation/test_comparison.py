@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -25,12 +26,13 @@ from design.evaluation.comparison import (
     sampled,
 )
 from design.evaluation.comparison_picture import compare_picture
-from design.evaluation.comparison_table import table, write_csv
+from design.evaluation.comparison_table import notes, table, write_csv
 from design.frames import R_rot_laser, R_world_rot
 from design.objective.ball_search import SETS
 from design.objective.named_objectives import homogeneity, log_density
 from design.objective.problem import problem_of
 from design.objective.score import score
+from design.search.optimum import find_optimum
 from design.search.search import search
 from design.sphere.directions import sample_set, spiral
 from design.task.task import load_task
@@ -180,6 +182,26 @@ def test_the_csv_holds_the_rows(rows, tmp_path):
     assert [ComparisonRow(**{key: kinds[FIELDS[key]](text) for key, text in line.items()}) for line in read] == rows
 
 
+def test_what_sees_nothing_is_blind_to_all_of_the_weight_and_no_more(ceiling, rows):
+    loaded, _, _ = ceiling
+    up = load_task(
+        loaded.task.model_dump(mode="json", exclude_none=True)
+        | {"weight": [{"shape": "cone", "axis": [0, 0, 1], "half_angle_deg": 40}]}
+    )
+    row = ready_made(problem_of(up), multibeam("ibeo LUX"), 1)
+    assert (row.J, row.blind_weight) == (0.0, 1.0)
+    told = [line for line in notes(up, [row]) if line.startswith("ibeo LUX")]
+    assert told == ["ibeo LUX sees nothing of the weight: its J is that of no beam, and has no error"]
+    assert not [line for line in notes(loaded, rows) if "sees nothing" in line]
+
+
+def test_what_j_alone_would_take_is_told_without_a_table():
+    optimum = find_optimum(load_task(Path("ground_ahead")), lambda _: None)
+    (first, *_), (alone, *_) = optimum.hole_lines(), optimum.hole_lines(tabled=False)
+    assert first.endswith("would take the last row of the table")
+    assert re.search(r"would take \(0, -5\d.*\) with J = -6\.12\d\d$", alone)
+
+
 def test_a_price_that_nobody_knows_is_a_question_mark(rows):
     lines = table(rows)
     assert len({len(line) for line in lines}) == 1, "columns stand below each other"
@@ -194,7 +216,8 @@ def test_the_cheap_scanner_stands_beside_with_what_a_dollar_sees(ceiling, rows):
     cheap = load_task(Path("low_cost"))
     assert row.time_s == cheap.task.motion.duration_s
     assert row.cost_usd == cheap.lidar.price_usd + cheap.servo.price_usd
-    assert (row.range_m, row.range_sigma_mm) == (25, 10)
+    assert (row.range_stated_m, row.range_practical_m, row.range_sigma_mm) == (25, 25, 10)
+    assert (rows[0].range_stated_m, rows[0].range_practical_m) == (30, 15), "what its maker states, what users get"
     assert row.beams_per_ball == pytest.approx(np.exp(-row.J) - 1)
     assert row.beams_per_ball_per_usd == pytest.approx(row.beams_per_ball / row.cost_usd)
     fan = beam_directions_rot(cheap.lidar.bearings_rad(), 0.0, np.radians(50.0))
@@ -225,6 +248,8 @@ def test_the_command_end_to_end(command, tmp_path, rows):
     assert (code, err) == (0, [])
     assert out.splitlines()[: len(rows) + 1] == table(rows)
     assert "not verified of HDL-64E: elevations_deg" in out
+    assert "not verified of UH1256-02-0610-06S: price_usd" in out and "not verified of XL430-W250: price_usd" in out
+    assert "not verified of UTM-30LX" not in out and "not verified of MX-64R" not in out
     assert sorted(path.name for path in (tmp_path / "ceiling").iterdir()) == [
         "compare.csv",
         "compare.png",
