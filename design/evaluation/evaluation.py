@@ -28,12 +28,30 @@ from design.task.task import LoadedTask
 
 
 @dataclass(frozen=True, slots=True)
+class Lever:
+    """The optical centre off the axis by (x, y) of the rotation frame, as seen at a range."""
+
+    x_mm: float
+    y_mm: float
+    range_m: float
+
+    def shares(self) -> tuple[float, float, float]:
+        """The same as shares of the range: `Problem.lever`."""
+        return self.x_mm / 1000 / self.range_m, self.y_mm / 1000 / self.range_m, 0.0
+
+    def words(self) -> str:
+        """What all figures hold for."""
+        return f"optical centre ({self.x_mm:g}, {self.y_mm:g}) mm off the axis: all figures hold at {self.range_m:g} m"
+
+
+@dataclass(frozen=True, slots=True)
 class Evaluation:
     """One setting of a task, judged.
 
     Attributes:
         problem: the task as numbers.
         angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        lever: what they hold for, where the optical centre was put off the axis.
         score: J by the closed form.
         ball: J by the paper's ball search over simulated scans.
         holes: where the region is blind.
@@ -49,6 +67,7 @@ class Evaluation:
 
     problem: Problem
     angles_rad: Setting
+    lever: Lever | None
     score: Score
     ball: BallScore
     holes: tuple[Hole, ...]
@@ -82,6 +101,7 @@ class Evaluation:
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
         return {
+            **({} if self.lever is None else {"lever": asdict(self.lever)}),
             "J": self.score.J,
             "J_error": self.score.J_error,
             "J_lower": self.score.J_lower,
@@ -108,6 +128,7 @@ class Evaluation:
         ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
             *self._doubts(),
+            *([] if self.lever is None else [f"lever          {self.lever.words()}"]),
             *(
                 [f"hole           {hole.words()}" for hole in self.holes]
                 or [f"holes          none: every direction that matters has beams within {ball_deg:g} deg"]
@@ -149,21 +170,25 @@ class Evaluation:
 
 
 def evaluate(
-    loaded: LoadedTask, problem: Problem, angles_rad: Setting, pole: str | None, progress: Callable[[str], None]
+    loaded: LoadedTask, angles_rad: Setting, pole: str | None, lever: str | None, progress: Callable[[str], None]
 ) -> Evaluation:
     """Requirements the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Args:
         loaded: the task.
-        problem: its numbers, `problem_to_judge`.
         angles_rad: the setting.
         pole: as `parse_pole` reads it, None for no pole.
+        lever: `X_MM,Y_MM,RANGE_M`, None for an optical centre on the axis.
         progress: is told what is being computed.
 
     Raises:
-        TaskError: no direction has a weight, or the pole makes no sense.
+        TaskError: no direction has a weight, or the pole or the lever makes no sense.
     """
     asked = None if pole is None else parse_pole(pole, loaded.lidar)
+    off_axis = None if lever is None else _parse_lever(lever)
+    problem = problem_of(loaded)
+    if off_axis is not None:
+        problem = replace(problem, lever=off_axis.shares())
     motion, sweep = loaded.task.motion, problem.sweep
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
@@ -173,6 +198,7 @@ def evaluate(
     return Evaluation(
         problem=problem,
         angles_rad=angles_rad,
+        lever=off_axis,
         score=found,
         ball=ball_score(problem, angles_rad),
         holes=holes(problem, angles_rad),
@@ -185,15 +211,6 @@ def evaluate(
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
     )
-
-
-def problem_to_judge(loaded: LoadedTask, lever: str | None) -> Problem:
-    """The numbers of a task, the optical centre off the axis as `lever` says: `X_MM,Y_MM,RANGE_M`.
-
-    Raises:
-        TaskError: these are no three numbers that make sense, or no direction has a weight.
-    """
-    return problem_of(loaded) if lever is None else replace(problem_of(loaded), lever=_parse_lever(lever))
 
 
 def angles_in(text: str) -> tuple[float, float, float, float]:
@@ -240,7 +257,7 @@ def _cap(cap: BlindCone) -> str:
     return f"{cap.half_angle_deg:.2f} deg about ({x:z.3f}, {y:z.3f}, {z:z.3f})"
 
 
-def _parse_lever(text: str) -> tuple[float, float, float]:
+def _parse_lever(text: str) -> Lever:
     try:
         x_mm, y_mm, range_m = (float(part) for part in text.split(","))
     except ValueError:
@@ -249,4 +266,4 @@ def _parse_lever(text: str) -> tuple[float, float, float]:
         raise TaskError(
             f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
         )
-    return x_mm / 1000 / range_m, y_mm / 1000 / range_m, 0.0
+    return Lever(x_mm, y_mm, range_m)

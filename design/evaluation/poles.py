@@ -135,7 +135,7 @@ def _hits(problem: Problem, angles_rad: Setting, pole: Pole, start: float, rng: 
         joint = problem.sweep.angles_rad(start)
     else:  # a start anywhere in the turn: between two lines by `start`, and at any of them
         joint = problem.lines.angles_rad + problem.lines.step_rad * (start + rng.integers(problem.lines.count))
-    beams = scan_at(problem.bearings_rad, joint, angles_rad)
+    beams = scan_at(problem.bearings_rad, joint, angles_rad, problem.lever)
     level = beams[np.abs(beams[:, 2]) <= np.sin(pole.half_height_rad)]
     seen = level[~problem.field.masked_at(level)]
     return np.sort(np.arctan2(seen[:, 1], seen[:, 0]))

@@ -70,8 +70,7 @@ def evaluate(
     from design.evaluation import evaluation
 
     loaded = as_task(task)
-    problem = evaluation.problem_to_judge(loaded, lever)
-    return evaluation.evaluate(loaded, problem, evaluation.setting_rad(angles_deg), pole, say)
+    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg), pole, lever, say)
 
 
 def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:

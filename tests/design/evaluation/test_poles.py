@@ -149,3 +149,13 @@ def test_evaluate_tells_of_a_pole(command):
     code, _, complaints = command("evaluate", "ceiling", "--angles=0,0,0,-90", "--pole=20,1000,500")
     assert code == 2
     assert len(complaints) == 1
+
+
+def test_a_pole_is_hit_from_where_the_optical_centre_is():
+    problem = problem_of(load_task(Path("ceiling")))
+    setting, pole = np.radians([0.0, 0.0, 0.0, -90.0]), Pole(0.02, 1.0, 5.0)
+    on_axis, off_axis = (
+        pole_chances(moved, setting, pole).chances[0].chance
+        for moved in (problem, replace(problem, lever=(0.2, 0.0, 0.0)))
+    )
+    assert abs(on_axis - off_axis) > 1e-3

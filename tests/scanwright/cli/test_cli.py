@@ -149,6 +149,16 @@ def test_optimise_as_json(command):
     assert {entry["unit"] for entry in answer["left_out"]} >= {"settings", "square degrees"}
 
 
+def test_a_lever_is_named_beside_the_figures_that_hold_for_it(command):
+    asked = ("evaluate", "ceiling", "--angles=0,0,0,-90")
+    _, plain, _ = command(*asked)
+    code, out, _ = command(*asked, "--lever=5,-3,1.0")
+    assert (code, "lever" in plain) == (0, False)
+    assert "lever          optical centre (5, -3) mm off the axis: all figures hold at 1 m" in out.splitlines()
+    _, out, _ = command(*asked, "--lever=5,-3,1.0", "--json")
+    assert json.loads(out)["lever"] == {"x_mm": 5.0, "y_mm": -3.0, "range_m": 1.0}
+
+
 def test_schema_and_catalogue(command):
     code, out, _ = command("schema")
     assert code == 0
