@@ -1,6 +1,7 @@
 """What one full scan comes to on the planes of a task, in metres: points, gaps, and the smallest thing hit twice.
 
-Every beam of a simulated scan is followed to the plane of a region; what is said is read off the points where they end.
+Every beam of a simulated scan is followed to the plane of a region; what is said is read off the points where they end,
+and of what lies within the practical range of the lidar.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.sphere.rectangle import edge_normals
 from design.sphere.regions import Field
-from design.task.shapes import PlaneRegion
+from design.task.shapes import LITTLE, PlaneRegion, beyond_words
 from design.task.task import LoadedTask
 
 AT_M = 3.0  # from the optical centre, where a gap is told
@@ -41,6 +42,8 @@ class PlaneFigures:
 
     Attributes:
         region: in words.
+        range_m: the practical range of the lidar.
+        beyond_range: share of its area that lies beyond; what follows is said of the rest.
         points: beams that end on it.
         points_per_m2: in the mean over the part of it that no mask hides.
         at_m: distance from the optical centre of what `gap_cm` is said of: `AT_M`, or the nearest to it in the region.
@@ -50,6 +53,8 @@ class PlaneFigures:
     """
 
     region: str
+    range_m: float
+    beyond_range: float
     points: int
     points_per_m2: float
     at_m: float
@@ -64,15 +69,20 @@ class PlaneFigures:
 
     def words(self) -> str:
         """The same in a line."""
+        if self.beyond_range == 1:
+            return f"{self.region}: 0 points, as all of it lies beyond the lidar's range of {self.range_m:g} m"
+        part = ""
+        if self.beyond_range > LITTLE:
+            share = beyond_words(self.beyond_range)
+            part = f"{share} of it lies beyond the lidar's range of {self.range_m:g} m; of the rest "
         if not self.points:
-            return f"{self.region}: no beam of a full scan ends there"
-        gaps = f"gaps of {_round(self.gap_cm)} cm at {self.at_m:.2g} m"
+            return f"{self.region}: {part}no beam of a full scan ends there"
+        at = f"cm at {rounded(self.at_m)} m"
+        gaps = f"gaps of {rounded(self.gap_cm)} {at}"
         if self.gap_off_axis_cm < SPOT * self.gap_cm:
-            gaps = (
-                f"gaps of {_round(self.gap_off_axis_cm)} cm at {self.at_m:.2g} m, {_round(self.gap_cm)} around the axis"
-            )
-        twice = f"what is {_round(self.twice_cm)} cm wide is hit twice wherever it lies"
-        return f"{self.region}: {_round(self.points_per_m2)} points per m2, {gaps}; {twice}"
+            gaps = f"gaps of {rounded(self.gap_off_axis_cm)} {at}, {rounded(self.gap_cm)} around the axis"
+        twice = f"what is {rounded(self.twice_cm)} cm wide is hit twice wherever it lies"
+        return f"{self.region}: {part}{rounded(self.points_per_m2)} points per m2, {gaps}; {twice}"
 
 
 def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
@@ -92,7 +102,8 @@ def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tupl
     beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
     beams = beams[~problem.field.masked_at(beams)]
     spots = _spots(problem, angles_rad)
-    return tuple(on_plane(region, beams, problem, spots) for region in regions)
+    reach_m = loaded.lidar.practical_range_m
+    return tuple(on_plane(region, beams, problem, spots, reach_m) for region in regions)
 
 
 def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:
@@ -105,7 +116,11 @@ def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:
 
 
 def on_plane(
-    region: PlaneRegion, beams: Float[ndarray, "n 3"], problem: Problem, spots: Float[ndarray, "spots 4"]
+    region: PlaneRegion,
+    beams: Float[ndarray, "n 3"],
+    problem: Problem,
+    spots: Float[ndarray, "spots 4"],
+    reach_m: float,
 ) -> PlaneFigures:
     """What beams, unit vectors (n, 3) of the world, leave on one region; `spots` are cones that hold none of them."""
     corners = np.array(region.corners_m())
@@ -115,14 +130,15 @@ def on_plane(
     away_m = normal @ corners[0]
     facing = beams @ normal * np.sign(away_m) > 1e-6
     ends = beams[facing] * (away_m / (beams[facing] @ normal))[:, None]
-    inside = (beams[facing] @ edge_normals(corners).T >= 0).all(axis=1)
+    inside = (beams[facing] @ edge_normals(corners).T >= 0).all(axis=1) & (np.linalg.norm(ends, axis=1) <= reach_m)
 
-    plane = _Plane(corners[0], sides[0], sides[1], problem.field, NO_SPOTS)
+    beyond = region.share_beyond(reach_m)
+    plane = _Plane(corners[0], sides[0], sides[1], problem.field, NO_SPOTS, reach_m).near()
     away = np.linalg.norm(plane.points(_grid(CELLS)), axis=1)
     seen = ~plane.hidden(_grid(CELLS))
     if not inside.any() or not seen.any():
-        return PlaneFigures(region.words(), 0, 0.0, AT_M, np.inf, np.inf, np.inf)
-    area_m2 = float(np.linalg.norm(np.cross(*sides)) * seen.mean())
+        return PlaneFigures(region.words(), reach_m, beyond, 0, 0.0, AT_M, np.inf, np.inf, np.inf)
+    area_m2 = float(np.linalg.norm(np.cross(plane.along, plane.across)) * seen.mean())
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
@@ -130,6 +146,8 @@ def on_plane(
     there = at_m * (1 - RING), at_m * (1 + RING)
     return PlaneFigures(
         region.words(),
+        reach_m,
+        beyond,
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),
         at_m,
@@ -141,13 +159,24 @@ def on_plane(
 
 @dataclass(frozen=True, slots=True)
 class _Plane:
-    """A rectangle: one corner, the sides from there, and what may hide it: masks, and cones that are not to count."""
+    """A rectangle: one corner, the sides from there, and what of it does not count: masked, in a cone, out of reach."""
 
     corner: Vector
     along: Vector
     across: Vector
     field: Field
     spots: Float[ndarray, "spots 4"]
+    reach_m: float
+
+    def near(self) -> _Plane:
+        """The part of it in the square around what is within reach; an empty one where nothing is."""
+        sides = np.stack([self.along, self.across])
+        lengths_m = np.linalg.norm(sides, axis=1)
+        foot_m = -(sides @ self.corner) / lengths_m
+        radius_m = np.sqrt(max(0.0, self.reach_m**2 - self.corner @ self.corner + foot_m @ foot_m))
+        low, high = (np.clip((foot_m + way * radius_m) / lengths_m, 0.0, 1.0) for way in (-1, 1))
+        along, across = (high - low)[:, None] * sides
+        return replace(self, corner=self.corner + low @ sides, along=along, across=across)
 
     def points(self, shares: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
         """Points of the rectangle [m] at shares of its sides, 0 .. 1."""
@@ -181,11 +210,12 @@ class _Plane:
             shares = (shares[near][:, None] + half * QUARTERS).reshape(-1, 2)
 
     def hidden(self, shares: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
-        """Whether a mask or a spot hides points, which are given as shares of the sides."""
+        """Whether points, given as shares of the sides, are hidden by a mask or a spot, or lie out of reach."""
         points = self.points(shares)
-        directions = points / np.linalg.norm(points, axis=1)[:, None]
+        away_m = np.linalg.norm(points, axis=1)
+        directions = points / away_m[:, None]
         in_spot = (directions @ self.spots[:, :3].T >= self.spots[:, 3]).any(axis=1)
-        return self.field.masked_at(directions) | in_spot
+        return self.field.masked_at(directions) | in_spot | (away_m > self.reach_m)
 
 
 def _grid(cells: int) -> Float[ndarray, "n 2"]:
@@ -194,5 +224,6 @@ def _grid(cells: int) -> Float[ndarray, "n 2"]:
     return np.stack(np.meshgrid(each, each, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def _round(value: float) -> str:
+def rounded(value: float) -> str:
+    """Two digits, never as a power of ten where the number is large."""
     return f"{value:.2g}" if value < 100 else f"{float(f'{value:.2g}'):,.0f}"

@@ -9,6 +9,7 @@ import math
 from abc import abstractmethod
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from design.record import Record
@@ -31,6 +32,8 @@ LEAST_M, MOST_M = 1e-3, 1e4
 Length = Annotated[Number, Field(ge=LEAST_M, le=MOST_M)]
 Far = Annotated[Number, Field(ge=-1e4, le=1e4)]
 THINNEST_DEG = 1e-3
+STRIPS = 20_000  # of the area of a plane
+LITTLE = 1e-3  # share of a plane beyond a range that is worth no word
 HEADINGS = {0.0: " ahead", 90.0: " to the left", 180.0: " behind", 270.0: " to the right"}
 
 GridStep = Annotated[Number, Field(ge=0.25, le=10), AfterValidator(_divides_the_half_circle)]
@@ -149,6 +152,20 @@ class OnPlane(Record):
         )
         return a, b, c, d
 
+    def share_beyond(self, reach_m: float) -> float:
+        """Share of its area that lies further away from the optical centre than a reach."""
+        corners = np.array(self.corners_m())
+        sides_m = corners[[1, 3]] - corners[0]
+        a_m, b_m = np.linalg.norm(sides_m, axis=1)
+        x_m, y_m = -corners[0] @ sides_m.T / (a_m, b_m)  # of the foot of the optical centre, from the first corner
+        squared_m2 = reach_m**2 - corners[0] @ corners[0] + x_m**2 + y_m**2
+        if not squared_m2 > 0:
+            return 1.0
+        along_m = (np.arange(STRIPS) + 0.5) * a_m / STRIPS - x_m
+        half_m = np.sqrt(np.maximum(squared_m2 - along_m**2, 0.0))
+        strips_m = np.clip(y_m + half_m, 0, b_m) - np.clip(y_m - half_m, 0, b_m)
+        return max(0.0, float(1 - strips_m.mean() / b_m))
+
     def words(self) -> str:
         """What it is."""
         return f"{self._named()}{HEADINGS.get(self.heading_deg % 360, f' at {self.heading_deg:g} deg')}"
@@ -233,6 +250,11 @@ class WallRegion(OnPlane):
 
     def _rising(self) -> tuple[tuple[str, str], ...]:
         return (("bottom_m", "top_m"),)
+
+
+def beyond_words(share: float) -> str:
+    """A share of a plane that is beyond a range: all of it only where nothing is left."""
+    return "all" if share == 1 else f"{min(share, 0.9999):.2%}" if share > 0.99 else f"{100 * share:.2g}%"
 
 
 def _level(from_m: float, to_m: float, width_m: float, z_m: float) -> tuple[Triple, Triple, Triple, Triple]:

@@ -32,6 +32,7 @@ from design.task.map_file import read_map
 from design.task.named_products import NAMED, motion_faults
 from design.task.named_record import named_table, names_in
 from design.task.shapes import (
+    LITTLE,
     BoxRegion,
     GridStep,
     MapRegion,
@@ -39,9 +40,11 @@ from design.task.shapes import (
     MeshRegion,
     Number,
     Placed,
+    PlaneRegion,
     Region,
     Required,
     Value,
+    beyond_words,
 )
 
 SHIPPED = Path(__file__).parent / "shipped"
@@ -180,6 +183,27 @@ class LoadedTask:
 
     def warnings(self) -> list[str]:
         """What the task can do, but not as well as its author may think."""
+        return [*self.unread_angles(), *self._out_of_range()]
+
+    def _out_of_range(self) -> list[str]:
+        """Planes that the lidar does not reach, where no scene tells how far everything is."""
+        if self.task.scene is not None:
+            return []
+        reach_m = self.lidar.practical_range_m
+        planes = [
+            (f"weight.{i}: {region.words()}", region.share_beyond(reach_m))
+            for i, region in enumerate(self.task.weight)
+            if isinstance(region, PlaneRegion) and region.value > 0
+        ]
+        return [
+            f"{name}: {beyond_words(beyond)} of it lies beyond the {reach_m:g} m that {self.lidar.name} sees, and J "
+            "counts beams that measure nothing there; bring it nearer, or take a lidar that sees farther"
+            for name, beyond in planes
+            if beyond > LITTLE
+        ]
+
+    def unread_angles(self) -> list[str]:
+        """Where the servo reads no angle in a part of every turn: what makes it a poor choice anywhere."""
         seen_deg = self.servo.position_feedback_deg
         if seen_deg < 360 and not isinstance(self.task.motion, Sweep):
             return [

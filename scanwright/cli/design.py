@@ -36,9 +36,11 @@ def optimise(
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        show_json(optimum.facts() | {"planes": [plane.facts() for plane in planes]})
+        warnings = optimum.asked.warnings()
+        show_json(optimum.facts() | {"planes": [plane.facts() for plane in planes], "warnings": warnings})
     else:
-        show([*optimum.lines(), *(f"one full scan, {plane.words()}" for plane in planes)])
+        scan = (f"one full scan, {plane.words()}" for plane in planes)
+        show([*optimum.lines(), *scan, *(f"warning: {warning}" for warning in optimum.asked.warnings())])
         if picture is not None:
             print(f"wrote {picture}")
         hint(f"next: `scanwright build {task}` makes it")

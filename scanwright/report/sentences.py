@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from design.angles import AngleSet
-from design.evaluation.metres import PlaneFigures
+from design.evaluation.metres import PlaneFigures, rounded
 from design.motion import Motion
 from scanwright.report.answer import BuildAnswer
 
@@ -52,7 +52,7 @@ def _sees(answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) ->
         return [*said, "No direction that counts is left out."]
     width_cm = 100 * ball_m * AT_M
     return [
-        f"Wherever it counts, a disc {width_cm:.2g} cm wide, {AT_M:g} m away and facing the scanner, gets "
+        f"Wherever it counts, a disc {rounded(width_cm)} cm wide, {AT_M:g} m away and facing the scanner, gets "
         f"{answer.own.least:,} of them or more."
     ]
 

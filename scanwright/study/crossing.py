@@ -85,7 +85,7 @@ class Crossing:
             task = _merged(base.task, chosen, name, self._own_files())
             products = Catalogue(base.products.products | self._own_products())
             doubts = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
-            doubts = doubts or replace(base, task=task, products=products).warnings()
+            doubts = doubts or replace(base, task=task, products=products).unread_angles()
             refused = doubts[0] if doubts else ""
         except ValidationError as error:
             refused = explain(error, name, Task).splitlines()[0]

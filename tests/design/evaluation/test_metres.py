@@ -6,11 +6,11 @@ from math import cos, hypot, pi, radians, sin
 import numpy as np
 import pytest
 
-from design.evaluation.metres import AT_M, RING, SLACK, on_plane, on_planes
+from design.evaluation.metres import AT_M, RING, SLACK, on_plane, on_planes, rounded
 from design.objective.problem import problem_of
 from design.task.task import load_task
 
-GROUND = {"shape": "ground", "from_m": 1.0, "to_m": 4.0, "width_m": 2.0, "height_m": 0.5}
+GROUND = {"shape": "ground", "from_m": 1.0, "to_m": 3.8, "width_m": 2.0, "height_m": 0.5}
 WALL = {"shape": "wall", "distance_m": 2.0, "width_m": 2.0, "height_m": 0.5, "top_m": 2.0, "heading_deg": 40.0}
 SETTING_DEG = (20.0, 35.0, -30.0, 50.0)
 LINES, BEAMS = 80, 683
@@ -71,9 +71,9 @@ def test_points_are_the_beams_that_end_there(beams):
     task = loaded(GROUND, WALL)
     assert len(beams) == LINES * len(task.lidar.bearings_rad())
     ground, wall = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
-    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 4 and abs(y) <= 1]
+    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 3.8 and abs(y) <= 1]
     assert ground.points == len(hits) > 100
-    assert ground.points_per_m2 == pytest.approx(len(hits) / (3 * 2))
+    assert ground.points_per_m2 == pytest.approx(len(hits) / (2.8 * 2))
     count = 0
     for beam in beams:
         ahead, left, up = turned(beam, "z", -radians(40))
@@ -91,7 +91,9 @@ def test_gaps_are_those_of_discs_tried_one_by_one(beams):
     task = loaded(GROUND)
     (found,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
     points, step = on_ground(beams), 0.05
-    places = [(x, y) for x in np.arange(1, 4 + step, step) for y in np.arange(-1, 1 + step, step) if x <= 4 and y <= 1]
+    places = [
+        (x, y) for x in np.arange(1, 3.8 + step, step) for y in np.arange(-1, 1 + step, step) if x <= 3.8 and y <= 1
+    ]
     ring = [(x, y) for x, y in places if abs(hypot(x, y, 0.5) - AT_M) <= RING * AT_M]
     assert found.at_m == AT_M
     for told_cm, tried_m in ((found.gap_cm, emptiest(points, 1, ring)), (found.twice_cm, emptiest(points, 2, places))):
@@ -126,18 +128,23 @@ def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams)
     behind = {"shape": "band", "phi_deg": [0, 180]}
     task = loaded(GROUND, mask=[behind])
     (half,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
-    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 4 and -1 <= y < 0]
+    hits = [(x, y) for x, y in on_ground(beams) if 1 <= x <= 3.8 and -1 <= y < 0]
     assert half.points == len(hits)
-    assert half.points_per_m2 == pytest.approx(len(hits) / 3, rel=0.02)
+    assert half.points_per_m2 == pytest.approx(len(hits) / 2.8, rel=0.02)
     left = [(x, y) for x, y in on_ground(beams) if y < 0]
-    tried_m = emptiest(left, 2, [(x, y) for x in np.arange(1, 4.01, 0.05) for y in np.arange(-1, 0, 0.05)])
+    tried_m = emptiest(left, 2, [(x, y) for x in np.arange(1, 3.81, 0.05) for y in np.arange(-1, 0, 0.05)])
     assert 2 * tried_m <= half.twice_cm / 100 * (1 + 1e-9) <= (2 * tried_m + 0.1) * (1 + SLACK) * (1 + 1e-9)
     region = task.task.weight[0]
-    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)), np.empty((0, 4)))
-    assert none.facts() == {"region": "ground 1 to 4 m ahead", "points": 0, "points_per_m2": 0.0} | dict.fromkeys(
-        ("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm")
-    )
-    assert none.words() == "ground 1 to 4 m ahead: no beam of a full scan ends there"
+    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)), np.empty((0, 4)), 4.0)
+    known = {
+        "region": "ground 1 to 3.8 m ahead",
+        "range_m": 4.0,
+        "beyond_range": 0.0,
+        "points": 0,
+        "points_per_m2": 0.0,
+    }
+    assert none.facts() == known | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
+    assert none.words() == "ground 1 to 3.8 m ahead: no beam of a full scan ends there"
     assert on_planes(loaded({"shape": "all"}), problem_of(loaded({"shape": "all"})), np.zeros(4)) == ()
 
 
@@ -146,3 +153,39 @@ def test_a_region_that_three_metres_do_not_reach_is_told_of_at_its_nearest():
     (found,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
     assert found.at_m == pytest.approx(hypot(1.5, 1.0, 0.5), abs=0.02)
     assert f"at {found.at_m:.2g} m" in found.words()
+
+
+def test_only_what_lies_within_the_range_counts(beams):
+    """The URG-04LX sees 4 m: a wall 3.5 m away lies beyond in part, and of a large one around it the same is near."""
+    assert loaded(GROUND).lidar.practical_range_m == 4.0
+    figures = []
+    for width_m in (6.0, 600.0):
+        wall = {"shape": "wall", "distance_m": 3.5, "width_m": width_m, "height_m": 0.5, "top_m": 2.5}
+        task = loaded(wall)
+        figures += on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    small, large = figures
+    half_m = np.sqrt(4.0**2 - 3.5**2)
+    y, z = np.meshgrid(np.linspace(-half_m, half_m, 2001), np.linspace(-0.5, 2.0, 2001))
+    near_m2 = (y**2 + z**2 <= half_m**2).mean() * 2 * half_m * 2.5
+    hits = [(3.5 * y / x, 3.5 * z / x) for x, y, z in beams if x > 1e-6]
+    count = sum(-0.5 <= z <= 2.0 and hypot(3.5, y, z) <= 4.0 for y, z in hits)
+    for found, area_m2 in ((small, 6.0 * 2.5), (large, 600.0 * 2.5)):
+        assert found.points == count > 50
+        assert found.beyond_range == pytest.approx(1 - near_m2 / area_m2, abs=2e-3)
+        assert found.points_per_m2 == pytest.approx(count / near_m2, rel=0.03)
+        assert "of it lies beyond the lidar's range of 4 m; of the rest " in found.words()
+    assert (small.at_m, small.gap_cm) == (large.at_m, pytest.approx(large.gap_cm, rel=2 * SLACK))
+
+
+def test_nothing_is_counted_where_nothing_is_in_range():
+    task = loaded(WALL | {"distance_m": 500.0, "width_m": 100.0})
+    (found,) = on_planes(task, problem_of(task), np.radians(SETTING_DEG))
+    assert (found.points, found.points_per_m2, found.beyond_range) == (0, 0.0, 1.0)
+    assert found.words() == (
+        "wall 500 m away, 0 to 2 m high at 40 deg: 0 points, as all of it lies beyond the lidar's range of 4 m"
+    )
+    assert found.facts()["gap_cm"] is None
+
+
+def test_a_large_number_is_no_power_of_ten():
+    assert [rounded(value) for value in (0.123, 8.26, 99.4, 500.0, 1234.0)] == ["0.12", "8.3", "99", "500", "1,200"]

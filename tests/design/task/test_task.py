@@ -462,6 +462,16 @@ def test_a_spinning_servo_that_cannot_read_all_around_is_told(tmp_path):
     assert "60 deg of every turn" in warning
 
 
+def test_a_plane_that_the_lidar_does_not_reach_is_told(tmp_path):
+    wall = '[[weight]]\nshape = "wall"\nwidth_m = 10.0\nheight_m = 0.5\ndistance_m = '
+    assert load_text(tmp_path, f"{BASE}{wall}12.0").warnings() == []
+    (partly,) = load_text(tmp_path, f"{BASE}{wall}14.5").warnings()
+    (wholly,) = load_text(tmp_path, f"{BASE}{wall}20.0").warnings()
+    assert partly.startswith("weight.0: wall 14.5 m away, 0 to 2.5 m high ahead: 2") and "% of it lies beyond" in partly
+    assert "all of it lies beyond the 15 m that UTM-30LX sees" in wholly, "of the 30 m that its maker states"
+    assert load_text(tmp_path, f"{BASE}{wall}20.0\nvalue = 0").warnings() == []
+
+
 @pytest.mark.parametrize(
     "motion, period_s",
     [({"mode": "spin"}, 0.5), ({"mode": "sweep", "limits_deg": [-170, 170], "accel_deg_s2": 2000.0}, 2.0)],

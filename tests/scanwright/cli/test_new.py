@@ -41,7 +41,9 @@ def test_every_pair_is_a_task_without_a_warning_or_one_line_says_why_not(here, l
         weak = ("AX-12A", "STS3215", "XL330-M288", "XL430-W250")
         assert servo == "PD42-3-1140" or (heavy and servo in weak)  # whose hub no layout takes
     else:
-        assert write_task_file(here / "pair.toml", text) == []
+        warnings = write_task_file(here / "pair.toml", text)
+        near = PRODUCTS.get(lidar, Lidar).practical_range_m < 5.0  # where the ground of the task ends
+        assert [f"that {lidar} sees" in warning for warning in warnings] == [True] * near
 
 
 def test_what_was_asked_for_stands_in_the_file(command, here):
