@@ -122,13 +122,8 @@ class Optimum:
         return [
             f"{seen}; J alone, not asked for that, would take {taken}",
             *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
-            f"what has no hole costs {self._price(best.score.J, plain.score.J)} against it",
+            f"what has no hole costs {price(self.problem, best.score.J, plain.score.J)} against it",
         ]
-
-    def _price(self, J: float, less: float) -> str:
-        if self.problem.objective.name == "log":
-            return f"{percent(-math.expm1(less - J))} of the beams per ball"
-        return f"{J - less:.2g} in J"
 
     def table(self) -> list[str]:
         """The best families, a line each, and what the best buys against the standard alignments."""
@@ -145,6 +140,13 @@ class Optimum:
             else:
                 lines.append(f"J = {other.J:.4f} +- {error_words(other.J, other.J_error)} for {name}")
         return lines
+
+
+def price(problem: Problem, J: float, less: float) -> str:
+    """What a J costs against a lower one, in words."""
+    if problem.objective.name == "log":
+        return f"{percent(-math.expm1(less - J))} of the beams per ball"
+    return f"{J - less:.2g} in J"
 
 
 def _told(family: Family) -> str:

@@ -23,7 +23,7 @@ from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_table, read_text
 from scanwright.report.check_pictures import CheckPictures, bodies_named
 from scanwright.report.density_sphere import density_sphere
-from scanwright.report.landscapes import AXIS, PLANE, landscape
+from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.room_picture import room_picture
 from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
 from scanwright.report.sentences import sentences
@@ -56,7 +56,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
     angles = load_angles(folder / "angles.json")
     on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
     bom = read(folder / "bom.csv", read_table)
-    planes = read(folder / "search.csv", lambda path: read_columns(path, PLANES_CSV))
+    planes = read(folder / "search.csv", _planes)
     axes = read(folder / "axes.csv", _axes)
     checks = _checks(folder)
     facts = {
@@ -70,7 +70,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
         "axes": axes,
         "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
-        "lowest": None if planes is None else _lowest(planes),
+        "any_J": planes is not None and bool(np.isfinite(planes[:, 2]).any()),
         "checks": checks,
         "bom": bom,
         "steps": read(
@@ -99,12 +99,13 @@ def _on_task(folder: Path) -> dict[str, Any]:
     """What cannot be said without the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said"))
+        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said", "mounts"))
     angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
     assembly = read(folder / "assembly.glb", load_glb)
     scanner = [] if assembly is None else about_centre(assembly, angles)
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
+    planes = read(folder / "search.csv", _planes)
     found, sphere = answer(problem, angles), density_sphere(problem, angles, axes, task.angles.step_deg)
     return {
         "objective": task.density.objective,
@@ -113,6 +114,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "sphere": sphere,
         "room": room_picture(task, folder, problem, setting, sphere, scanner),
         "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting)),
+        "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 
 
@@ -130,6 +132,10 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
 
 def _checks(folder: Path) -> dict[str, list[dict[str, Any]]] | None:
     return read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
+
+
+def _planes(path: Path) -> Array:
+    return read_columns(path, PLANES_CSV)
 
 
 def _axes(path: Path) -> Array:
@@ -180,15 +186,6 @@ def _by_severity(checks: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]
     known = {severity: [c for c in checks if c["severity"] == severity] for severity in SEVERITIES}
     known["error"] += [c for c in checks if c["severity"] not in SEVERITIES]
     return known
-
-
-def _lowest(planes: Array) -> dict[str, Any] | None:
-    """The lowest J of the table, and the settings that have it."""
-    open_planes = planes[np.isfinite(planes[:, 2])]
-    if not len(open_planes):
-        return None
-    lowest = open_planes[:, 2].min()
-    return {"J": float(lowest), "rows": open_planes[open_planes[:, 2] == lowest].tolist()}
 
 
 def _places(

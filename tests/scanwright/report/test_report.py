@@ -27,9 +27,9 @@ from design.frames import R_world_rot
 from design.left_out import LeftOut
 from design.motion import Sweep
 from design.objective.problem import NODES, problem_of
-from design.objective.score import quick_J
+from design.objective.score import quick_J, score
 from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
-from design.task.task import load_task
+from design.task.task import Limits, load_task
 from scanwright.pipeline import records as writer
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.pipeline.records import write_report
@@ -38,6 +38,7 @@ from scanwright.report.answer import answer, hidden_by, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
 from scanwright.report.density_sphere import SHADES, STEP_DEG, density_sphere
+from scanwright.report.landscapes import other_mounts
 from scanwright.report.page import report_html
 from scanwright.report.scanner_scene import load_glb, placed_bodies, scanner_scene
 
@@ -380,8 +381,33 @@ def test_the_code_of_the_page_asks_for_what_is_there(folder, page):
 
 def test_the_table_of_settings_names_the_lowest(page):
     settings = " ".join(page.text["settings"].split())
-    assert "The lowest J in the table is -5.0, and 1 setting has it" in settings
+    assert "As built, with its parts and at angles refined between those of the grid, J is -5.7636." in settings
+    assert settings.index("kept") < settings.index("blind to"), "those first that keep what the task asks"
     assert "25 ways to mount the laser on the axis, and 325 ways to mount the axis on the robot" in settings
+
+
+def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
+    """The setting of the shipped task that J alone would take, beside the best one without a hole."""
+    loaded = load_task(Path("ground_ahead"))
+    problem, built = problem_of(loaded), np.radians([0.0, -55.61, -78.72, 79.75])
+    planes = np.array([[-80.0, 75.0, -6.1285, 0.0, -55.0], [-80.0, 80.0, -6.128, 0.0, -55.0], [0.0, 0.0, np.inf, 0, 0]])
+    found = other_mounts(problem, loaded.task, built, planes)
+    ((kept,), (broken,)) = found.kept, found.broken
+    assert (kept.angles_deg, kept.breaks) == ((0, -55, -80, 80), "")
+    assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
+    assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
+    assert (
+        "would take (0, -55, -80, 75) with J = -6.1284, which is blind ahead and 35 deg down: 0.58 deg" in found.alone
+    )
+    assert found.alone.endswith("What keeps all that the task asks costs 0.086% of the beams per ball against it.")
+    allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
+    assert (
+        len(other_mounts(problem, allowed, built, planes).kept) == 2
+        and not other_mounts(problem, allowed, built, planes).alone
+    )
+    limited = allowed.model_copy(update={"limits": Limits(min_density=50)})
+    (other,) = other_mounts(problem, limited, built, planes).broken
+    assert (other.angles_deg, other.breaks) == (broken.angles_deg, "breaks the limits")
 
 
 def test_the_manifest_in_the_page_is_that_of_the_folder(folder, page, text):
