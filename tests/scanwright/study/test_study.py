@@ -17,6 +17,7 @@ from benchmarks.scanwright.study.invented import invented_judge, invented_search
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.task.named_record import names_in
+from design.task.task import SHIPPED as TASKS
 from design.task.task import Limits, load_task
 from scanwright.study.candidate import addresses, bounds_of, record_digest, search_record, winner_task
 from scanwright.study.crossing import Crossing, _with_period
@@ -250,6 +251,15 @@ def test_a_product_of_the_study_goes_with_its_winners(tmp_path):
     assert mine.name == "rolling-my-ring"
     assert load_catalogue(*map(Path, mine.loaded.task.catalogue)).named("my ring")
     assert "needs a slip ring" in none.refused
+
+
+def test_a_region_out_of_range_refuses_no_candidate(tmp_path):
+    """It warns: another lidar of the study may reach, and a scanner that sees a part of it is one."""
+    wall = '[[weight]]\nshape = "wall"\ndistance_m = 20\nwidth_m = 4\nheight_m = 0.5\n'
+    text = (TASKS / "rolling.toml").read_text(encoding="utf-8")
+    (tmp_path / "far.toml").write_text(text.replace('[[weight]]\nshape = "all"\n', wall), encoding="utf-8")
+    (found,) = crossed('tasks = ["far.toml"]', tmp_path)
+    assert found.refused == "" and "beyond the 15 m" in found.loaded.warnings()[0]
 
 
 def test_every_shipped_study_can_be_read():
