@@ -90,8 +90,8 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_m: float) -
         message = (
             f"{SERVO}: gravity turns {servo.name} {turns}, of {RUBS_NM:g} that ring and bearing rub with: nobody tells "
             f"where the centre of mass of {scanner.lidar.name} is, within {LIDAR_DOUBT_MM:g} mm of the middle of its "
-            "body or so; look at the ripple that `scanwright scan` prints, and slide the counterweight, where there is "
-            "one, to the least"
+            "body or so; look at the ripple that `scanwright scan` prints, and move the balancing weight, where there "
+            "is one, until it is least"
         )
         return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", SERVO, message)
     grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
