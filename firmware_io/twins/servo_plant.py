@@ -68,6 +68,8 @@ class Plant:
         position_p: duty per rad of position error.
         margin_rad: position error that the loop ignores.
         punch: least duty beyond the margin.
+        coasting_rad_s: rate at which what a rotor loses without current would take its stall torque; infinite where
+            friction is all.
     """
 
     stall_torque_nm: float
@@ -83,6 +85,7 @@ class Plant:
     position_p: float
     margin_rad: float
     punch: float
+    coasting_rad_s: float = math.inf
 
 
 def plant_of(model: str) -> Plant:
@@ -118,11 +121,13 @@ def _stepper(holding_nm: float) -> Plant:
     """A stepper that turns its horn itself; no loop knows of its angle.
 
     Assumed: rotor and hub of 500 g cm2, more than they have, so that a solver need not follow what nobody sees; eddies
-    that would take all the torque at 200 rpm, and no friction beside them; a shaft of 100 Nm/rad.
+    that would take all the torque at 200 rpm, with current or without, and no friction beside them; a shaft of
+    100 Nm/rad.
     """
     return Plant(
         stall_torque_nm=holding_nm,
         no_load_rad_s=200 * RPM,
+        coasting_rad_s=200 * RPM,
         inertia_kg_m2=5e-5,
         friction_nm=0.0,
         backlash_rad=0.0,
@@ -197,7 +202,7 @@ def effort(
     """
     del h_rate
     if drive.mode == "off":
-        return 0.0, 0.0
+        return 0.0, -m_rate / plant.coasting_rad_s
     asked = math.sin(_POLES * (setpoint - m)) if drive.mode == "steps" else _asked(plant, drive, setpoint, h, i, seen)
     if drive.mode == "steps":  # the current makes the field weaker, it does not cut its top off
         asked *= drive.torque_limit

@@ -292,8 +292,6 @@ def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
             recording = out / f"{attempt}.mcap"
             with program("scan", out, "--turns", turns, "-o", recording) as process:
                 said, complaints = process.communicate(timeout=600)
-            if process.returncode and "no answer" in complaints and attempt < 2:
-                continue  # the twins' process got no time: a servo that is silent ends a scan, and rightly
             assert process.returncode == 0, complaints
             error_m, share = residuals_m(read_ply(recording.with_suffix(".ply")), angles, room(None))
             median_m = np.median(error_m)
