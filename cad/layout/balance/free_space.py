@@ -60,4 +60,4 @@ def _from_slot(points: Array, first: tuple[float, float], last: tuple[float, flo
 def in_hull(points: Array, corners: Array, gap: float) -> Mask:
     """Points nearer than a gap to every plane of the convex hull of corners, shape (m, 3), or behind it."""
     planes = ConvexHull(corners).equations
-    return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1) < gap)
+    return np.asarray((planes[:, :3] @ points.T + planes[:, 3:]).max(axis=0) < gap)

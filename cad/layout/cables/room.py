@@ -1,6 +1,6 @@
 """Where a lead may run on the rotor: beside all that turns with it, above all that stands still, out of the fan.
 
-Rotation frame at gamma = 0, mm. Distances from convex shapes are those from their planes: never more than the true one.
+Rotation frame at gamma = 0, mm.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from cad.layout.balance.counterweight import LONGER, Counterweight
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
 from cad.layout.deck import FOOT_THICKNESS, Deck
 from cad.layout.envelope import Box, box_corners, envelope_of
 from cad.layout.layout import Layout
@@ -24,17 +24,6 @@ from design.catalogue.products import Lidar
 
 BAR_SCREW = SCREWS["M4"]
 BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
-HUB_SIDES = 24
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A convex shape: its planes (n, 4), outwards, the sphere around it, and whether channels are cut from it."""
-
-    planes: Array
-    middle: Array
-    reach: float
-    carved: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +53,19 @@ class RotorRoom:
     def free(self, points: Array, half: float, gap: float) -> Mask:
         """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
         room = half + gap
-        clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room) & ~self._in_fan(points, half)
-        for shape in self.shapes:  # the planes of a shape are asked for what its sphere does not clear
-            near = np.flatnonzero(clear)
-            near = near[np.linalg.norm(points[near] - shape.middle, axis=1) < shape.reach + room]
-            beside = (points[near] @ shape.planes[:, :3].T + shape.planes[:, 3]).max(axis=1) > room
-            clear[near] = beside | self._carved(points[near], room) if shape.carved else beside
-        return np.asarray(clear & self.beside_others(points))
+        clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
+        for keeps in (  # what is told soonest first, and of what is left only
+            lambda some: ~self._in_fan(some, half),
+            lambda some: beside(self.shapes, some, room, lambda inside: self._carved(inside, room)),
+            self.beside_others,
+        ):
+            left = np.flatnonzero(clear)
+            clear[left] = keeps(points[left])
+        return np.asarray(clear)
 
     def beside_others(self, points: Array) -> Mask:
         """Whether each point, shape (n, 3), is far enough from the leads that run already, shape (n,)."""
-        middles, apart = self.others
-        near = np.linalg.norm(points[:, None] - middles, axis=2).min(axis=1, initial=np.inf)
-        return np.asarray(near > apart)
+        return farther(points, *self.others)
 
     def _carved(self, points: Array, room: float) -> Mask:
         """In the channels that the linkage leaves free for the cables and for putting in the lidar."""
@@ -135,12 +124,6 @@ def room_of(layout: Layout) -> RotorRoom:
     )
 
 
-def shape_of(corners: Array, carved: bool = False) -> Shape:
-    """The convex hull of corners, shape (n, 3)."""
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
-
-
 def _floor(layout: Layout) -> float:
     """Height over all that stands still, or is as wide, below the hub."""
     stack = layout.stack
@@ -155,14 +138,6 @@ def _stubs(lidar: Lidar) -> list[Box]:
     return [
         ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
     ]
-
-
-def around_axis(radius: float, low: float, high: float) -> Array:
-    """Corners around a cylinder about the axis, shape (n, 3)."""
-    turn = 2 * math.pi * np.arange(HUB_SIDES) / HUB_SIDES
-    around = radius / math.cos(math.pi / HUB_SIDES)
-    ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return np.concatenate([np.column_stack([ring, np.full(HUB_SIDES, z)]) for z in (low, high)])
 
 
 def _arm(flag: Flag) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from cad import outlines
 from cad.layout.belt.stack import FOOT, FOOT_HALF, PLATE, SHELF, BeltStack, case_corners, drive_corners
-from cad.layout.cables.room import Shape, around_axis, shape_of
+from cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
 from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PLUG_GAP, RAIL_INSET, STRUT_BEHIND, Deck, strut_corners
 from cad.layout.direct import adapter
 from cad.layout.direct.cage import SEAT_GAP, plate_half_x
@@ -49,13 +49,10 @@ class StandingRoom:
         room = half + gap
         over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
         clear = (points[:, 2] < self.ceiling - room) & (over_deck > half)
-        for shape in self.shapes:
-            near = np.flatnonzero(clear)
-            near = near[np.linalg.norm(points[near] - shape.middle, axis=1) < shape.reach + room]
-            clear[near] = (points[near] @ shape.planes[:, :3].T + shape.planes[:, 3]).max(axis=1) > room
         middles, radius = self.others
-        nearest = np.linalg.norm(points[:, None] - middles, axis=2).min(axis=1, initial=np.inf)
-        return np.asarray(clear & (nearest > radius + room))
+        left = np.flatnonzero(clear)
+        clear[left] = beside(self.shapes, points[left], room) & farther(points[left], middles, radius + room)
+        return np.asarray(clear)
 
     def beside(self, middles: Array, radius: float) -> StandingRoom:
         """The room that is left beside a cable."""

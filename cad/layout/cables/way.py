@@ -118,6 +118,15 @@ def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class _Ends:
+    """The stiff pieces that begin at the last points: number of the first of these, directions (k, 3), lengths (k,)."""
+
+    first: int
+    directions: Array
+    left: Array
+
+
+@dataclass(frozen=True, slots=True)
 class WayGraph:
     """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
 
@@ -142,15 +151,16 @@ class WayGraph:
             goals: last points, and the same of the stiff piece that begins there.
         """
         left = GREED * np.linalg.norm(self.points[:, None] - self.points[list(goals)], axis=2).min(axis=1)
+        ends = _Ends(min(goals), *(np.array(each) for each in zip(*goals.values(), strict=True)))
         # a piece is known by its two points; before the first one stands the stiff end
-        best: dict[tuple[int, int], float] = {}
+        shortest: dict[int, Array] = {}  # of all chains so far that end with each piece from a point
         came: dict[tuple[int, int], tuple[int, int]] = {}
         arrived: dict[int, int] = {}
-        queue = [(float(left[i]), 0.0, -1, i) for i in starts]
+        queue = [(float(left[i]), 0.0, -1, i, 0) for i in starts]
         heapq.heapify(queue)
         while queue:
-            _, length, before, here = heapq.heappop(queue)
-            if best.get((before, here), math.inf) < length:
+            _, length, before, here, piece = heapq.heappop(queue)
+            if before >= 0 and shortest[before][piece] < length:
                 continue
             if here in goals and before >= 0:
                 return _back(came, (before, here))
@@ -158,11 +168,12 @@ class WayGraph:
             if arrived[here] > ARRIVALS:
                 continue
             stiff = starts[here] if before < 0 else self._piece(before, here)
-            for there, more in self._onwards(here, stiff, goals):
-                found = length + more
-                if found < best.get((here, there), math.inf) - 1e-9:
-                    best[here, there], came[here, there] = found, (before, here)
-                    heapq.heappush(queue, (found + float(left[there]), found, here, there))
+            others, _, lengths = self._pieces_at(here)
+            known = shortest.setdefault(here, np.full(len(others), np.inf))
+            for onto in self._onwards(here, stiff, ends, length + lengths < known - 1e-9):
+                found, there = length + float(lengths[onto]), int(others[onto])
+                known[onto], came[here, there] = found, (before, here)
+                heapq.heappush(queue, (found + float(left[there]), found, here, there, int(onto)))
         return []
 
     def _piece(self, start: int, end: int) -> Stiff:
@@ -170,18 +181,19 @@ class WayGraph:
         length = float(np.linalg.norm(along))
         return along / length, length / 2
 
-    def _onwards(self, here: int, stiff: Stiff, goals: dict[int, Stiff]) -> list[tuple[int, float]]:
-        """The points that one may go on to from a piece, and how far they are."""
+    def _onwards(self, here: int, stiff: Stiff, ends: _Ends, asked: Mask) -> NDArray[np.int64]:
+        """Which of the pieces from a point, of those that are asked for, one may go on along from a stiff one."""
         others, along, lengths = self._pieces_at(here)
         direction, left = stiff
-        fits = _arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2)
-        for goal, (onto, after) in goals.items():
-            at = np.flatnonzero(others == goal)
-            fits[at] &= _arc(self.radius, along[at] @ onto) <= np.minimum(after, lengths[at] / 2)
+        fits = asked & (_arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2))
+        last = np.flatnonzero(others >= ends.first)
+        if len(last):
+            end = others[last] - ends.first
+            turn = np.einsum("ij,ij->i", along[last], ends.directions[end])
+            fits[last] &= _arc(self.radius, turn) <= np.minimum(ends.left[end], lengths[last] / 2)
         chosen = np.flatnonzero(fits)
         inside = self.points[here] + _inwards(self.radius, direction, along[chosen])
-        chosen = chosen[self.room.free(inside, self.half, GAP)]
-        return [(int(others[i]), float(lengths[i])) for i in chosen]
+        return chosen[self.room.free(inside, self.half, GAP)]
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Points that a free straight piece leads to from one, directions (m, 3) and lengths (m,)."""
