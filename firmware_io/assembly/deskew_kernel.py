@@ -68,12 +68,14 @@ def place_block(
     points_m = np.empty((scans, 3 * beams), np.float32)
     verdict = np.empty((scans, beams), np.uint8)
     joint_rad = np.empty((scans if with_joint else 0, beams))
+    range_m = block.range_m.view()
+    range_m.flags.writeable = False  # as those of a recording are: the kernel is compiled for one kind only
 
     def work(rows: slice) -> None:
         _place(
             block.stamp_ns[rows],
             logged_ns[rows],
-            block.range_m[rows],
+            range_m[rows],
             fan,
             curve.knot_ns,
             curve.coefficient,
@@ -167,18 +169,31 @@ def _sin_cos(angle_rad: float) -> tuple[float, float]:
     return 2 * s * c, 1 - 2 * s * s
 
 
+@njit(nogil=True)
+def _before(time_ns: Times, end_ns: int) -> int:
+    """How many of ascending times, whole numbers, lie before an end: numpy's search compiles ten times as long."""
+    low, high = 0, time_ns.size
+    while low < high:
+        middle = (low + high) // 2
+        if time_ns[middle] < end_ns:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @njit(inline="always")
 def _run(begin_ns: int, offset_ns: Floats, at: int, knot_ns: Times) -> tuple[int, int]:
     """The piece that beam `at` falls into (-1: none), and the first beam behind it that does not."""
-    time_ns = begin_ns + np.int64(offset_ns[at])
+    time_ns = begin_ns + int(offset_ns[at])
     if time_ns < knot_ns[0]:
-        return -1, int(np.searchsorted(offset_ns, np.float64(knot_ns[0] - begin_ns), "left"))
+        return -1, _before(offset_ns, knot_ns[0] - begin_ns)
     if time_ns > knot_ns[-1]:
         return -1, offset_ns.size
-    piece = int(np.searchsorted(knot_ns, time_ns, "right")) - 1
+    piece = _before(knot_ns, time_ns + 1) - 1
     if piece >= knot_ns.size - 2:
-        return knot_ns.size - 2, int(np.searchsorted(offset_ns, np.float64(knot_ns[-1] - begin_ns), "right"))
-    return piece, int(np.searchsorted(offset_ns, np.float64(knot_ns[piece + 1] - begin_ns), "left"))
+        return knot_ns.size - 2, _before(offset_ns, knot_ns[-1] - begin_ns + 1)
+    return piece, _before(offset_ns, knot_ns[piece + 1] - begin_ns)
 
 
 @njit(cache=True, nogil=True, fastmath=_CONTRACT)
@@ -280,7 +295,8 @@ def _place(
         _axis_angle(logged_ns[s], fan.offset_ns, knot_ns, coefficient, angle)
         _judge(range_m[s], angle, fan, verdict[s])
         if joint_rad.shape[0]:
-            joint_rad[s] = angle
+            for k in range(beams):  # a row set at once brings the words of its errors, a second to compile
+                joint_rad[s, k] = angle[k]
         at = 0
         while at < beams:
             i, end = _run(stamp_ns[s], fan.offset_ns, at, poses.time_ns)

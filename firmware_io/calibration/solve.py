@@ -208,7 +208,8 @@ def _summed(values: Floats, label: Ints, labels: int) -> Floats:
 def _add(values: Array, label: Ints, out: Array) -> None:
     for i in range(label.size):
         if label[i] >= 0:
-            out[label[i]] += values[i]
+            for k in range(out.shape[1]):
+                out[label[i], k] += values[i, k]
 
 
 def step(part: Reduced) -> tuple[Floats, Floats]:

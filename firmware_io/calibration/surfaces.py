@@ -71,7 +71,6 @@ def group(
     return Grouping(surface, spot.ravel(), np.array(planes))
 
 
-@njit(cache=True, nogil=True)
 def _grown(
     seed: int,
     left: Mask,
@@ -84,22 +83,32 @@ def _grown(
     near_m: float,
 ) -> tuple[Array, float, Mask]:
     """The plane n . p = c that grows from a tile to the ends of its wall, and which tiles that are left lie in it."""
-    n, c = normal[seed], _dot(normal[seed], point[seed])
+    n, c = normal[seed], float(normal[seed] @ point[seed])
+    asked = left & (place == place[seed])
     before = np.zeros(left.size, np.bool_)
     for _ in range(_REFITS):
-        mine = np.zeros(left.size, np.bool_)
-        for i in range(left.size):
-            if left[i] and place[i] == place[seed]:
-                mine[i] = (
-                    abs(_dot(n, point[i]) - c) < near_m
-                    and _dot(n, normal[i]) > limit[i]
-                    and abs(_dot(n, direction[i])) > _GRAZING
-                )
-        if mine.sum() < _FEWEST or np.array_equal(mine, before):
+        mine = _in_plane(n, c, asked, point, normal, direction, limit, near_m)
+        if np.count_nonzero(mine) < _FEWEST or np.array_equal(mine, before):
             break
         n, c = _plane(point[mine], normal[mine], weight[mine])
         before = mine
     return n, c, mine
+
+
+@njit(cache=True, nogil=True)
+def _in_plane(
+    n: Array, c: float, asked: Mask, point: Array, normal: Array, direction: Array, limit: Array, near_m: float
+) -> Mask:
+    """Which tiles, of those that are asked for, lie in the plane n . p = c, and are seen well."""
+    mine = np.zeros(asked.size, np.bool_)
+    for i in range(asked.size):
+        if asked[i]:
+            mine[i] = (
+                abs(_dot(n, point[i]) - c) < near_m
+                and _dot(n, normal[i]) > limit[i]
+                and abs(_dot(n, direction[i])) > _GRAZING
+            )
+    return mine
 
 
 @njit(inline="always")
@@ -107,7 +116,6 @@ def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True)
 def _plane(point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
     """Plane through weighted points; few of them lean on their normals."""
     mean = weight @ point / weight.sum()
@@ -118,7 +126,7 @@ def _plane(point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
         n = weight @ normal
         n /= np.linalg.norm(n)
     n = n if weight @ (normal @ n) > 0 else -n
-    return n, n @ mean
+    return n, float(n @ mean)
 
 
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:

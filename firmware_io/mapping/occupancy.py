@@ -137,20 +137,21 @@ def _ways_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, 
     ways = np.empty((points_m.shape[0], 4))
     count = 0
     for i in range(points_m.shape[0]):
-        eye, along = eyes_m[i], points_m[i] - eyes_m[i]
-        length = np.sqrt(np.sum(along**2))
+        x, y, z = eyes_m[i, 0], eyes_m[i, 1], eyes_m[i, 2]
+        dx, dy, dz = points_m[i, 0] - x, points_m[i, 1] - y, points_m[i, 2] - z
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
         if not length > short_m:  # an eye that nobody knows, too
             continue
         begin, end = 0.0, 1.0 - short_m / length
-        if along[2] == 0.0:
-            if eye[2] < low_m or eye[2] > high_m:
+        if dz == 0.0:
+            if z < low_m or z > high_m:
                 continue
         else:
-            a, b = (low_m - eye[2]) / along[2], (high_m - eye[2]) / along[2]
+            a, b = (low_m - z) / dz, (high_m - z) / dz
             begin, end = max(begin, min(a, b)), min(end, max(a, b))
         if begin < end:
-            ways[count, :2] = eye[:2] + begin * along[:2]
-            ways[count, 2:] = eye[:2] + end * along[:2]
+            ways[count, 0], ways[count, 1] = x + begin * dx, y + begin * dy
+            ways[count, 2], ways[count, 3] = x + end * dx, y + end * dy
             count += 1
     return ways[:count]
 

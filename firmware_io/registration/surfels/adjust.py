@@ -9,6 +9,7 @@ What the stated covariance of the scanner's angles allows is unknown too, the sa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
@@ -16,11 +17,12 @@ from numpy import ndarray
 
 from design import frames
 from design.arrays import Floats, Pose
+from design.concurrency.parallel import in_chunks
 from firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
 from firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
 
 _ROUNDS = 8
-_SETTLED = 1e-2  # squared sigmas of a step: a hundredth of what is stated is no longer an error
+_SETTLED = 5e-2  # squared sigmas of a step: beams at the edges of pieces come and go, and move it as much for ever
 _SAME_REACH = 0.9
 _REACH = 5  # sigmas: what a wall's noise never does
 _FOREIGN = 0.02
@@ -33,6 +35,7 @@ _MEDIAN_CHI2 = 2.37  # of three degrees of freedom
 _VAGUE = 0.1  # of the spacing: flat pieces that leave a position this open leave out what holds it
 _RIDGE = 1e-9  # of a plane's information: keeps what one line leaves open solvable
 _RANK = 1e-6
+_SHARES = 8  # of the beams, summed side by side: on every machine as many, as the order of a sum rounds it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +88,7 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
         answer = Adjusted(T, solved.covariance, int(solved.agrees.sum()), solved.scale)
         reach_m = min(cells.reach_m, _REACH * solved.noise_m)
         still = solved.x[:6] @ np.linalg.solve(solved.covariance, solved.x[:6]) < _SETTLED
-        if still and solved.agrees.all() and reach_m > _SAME_REACH * cells.reach_m:
+        if still and reach_m > _SAME_REACH * cells.reach_m:
             break
         cells = cells.moved(solved.planes, reach_m).kept(solved.agrees)
     return answer
@@ -104,12 +107,18 @@ class _Solved:
 def _summed(
     beams: Beams, cells: Cells, lookup: Lookup, T: Pose, moves: bool
 ) -> tuple[Floats, Int64[ndarray, " m"], Int64[ndarray, " m"]]:
-    beam, cell = (beams.points_m, beams.eye_m, beams.joint_rad, beams.frame), cells
-    known = (lookup.edge_m, lookup.keys, lookup.first, lookup.cells)
-    axes = np.ascontiguousarray(cells.axes)
-    return sum_beams(
-        *beam, np.ascontiguousarray(T), moves, *known, cell.low_m, cell.edge_m, cell.centre_m, axes, cell.reach_m
-    )
+    known, cell = (lookup.edge_m, lookup.keys, lookup.first, lookup.cells), cells
+    pose, axes = np.ascontiguousarray(T), np.ascontiguousarray(cells.axes)
+    bounds = [len(beams.points_m) * k // _SHARES for k in range(_SHARES + 1)]
+
+    def share(k: int) -> tuple[Floats, Int64[ndarray, " m"], Int64[ndarray, " m"]]:
+        some = slice(bounds[k], bounds[k + 1])
+        beam = (beams.points_m[some], beams.eye_m, beams.joint_rad[some], beams.frame)
+        return sum_beams(*beam, pose, moves, *known, cell.low_m, cell.edge_m, cell.centre_m, axes, cell.reach_m)
+
+    shares = in_chunks(lambda some: [share(k) for k in range(_SHARES)[some]], _SHARES, smallest=1)
+    sums, on, off = zip(*chain.from_iterable(shares), strict=True)
+    return np.sum(sums, axis=0), np.sum(on, axis=0), np.sum(off, axis=0)
 
 
 def _solve(

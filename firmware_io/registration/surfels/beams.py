@@ -47,7 +47,7 @@ class Beams:
     covariance: Float64[ndarray, "4 4"] | None
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def sum_beams(
     points_m: Float32s,
     eye_m: Floats,
