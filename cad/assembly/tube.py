@@ -7,7 +7,8 @@ import numpy as np
 
 from cad import solids
 from cad.geometry.mesh import mesh_of
-from cad.layout.cables.leads import JOINT, JOINT_WALL, RotorLead
+from cad.layout.cables import joint
+from cad.layout.cables.leads import RotorLead
 from cad.layout.cables.path import Path, PathPiece
 from cad.layout.cables.standing import StandingLead
 from cad.layout.names import ROTOR_LEAD
@@ -26,11 +27,10 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
     assert lead.path is not None
     with building(ROTOR_LEAD, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
         tube: cq.Shape = _tube(lead.path, lead.diameter / 2)
-        joint = lead.path.joint_piece()
-        if joint is not None and joint.length >= JOINT:
-            along = (joint.end - joint.start) / joint.length
-            start = joint.middle - JOINT / 2 * along
-            tube = tube.fuse(solids.cylinder(lead.diameter / 2 + JOINT_WALL, start, along, JOINT))
+        if lead.joint is not None:
+            start, *_, end = lead.joint.points()
+            along = (end - start) / joint.LENGTH
+            tube = tube.fuse(solids.cylinder(lead.diameter / 2 + joint.WALL, start, along, joint.LENGTH))
         return _closed(ROTOR_LEAD, checked(tube))
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from cad.assembly.assembly import Assembly
 from cad.checks.check import Check, at_least, note, tidy
-from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
+from cad.layout.cables import joint
+from cad.layout.cables.leads import RotorLead, tied_mm
 from cad.layout.cables.tie_seat import TieSeat
 from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 
@@ -52,16 +53,15 @@ def _checks(lead: RotorLead, where: str, seat: TieSeat | None) -> list[Check]:
             f"clears all parts with a bundle of {lead.diameter:g} mm: thinner leads, or another azimuth of the cable"
         )
         return [Check("lead_bend", "warning", None, lead.radius, "mm", where, what)]
-    joint = lead.path.joint_piece()
+    longest = max((piece.length for piece in joint.straights(lead.path)), default=0.0)
+    straight = longest if lead.joint is None else lead.joint.piece.length
     tied = None if seat is None else tied_mm(lead, seat)
     what = f"{where}: no tongue of the hub holds it: tie it to what is near"
     if tied is not None:
         what = f"{where}: runs {tied:.1f} mm below the tongue of the hub that it is tied to"
     return [
         at_least("lead_bend", lead.path.least_radius(), lead.radius, "mm", where, "least bend radius of its middle"),
-        at_least(
-            "lead_joint", 0.0 if joint is None else joint.length, JOINT, "mm", where, "straight piece for its joint"
-        ),
+        at_least("lead_joint", straight, joint.LENGTH, "mm", where, "straight piece for its joint"),
         note(
             "lead_length", lead.path.length(), "mm", where, "from the ring's rotor to the jacket of the lidar's cable"
         ),

@@ -1,7 +1,7 @@
 """The leads between lidar and slip ring: where they begin and end on this scanner, and the way that each one takes.
 
 Behind the straight piece that its maker draws, the jacket of the lidar's cable is taken off; its wires go on, bend like
-the leads of the ring, and meet them in a joint on the longest straight piece. Both turn with the lidar: they bend when
+the leads of the ring, and meet them in a joint on a straight piece. Both turn with the lidar: they bend when
 they are laid, and then no more.
 """
 
@@ -15,6 +15,8 @@ from itertools import product
 import numpy as np
 
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables import joint as joints
+from cad.layout.cables.joint import Joint, joint_of
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import RotorRoom, room_of
 from cad.layout.cables.tie_seat import TieSeat
@@ -34,9 +36,7 @@ OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 HELD = 1.0  # beyond the face that a lead leaves by, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
 ASIDE = 15.0  # deg between two azimuths that a ring's lead may leave at
-JOINT = 12.0  # length of a joint: crimps beside each other, and a shrink tube over them
 LEAD_G_CM3 = 1.5  # reckoned: five wires of 1.3 mm over 0.14 mm2 of copper are 2.9 g/m each, in a bundle of 3.5 mm
-JOINT_WALL = 0.5  # of the shrink tube over the crimps; of what a lead keeps to all others it leaves a tenth
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +48,14 @@ class RotorLead:
         diameter: of the bundle.
         radius: least one that it may be bent to.
         path: its middle from the ring to the lidar, rotation frame at gamma = 0; None where there is no way.
+        joint: where its wires meet the ring's; None where no straight piece is long enough.
     """
 
     y: float
     diameter: float
     radius: float
     path: Path | None
+    joint: Joint | None = None
 
     @property
     def mass_g(self) -> float:
@@ -81,7 +83,21 @@ def leads_of(layout: Layout) -> tuple[RotorLead, ...]:
             found = leads
         if _ways(found) == len(numbers) or leads[order[0]].path is None:
             break  # the first has all the room: what has no way then has none
-    return found
+    return _jointed(layout, found)
+
+
+def _jointed(layout: Layout, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
+    """The leads with their joints, each beside the other leads and the joints before it."""
+    room = replace(room_of(layout), bearings_rad=None)  # a way may be in the fan; its joint is then, too
+    points = [np.zeros((0, 3)) if lead.path is None else lead.path.points(SAMPLE) for lead in leads]
+    found: list[RotorLead] = []
+    for i, lead in enumerate(leads):
+        apart = lead.diameter + joints.WALL + BESIDE / 2
+        others = [(middles, apart) for k, middles in enumerate(points) if k != i]
+        others += [(other.joint.points(), apart + joints.WALL) for other in found if other.joint is not None]
+        joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, room, others)
+        found.append(replace(lead, joint=joint))
+    return tuple(found)
 
 
 def tied_mm(lead: RotorLead, seat: TieSeat) -> float | None:

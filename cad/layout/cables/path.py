@@ -96,12 +96,6 @@ class Path:
                 found.append(depth / 2 + chord**2 / (8 * depth))
         return round(min(found), 6)
 
-    def joint_piece(self) -> PathPiece | None:
-        """The longest straight piece behind the first bend, where hands reach; None where all of it is bent."""
-        pieces = self.pieces()
-        bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
-        return max((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda p: p.length, default=None)
-
     def points(self, step: float) -> Array:
         """Points along it, no further apart than a step, shape (n, 3)."""
         found = []

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 
 from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import JOINT, RotorLead, tied_mm
+from cad.layout.cables.joint import LENGTH
+from cad.layout.cables.leads import RotorLead, tied_mm
 from cad.layout.cables.standing import StandingLead
 from cad.layout.layout import Layout
 
@@ -22,7 +23,7 @@ def leads_words(layout: Layout, leads: Sequence[RotorLead]) -> str:
         f"Take the jacket of the lidar's cable off {straight:g} mm behind the lidar: that much stays straight, and the "
         "bare wires behind it go on as one bundle with the leads of the ring, the way that the picture shows.",
         *(_one(layout, lead) for lead in laid),
-        f"Crimp the wires of each bundle side by side on its longest straight piece, with {JOINT:g} mm of shrink tube "
+        f"Crimp the wires of each bundle side by side on a straight piece, with {LENGTH:g} mm of shrink tube "
         "over all of them; the wiring diagram tells which belong together. "
         f"The {SPARE:g} mm that are left go back along the joint, under the same tube.",
         *_ties(layout, laid),
@@ -73,7 +74,7 @@ def _one(layout: Layout, lead: RotorLead) -> str:
     out = "by the shaft's window" if isinstance(layout.stack, BeltStack) else "under the hub"
     if layout.stack.bearing is not None:
         out = "by the channel of the hub"
-    joint = lead.path.joint_piece()
+    joint = lead.joint
     where = "" if joint is None else f", its joint {math.dist(joint.middle, lead.path.corners[-1]):.0f} mm from there"
     return (
         f"The cable at y = {lead.y:g} mm: the bundle leaves {out} at {azimuth:.0f} deg (counter-clockwise from above, "

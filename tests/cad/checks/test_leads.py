@@ -11,7 +11,7 @@ from cad.assembly.steps import steps_of
 from cad.assembly.tube import lead_solid
 from cad.checks.clearance import clearance_checks
 from cad.checks.rotor_leads import lead_checks
-from cad.layout.cables.leads import JOINT, JOINT_WALL
+from cad.layout.cables import joint
 from cad.layout.cables.path import Path
 
 
@@ -28,9 +28,9 @@ def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):
 
 def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
     for number, lead in enumerate(lying.leads, start=1):
-        half, wide = lead.diameter / 2, lead.diameter / 2 + JOINT_WALL
+        half, wide = lead.diameter / 2, lead.diameter / 2 + joint.WALL
         wanted = np.pi * (
-            half**2 * (lead.path.length() - JOINT) + wide**2 * JOINT
+            half**2 * (lead.path.length() - joint.LENGTH) + wide**2 * joint.LENGTH
         )  # Pappus: the middle is the centroid
         assert lying.bought[f"rotor_lead_{number}"].Volume() == pytest.approx(wanted, rel=1e-4)
 
@@ -38,7 +38,7 @@ def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
 def test_a_lead_straight_through_the_linkage_is_seen(lying):
     first = lying.leads[0]
     short = Path((first.path.corners[0], first.path.corners[-1]), first.radius)
-    bad = replace(lying, bought=lying.bought | {"rotor_lead_1": lead_solid(replace(first, path=short))})
+    bad = replace(lying, bought=lying.bought | {"rotor_lead_1": lead_solid(replace(first, path=short, joint=None))})
     (found,) = [check for check in clearance_checks(bad) if check.kind == "interference"]
     assert found.severity == "error" and "rotor_lead_1" in found.where and found.value > 10
 

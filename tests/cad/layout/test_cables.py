@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cad.layout.cables.joint import LENGTH, WALL
 from cad.layout.cables.leads import leads_of, outlet_mm
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import room_of
@@ -19,6 +20,7 @@ SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a ho
     "lying": ((0, 0, 90, 0), "UTM-30LX", BORE),
     "bearing": ((-41, 56, 30, -90), "UTM-30LX", "SNU11-P0210"),
     "belt": ((0, 19, 84, 41), "URG-04LX", CAPSULE),
+    "joints": ((-161.07, -30.61, -17.79, -26.82), "UTM-30LX", BORE),  # the longest straight piece lies in the hub
 }
 
 
@@ -86,6 +88,22 @@ def test_a_lead_turns_above_all_that_stands_still(setting):
         outside = points[np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + lead.diameter]
         assert outside[:, 2].min() > room.floor + lead.diameter / 2
         assert room.free(outside[3:-6], lead.diameter / 2, 0.4).all()
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_joints_touch_neither_the_hub_nor_the_other_lead(setting):
+    layout = layout_for(setting)
+    leads = [lead for lead in leads_of(layout) if lead.joint is not None]
+    assert leads
+    for lead in leads:
+        thick, points = lead.diameter / 2 + WALL, lead.joint.points()
+        assert np.ptp(points, axis=0) @ np.ptp(points, axis=0) == pytest.approx(LENGTH**2)
+        if setting != "belt":  # whose leads leave through the shaft
+            assert (np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + thick).all()
+        for other in leads:
+            if other is not lead:
+                nearest = np.linalg.norm(points[:, None] - other.path.points(0.5), axis=2).min()
+                assert nearest > thick + other.diameter / 2
 
 
 def test_where_no_way_is_wide_enough_there_is_none():

@@ -1,0 +1,69 @@
+"""Where the wires of a lidar's cable meet a lead of the ring: crimped side by side, with a shrink tube over them.
+
+That tube is thicker than the bundle. So it sits on the longest straight piece where all of it has room, beside what
+turns and beside the other leads; behind the first bend, where hands reach.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cad.layout.cables.obstacles import farther
+from cad.layout.cables.path import Path, PathPiece
+from cad.layout.cables.way import GAP, LeadRoom
+from design.arrays import Array
+
+LENGTH = 12.0  # crimps beside each other, and a shrink tube over them
+WALL = 0.5  # of the shrink tube; of what a lead keeps to all others it leaves a tenth
+STEP = 3.0  # between two places that are tried, and two points of a joint that are looked at
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """The piece of a path that it sits on, and the middle of its `LENGTH` there, shape (3,)."""
+
+    piece: PathPiece
+    middle: Array
+
+    def points(self) -> Array:
+        """Along it, shape (n, 3)."""
+        along = (self.piece.end - self.piece.start) / self.piece.length
+        return self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * along
+
+
+def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> Joint | None:
+    """The joint of a lead; None where no straight piece is long enough.
+
+    Args:
+        path: of the lead.
+        half: its radius.
+        room: that it runs through.
+        others: middles of the other leads, shape (n, 3), and how far to keep the middle of the joint from them.
+    """
+    places = [place for piece in straights(path) for place in _places(piece)]
+    for place in places:
+        points = place.points()
+        if room.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
+            return place
+    return places[0] if places else None  # the check of clearances tells what it is too near to
+
+
+def straights(path: Path) -> list[PathPiece]:
+    """The straight pieces behind the first bend, the longest first."""
+    pieces = path.pieces()
+    bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
+    return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
+
+
+def _places(piece: PathPiece) -> Iterator[Joint]:
+    """From the middle of a piece to its ends."""
+    along = (piece.end - piece.start) / piece.length
+    most = (piece.length - LENGTH) / 2
+    if most >= 0:
+        for off in np.linspace(0.0, most, math.ceil(most / STEP) + 1):
+            yield Joint(piece, piece.middle - off * along)
+            yield Joint(piece, piece.middle + off * along)
