@@ -6,6 +6,7 @@ each other by their distances, or show one through another.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,13 @@ class Shown:
 
     away_m: Float[ndarray, " n"]
     brightness: Float[ndarray, " n"]
+
+
+def in_front(views: Sequence[Shown]) -> Shown:
+    """What several bodies together show: in each pixel the one that is nearest."""
+    away_m, brightness = (np.stack(rows) for rows in zip(*((v.away_m, v.brightness) for v in views), strict=True))
+    nearest = away_m.argmin(axis=0)[None]
+    return Shown(*(np.take_along_axis(rows, nearest, axis=0)[0] for rows in (away_m, brightness)))
 
 
 @dataclass(frozen=True, slots=True)

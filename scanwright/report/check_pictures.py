@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from design.arrays import Array
-from design.scene.parallel_view import Shown, view_of
+from design.scene.parallel_view import in_front, view_of
 from design.scene.ray_caster import build_scene
 from scanwright.report.data_uri import png_uri
 
@@ -74,10 +74,10 @@ class CheckPictures:
     """Pictures of one scanner, each drawn once."""
 
     def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
-        self._bodies = bodies
         corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
-        self._view = view_of(corners, (SIZE[0] * FINER, SIZE[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
-        self._all = self._shown(tuple(bodies))
+        view = view_of(corners, (SIZE[0] * FINER, SIZE[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
+        self._each = {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
+        self._all = in_front(list(self._each.values()))
         self._drawn: dict[tuple[str, ...], str] = {}
 
     def picture(self, names: tuple[str, ...]) -> str:
@@ -87,7 +87,7 @@ class CheckPictures:
         return self._drawn[names]
 
     def _draw(self, names: tuple[str, ...]) -> str:
-        shown = self._shown(names)
+        shown = in_front([self._each[name] for name in names])
         named = np.isfinite(shown.away_m)[:, None]
         front = named & (shown.away_m <= self._all.away_m + 1e-6)[:, None]
         pale = np.where(np.isfinite(self._all.away_m)[:, None], self._all.brightness[:, None] * OTHER, 255.0)
@@ -96,7 +96,3 @@ class CheckPictures:
         width, height = SIZE
         fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
         return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))
-
-    def _shown(self, names: tuple[str, ...]) -> Shown:
-        triangles = np.concatenate([self._bodies[name].triangles_m for name in names])
-        return self._view.shown(build_scene(triangles))
