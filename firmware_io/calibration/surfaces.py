@@ -71,6 +71,7 @@ def group(
     return Grouping(surface, spot.ravel(), np.array(planes))
 
 
+@njit(cache=True, nogil=True)
 def _grown(
     seed: int,
     left: Mask,
@@ -83,32 +84,25 @@ def _grown(
     near_m: float,
 ) -> tuple[Array, float, Mask]:
     """The plane n . p = c that grows from a tile to the ends of its wall, and which tiles that are left lie in it."""
-    n, c = normal[seed], float(normal[seed] @ point[seed])
-    asked = left & (place == place[seed])
-    before = np.zeros(left.size, np.bool_)
+    n, c = normal[seed].copy(), _dot(normal[seed], point[seed])
+    mine = np.zeros(left.size, np.bool_)
     for _ in range(_REFITS):
-        mine = _in_plane(n, c, asked, point, normal, direction, limit, near_m)
-        if np.count_nonzero(mine) < _FEWEST or np.array_equal(mine, before):
-            break
-        n, c = _plane(point[mine], normal[mine], weight[mine])
-        before = mine
-    return n, c, mine
-
-
-@njit(cache=True, nogil=True)
-def _in_plane(
-    n: Array, c: float, asked: Mask, point: Array, normal: Array, direction: Array, limit: Array, near_m: float
-) -> Mask:
-    """Which tiles, of those that are asked for, lie in the plane n . p = c, and are seen well."""
-    mine = np.zeros(asked.size, np.bool_)
-    for i in range(asked.size):
-        if asked[i]:
-            mine[i] = (
-                abs(_dot(n, point[i]) - c) < near_m
+        count, same = 0, True
+        for i in range(left.size):
+            inside = (
+                left[i]
+                and place[i] == place[seed]
+                and abs(_dot(n, point[i]) - c) < near_m
                 and _dot(n, normal[i]) > limit[i]
                 and abs(_dot(n, direction[i])) > _GRAZING
             )
-    return mine
+            count += inside
+            same &= inside == mine[i]
+            mine[i] = inside
+        if count < _FEWEST or same:
+            break
+        n, c = _plane(mine, point, normal, weight)
+    return n, c, mine
 
 
 @njit(inline="always")
@@ -116,17 +110,36 @@ def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _plane(point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
-    """Plane through weighted points; few of them lean on their normals."""
-    mean = weight @ point / weight.sum()
-    spread = point - mean
-    values, vectors = np.linalg.eigh((spread * weight.reshape(-1, 1)).T @ spread)
-    n = np.ascontiguousarray(vectors[:, 0])
+@njit(cache=True, nogil=True)
+def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
+    """Plane through those of weighted points that are marked; few of them lean on their normals.
+
+    In loops: products and means of whole arrays would take three seconds to compile.
+    """
+    total, mean, n, spread = 0.0, np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    for i in range(mine.size):
+        if mine[i]:
+            total += weight[i]
+            for k in range(3):
+                mean[k] += weight[i] * point[i, k]
+                n[k] += weight[i] * normal[i, k]
+    for k in range(3):
+        mean[k] /= total
+    for i in range(mine.size):
+        if mine[i]:
+            for k in range(3):
+                for other in range(3):
+                    spread[k, other] += weight[i] * (point[i, k] - mean[k]) * (point[i, other] - mean[other])
+    values, vectors = np.linalg.eigh(spread)
+    length = np.sqrt(_dot(n, n))
     if values[1] < 1e-2 * values[2]:  # in a row: any plane through the row fits
-        n = weight @ normal
-        n /= np.linalg.norm(n)
-    n = n if weight @ (normal @ n) > 0 else -n
-    return n, float(n @ mean)
+        for k in range(3):
+            n[k] /= length
+    else:
+        sign = 1.0 if _dot(vectors[:, 0], n) > 0 else -1.0
+        for k in range(3):
+            n[k] = sign * vectors[k, 0]
+    return n, _dot(n, mean)
 
 
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:
