@@ -23,7 +23,7 @@ STEP = 3.0  # between two places that are tried, and two points of a joint that 
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class LeadJoint:
     """The piece of a path that it sits on, and the middle of its `LENGTH` there, shape (3,)."""
 
     piece: PathPiece
@@ -35,7 +35,7 @@ class Joint:
         return self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * along
 
 
-def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> Joint | None:
+def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
     """The joint of a lead; None where no straight piece is long enough.
 
     Args:
@@ -59,11 +59,11 @@ def straights(path: Path) -> list[PathPiece]:
     return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
 
 
-def _places(piece: PathPiece) -> Iterator[Joint]:
+def _places(piece: PathPiece) -> Iterator[LeadJoint]:
     """From the middle of a piece to its ends."""
     along = (piece.end - piece.start) / piece.length
     most = (piece.length - LENGTH) / 2
     if most >= 0:
         for off in np.linspace(0.0, most, math.ceil(most / STEP) + 1):
-            yield Joint(piece, piece.middle - off * along)
-            yield Joint(piece, piece.middle + off * along)
+            yield LeadJoint(piece, piece.middle - off * along)
+            yield LeadJoint(piece, piece.middle + off * along)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cad.layout.belt.stack import BeltStack
 from cad.layout.cables import joint as joints
-from cad.layout.cables.joint import Joint, joint_of
+from cad.layout.cables.joint import LeadJoint, joint_of
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import RotorRoom, room_of
 from cad.layout.cables.tie_seat import TieSeat
@@ -55,7 +55,7 @@ class RotorLead:
     diameter: float
     radius: float
     path: Path | None
-    joint: Joint | None = None
+    joint: LeadJoint | None = None
 
     @property
     def mass_g(self) -> float:

@@ -1,0 +1,207 @@
+"""The report in a browser: whole without a network, every control does what it says, nobody is kept out."""
+
+import io
+import itertools
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from report_folder import cell, picture
+
+
+def shot_of(page, selector):
+    """Colours of what is shown, 0 to 1, once the page has drawn what it was asked for."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return np.asarray(Image.open(io.BytesIO(page.locator(selector).screenshot())).convert("RGB"), float) / 255
+
+
+def lilac(shot):
+    """Where the bodies of the fixture are: red and blue are well above green there, not so in the fan."""
+    return (shot[:, :, 2] - shot[:, :, 1] > 0.25) & (shot[:, :, 0] - shot[:, :, 1] > 0.1)
+
+
+def changed(one, other):
+    """Whether two pictures show different things: more than a pixel of an edge here and there."""
+    return (np.abs(one - other).max(axis=2) > 0.1).mean() > 2e-3
+
+
+def until(page, condition):
+    """Wait for a condition in JavaScript; Playwright's own way needs `eval`, which the page forbids."""
+    look = f"const look = () => ({condition}) ? done(true) : requestAnimationFrame(look)"
+    late = "setTimeout(() => done(false), 60000)"
+    assert page.evaluate(f"() => new Promise((done) => {{ {look}; {late}; look(); }})"), condition
+
+
+@pytest.fixture
+def shown(browser, folder):
+    """The report, wide."""
+    return browser.open((folder / "report.html").as_uri())
+
+
+def test_the_page_is_whole_with_the_network_off(shown):
+    """And the console is silent, nothing is asked of anybody: the fixture holds that for every test with it."""
+    sizes = shown.evaluate("Promise.all([...document.images].map((i) => i.decode().then(() => i.naturalWidth)))")
+    assert len(sizes) >= 12 and min(sizes) > 0
+    assert shown.locator("#hint, #sphere-hint").evaluate_all("all => all.every((hint) => hint.hidden)")
+    assert shown.evaluate("document.documentElement.scrollWidth") <= 1400
+    scanner = shot_of(shown, "#canvas")
+    assert lilac(scanner).mean() > 0.01
+    for key in ("ArrowLeft", "ArrowRight"):  # a second picture is no worse than the first one
+        shown.locator("#canvas").press(key)
+    inside = slice(5, -5), slice(5, -5)  # of the frame that has the focus now
+    assert not changed(shot_of(shown, "#canvas")[inside], scanner[inside])
+
+
+def test_every_control_of_the_scanner_does_what_it_says(shown):
+    shown.uncheck("#fan")
+    start = shot_of(shown, "#canvas")
+    area = lilac(start).sum()
+
+    def middle(shot):
+        return np.argwhere(lilac(shot)).mean(axis=0)
+
+    shown.locator("#axis").fill("90")
+    turned = shot_of(shown, "#canvas")
+    assert changed(turned, start) and shown.inner_text("#axis-shown") == "90.0 deg"
+    shown.locator("#axis").fill("0")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.locator("#apart").fill("1")
+    apart = shot_of(shown, "#canvas")
+    assert changed(apart, start) and 0.1 * area < lilac(apart).sum()
+    shown.locator("#apart").fill("0")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.click("#nearer")
+    assert lilac(shot_of(shown, "#canvas")).sum() > 1.2 * area
+    shown.click("#farther")
+    assert not changed(shot_of(shown, "#canvas"), start)
+    shown.check("#fan")
+    fan = shot_of(shown, "#canvas")
+    light, dark = (np.abs(fan - colour).max(axis=2) < 0.02 for colour in ([0.98, 0.88, 0.64], [0.15] * 3))
+    assert light.mean() > 0.02 < light.sum() / dark.sum() and dark.sum() > 100  # two fifths of it over white
+    for axis, count in (("89.5", 200), ("90", 100), ("359.5", 100), ("0", 200)):
+        shown.locator("#axis").fill(axis)
+        until(shown, f"document.getElementById('fan-shown').textContent == '{count} of 1081 beams hidden'")
+    box = shown.locator("#canvas").bounding_box()
+    shown.mouse.move(box["x"] + 300, box["y"] + 300)
+    shown.mouse.down()
+    shown.mouse.move(box["x"] + 400, box["y"] + 250)
+    shown.mouse.up()
+    assert changed(shot_of(shown, "#canvas"), fan)
+    assert np.abs(middle(shot_of(shown, "#canvas")) - middle(fan)).max() > 1
+
+
+def test_the_axis_spins_as_fast_as_in_a_scan(shown):
+    shown.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    shown.evaluate(
+        """() => {
+            const waiting = [];
+            window.requestAnimationFrame = (draw) => waiting.push(draw);
+            window.framesUntil = (fromMs, toMs) => {
+                for (let ms = fromMs; ms <= toMs; ms += 500) waiting.splice(0).forEach((draw) => draw(ms));
+                return Number(document.getElementById("axis").dataset.exact);
+            };
+        }"""
+    )  # time passes as this test says; few frames, since a graphics process without a card draws each one, on and on
+    press = "document.getElementById('spin').click()"
+    shown.evaluate(press)
+    start = shown.evaluate("framesUntil(1000, 1500)")
+    assert shown.evaluate("framesUntil(2000, 4500)") - start == pytest.approx(3 * 360 / 18, abs=1e-6)
+    assert 0 < shown.evaluate("framesUntil(5000, 19500)") < 20  # round once
+    shown.evaluate(press)
+    assert shown.get_attribute("#spin", "aria-pressed") == "false"
+
+
+def test_a_check_shows_where(shown):
+    shown.uncheck("#fan")
+    both = lilac(shot_of(shown, "#canvas")).sum()
+    shown.locator("#checks tr.warning button").click()
+    assert shown.inner_text("#picked-shown") == "base_mount"
+    one = shot_of(shown, "#canvas")
+    assert 0.1 * both < lilac(one).sum() < 0.9 * both
+    shown.locator("#checks tr.error button").click()
+    assert lilac(shot_of(shown, "#canvas")).sum() == pytest.approx(both, rel=0.02)
+    shown.locator("#checks tr.warning button").click()
+    shown.click("#everything")
+    assert lilac(shot_of(shown, "#canvas")).sum() == pytest.approx(both, rel=0.02)
+    assert not shown.is_visible("#picked")
+
+
+def test_the_ball_is_wrapped_the_right_way_round(shown):
+    """What is in its middle is what its picture has in the direction of the camera."""
+    seen = []
+    look_deg = json.loads(shown.locator("#sphere").text_content())["look_deg"]
+    assert look_deg[0] == 25 and -45 < look_deg[1] < -25  # the region is ahead and 5 to 60 deg down
+    for number in range(4):
+        shown.select_option("#sphere-choice", str(number))
+        title = shown.locator("#sphere-choice option").nth(number).inner_text()
+        until(shown, f"document.getElementById('sphere-title').textContent == '{title}'")
+        shot = shot_of(shown, "#sphere-canvas")
+        yaw, pitch = np.radians(look_deg[0] + 3), np.radians(look_deg[1])
+        wrapped = picture(shown.get_attribute(f"#sphere-{number}", "src"))
+        towards = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
+        height, width = shot.shape[:2]
+        # a little beside the middle, where a line of the grid is
+        right = int(width / 2 + 0.052 * height / 2 / 1.25 * np.cos(pitch))
+        np.testing.assert_allclose(shot[height // 2, right], np.array(wrapped.getpixel(cell(towards))) / 255, atol=0.05)
+        seen.append(shot)
+    assert [changed(*pair) for pair in itertools.pairwise(seen)] == [False, True, True]
+    shown.locator("#sphere-canvas").press("ArrowUp")
+    assert changed(shot_of(shown, "#sphere-canvas"), seen[3])
+    assert {"ahead", "left", "axis"} <= set(shown.locator(".mark:visible").all_inner_texts())
+
+
+def test_a_phone_needs_no_sideways_scroll(browser, folder):
+    page = browser.open((folder / "report.html").as_uri(), 390, 844, device_scale_factor=2, has_touch=True)
+    page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    assert lilac(shot_of(page, "#canvas")).mean() > 0.01
+    small = page.evaluate(
+        "[...document.querySelectorAll('p, td, dd, dt, li, summary, label, button')]"
+        ".filter((e) => parseFloat(getComputedStyle(e).fontSize) < 12).length"
+    )
+    assert small == 0
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nobody_is_kept_out_of_it(browser, folder, size, scheme):
+    page = browser.open((folder / "report.html").as_uri(), *size, color_scheme=scheme)
+    page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
+    assert browser.barriers(page) == []
+
+
+def test_on_paper_nothing_is_folded_and_no_control_is_left(shown):
+    shown.evaluate(
+        "window.onbeforeprint = () => (window.printed = document.querySelectorAll('details:not([open])').length)"
+    )
+    content = shown.pdf(format="A4")
+    assert content.startswith(b"%PDF") and 3 <= content.count(b"/Type /Page\n") <= 8
+    assert shown.evaluate("window.printed") == shown.locator("details.screen").count()
+    assert shown.locator("details[open]").count() == 0
+    shown.emulate_media(media="print")
+    for selector in ("#controls", "#sphere-controls", "#sphere-canvas", "#files", "nav"):
+        assert not shown.is_visible(selector)
+    for selector in ("#canvas", ".room img", ".said", "#density .map img"):
+        assert shown.is_visible(selector)
+    drawn = "(pictures) => pictures.every((p) => p.src.startsWith('data:image/svg+xml') && p.naturalWidth > 0)"
+    assert shown.locator("#density .map img, #settings figure img").evaluate_all(drawn)  # sharp on paper
+    assert lilac(shot_of(shown, "#canvas")).mean() > 0.005
+
+
+def test_without_webgl_the_page_says_so_and_the_rest_is_there(browser, folder):
+    page = browser.open("about:blank")
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto((folder / "report.html").as_uri())
+    assert page.is_visible("#hint") and page.is_visible("#sphere-hint")
+    assert not page.is_visible("canvas") and not page.is_visible("#controls")
+    assert page.is_visible("#settings img")
+    assert page.locator("#checks button:disabled").count() == page.locator("#checks button").count() > 0
+
+
+def test_the_browser_tests_would_see_a_request(browser, tmp_path):
+    leaky = tmp_path / "leaky.html"
+    leaky.write_text("<img src='http://192.0.2.1/x.png'><script>console.error('oh')</script>")
+    browser.open(leaky.as_uri())
+    assert "asked the network for http://192.0.2.1/x.png" in browser.complaints and "oh" in browser.complaints
+    browser.complaints.clear()
