@@ -29,10 +29,13 @@ class LeadJoint:
     piece: PathPiece
     middle: Array
 
+    def along(self) -> Array:
+        """Its direction, shape (3,)."""
+        return np.asarray((self.piece.end - self.piece.start) / self.piece.length)
+
     def points(self) -> Array:
-        """Along it, shape (n, 3)."""
-        along = (self.piece.end - self.piece.start) / self.piece.length
-        return self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * along
+        """From its one end to the other, shape (n, 3)."""
+        return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along())
 
 
 def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
