@@ -7,7 +7,7 @@ that may be blind, and all that a sweep must not miss are sums over nodes: one m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -104,10 +104,17 @@ class Requirements:
     problem: Problem
     limits: Limits
     avoid_holes: bool
+    _known: dict[tuple[float, ...], Score] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def score(self, angles_deg: Setting) -> Score | None:
-        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None where it is refused."""
-        found = score(self.problem, np.radians(angles_deg))
+        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None where it is refused.
+
+        Kept, as the steps of a search ask for the same: that of a sweep takes seconds where its J is to be exact.
+        """
+        named = tuple(np.asarray(angles_deg).tolist())
+        if named not in self._known:
+            self._known[named] = score(self.problem, np.radians(angles_deg))
+        found = self._known[named]
         return found if self.keeps(found, angles_deg) else None
 
     def J(self, angles_deg: Setting, nodes: int) -> float:

@@ -75,14 +75,14 @@ def search(
     progress(_looked_over(problem, fine))
     avoid = ranges.holes == "avoid"
     least_blind = None
-    found = _best(problem, fine, progress, limits, avoid, effort)
+    required = Requirements(problem, limits, avoid)
+    found = _best(required, fine, progress, effort)
     if avoid and found.leader is None:  # nothing is free of holes: the lowest J of all
         least_blind = _least_blind(problem, found.land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
-        avoid = False
-        found = _best(problem, fine, progress, limits, avoid, effort)
+        avoid, required = False, replace(required, avoid_holes=False)
+        found = _best(required, fine, progress, effort)
     land, winner = found.land, found.leader
-    required = Requirements(problem, limits, avoid)
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
     if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
@@ -130,9 +130,9 @@ class _Best:
     leader: Leader | None
 
 
-def _best(problem: Problem, grid: Grid, progress: Progress, limits: Limits, avoid: bool, effort: Effort) -> _Best:
-    required, asked = Requirements(problem, limits, avoid), limits
-    land, exact = _landscape(problem, grid, progress, limits, avoid, effort)
+def _best(required: Requirements, grid: Grid, progress: Progress, effort: Effort) -> _Best:
+    problem, asked, avoid = required.problem, required.limits, required.avoid_holes
+    land, exact = _landscape(problem, grid, progress, asked, avoid, effort)
     leader = best_leader(land, *grid, required)
     while leader is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
         asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
