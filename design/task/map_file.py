@@ -18,7 +18,7 @@ def read_map(path: Path) -> Array:
     """Weights of cells, (rows, columns), of a PNG, CSV or NPY file.
 
     Raises:
-        TaskError: it is no table of finite numbers that are not negative.
+        TaskError: it is no table of finite numbers that are not negative, and some of them above 0.
     """
     try:
         table = _map_table(path)
@@ -34,6 +34,8 @@ def read_map(path: Path) -> Array:
         raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
     if not np.isfinite(table).all() or (table < 0).any():
         raise TaskError(f"{path}: a map holds weights: finite and not negative")
+    if not table.any():
+        raise TaskError(f"{path}: every weight of the map is 0: nothing in it counts")
     return table.astype(float)
 
 

@@ -68,6 +68,7 @@ def save_maps(folder):
     (folder / "blank.csv").write_text("", encoding="utf-8")
     (folder / "fake.png").write_text("not a picture", encoding="utf-8")
     (folder / "map.jpg").write_bytes(b"\xff\xd8")
+    (folder / "zero.csv").write_text("0")
     (folder / "folder.npy").mkdir()
 
 
@@ -169,6 +170,7 @@ WRONG = {
     "table missing": (a_map("none.csv"), ["none.csv: cannot read the map: No such file or directory"]),
     "table with a short row": (a_map("ragged.csv"), ["ragged.csv", "cannot read the map"]),
     "table of no rows": (a_map("blank.csv"), ["blank.csv"]),
+    "table of nothing but 0": (a_map("zero.csv"), ["zero.csv: every weight of the map is 0"]),
     "picture that is none": (a_map("fake.png"), ["fake.png", "cannot read the map"]),
     "mask map missing": (weight('shape = "map"\nfile = "none.csv"', "mask"), ["none.csv"]),
 }
