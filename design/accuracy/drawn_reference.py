@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
 from design.arrays import Array, Ints, Mask, Setting
+from design.concurrency.compiled import njit
 from design.motion import Spin, StopAndGo, Sweep
 from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
 from design.task.task import LoadedTask
