@@ -6,9 +6,12 @@ chunk are cut here, because its reader makes an object of each record, which tak
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Collection, Iterator
 from contextlib import closing
+from functools import lru_cache
+from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -26,6 +29,7 @@ from firmware_io.foreign import foreign
 
 CHUNK_S = 0.25
 """What damage may cost: a chunk holds no more."""
+_RUN_BYTES = 1_000_000
 _MAGIC = b"\x89MCAP"
 _MESSAGE = 0x05
 _RECORD = struct.Struct("<BQ")  # opcode, length
@@ -89,11 +93,11 @@ def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -
         )
         waiting = [] if summary.chunk_indexes else foreign(f"{path}: damaged", _unchunked, stream, topics)
 
-        def unpack(chunk: ChunkIndex) -> list[_Timed]:
-            return foreign(f"{path}: damaged", _chunk, stream, chunk, wanted, summed)
+        def unpack(run: list[ChunkIndex]) -> list[list[_Timed]]:
+            return [foreign(f"{path}: damaged", _chunk, stream, chunk, wanted, summed) for chunk in run]
 
-        with closing(ahead(unpack, chunks)) as unpacked:
-            for chunk, messages in zip(chunks, unpacked, strict=True):
+        with closing(ahead(unpack, _runs(chunks))) as unpacked:
+            for chunk, messages in zip(chunks, chain.from_iterable(unpacked), strict=True):
                 ready = [message for message in waiting if message[0] < chunk.message_start_time]
                 yield from (message[2:] for message in ready)
                 waiting = waiting[len(ready) :] + messages
@@ -114,14 +118,33 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _summary(path: Path, stream: BinaryIO) -> Summary:
+    found = os.fstat(stream.fileno())
+    return _summary_of(path, found.st_size, found.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)  # of ten minutes it lists 2,400 chunks, and whoever opens a recording asks four times
+def _summary_of(path: Path, _size: int, _changed_ns: int) -> Summary:
     what = f"{path}: the recording was cut off (`scanwright repair` mends it)"
-    summary = foreign(what, lambda: SeekingReader(stream).get_summary())
+    with _opened(path) as stream:
+        summary = foreign(what, lambda: SeekingReader(stream).get_summary())
     if summary is None:
         raise RecordingError(what)
     for channel in summary.channels.values():
         if channel.schema_id not in summary.schemas:
             raise RecordingError(f"{path}: {channel.topic} has no type in the index: `scanwright repair` mends it")
     return summary
+
+
+def _runs(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
+    """Small chunks in runs: to hand one over to another thread takes as long as to unpack it."""
+    run: list[ChunkIndex] = []
+    for chunk in chunks:
+        run.append(chunk)
+        if sum(each.uncompressed_size for each in run) >= _RUN_BYTES:
+            yield run
+            run = []
+    if run:
+        yield run
 
 
 def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: bool) -> list[_Timed]:
