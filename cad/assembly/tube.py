@@ -28,7 +28,7 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
     with building(ROTOR_LEAD, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
         tube: cq.Shape = _tube(lead.path, lead.diameter / 2)
         if lead.joint is not None:
-            along = lead.joint.along()
+            along = lead.joint.along
             start = lead.joint.middle - joint.LENGTH / 2 * along
             tube = tube.fuse(solids.cylinder(lead.diameter / 2 + joint.WALL, start, along, joint.LENGTH))
         return _closed(ROTOR_LEAD, checked(tube))

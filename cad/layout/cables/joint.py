@@ -7,7 +7,7 @@ turns and beside the other leads; behind the first bend, where hands reach.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,18 +24,24 @@ STEP = 3.0  # between two places that are tried, and two points of a joint that 
 
 @dataclass(frozen=True, slots=True)
 class LeadJoint:
-    """The piece of a path that it sits on, and the middle of its `LENGTH` there, shape (3,)."""
+    """The piece of a path that its `LENGTH` sits on, and how far along that from its middle."""
 
     piece: PathPiece
-    middle: Array
+    off: float
 
+    @property
     def along(self) -> Array:
         """Its direction, shape (3,)."""
         return np.asarray((self.piece.end - self.piece.start) / self.piece.length)
 
+    @property
+    def middle(self) -> Array:
+        """Shape (3,)."""
+        return self.piece.middle + self.off * self.along
+
     def points(self) -> Array:
         """From its one end to the other, shape (n, 3)."""
-        return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along())
+        return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along)
 
 
 def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
@@ -62,11 +68,8 @@ def straights(path: Path) -> list[PathPiece]:
     return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
 
 
-def _places(piece: PathPiece) -> Iterator[LeadJoint]:
+def _places(piece: PathPiece) -> list[LeadJoint]:
     """From the middle of a piece to its ends."""
-    along = (piece.end - piece.start) / piece.length
     most = (piece.length - LENGTH) / 2
-    if most >= 0:
-        for off in np.linspace(0.0, most, math.ceil(most / STEP) + 1):
-            yield LeadJoint(piece, piece.middle - off * along)
-            yield LeadJoint(piece, piece.middle + off * along)
+    steps = np.linspace(0.0, most, math.ceil(most / STEP) + 1).tolist() if most >= 0 else []
+    return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]
