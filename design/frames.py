@@ -47,9 +47,14 @@ def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Rotation:
     """Rotation about v by its length (Rodrigues), shape (3, 3)."""
     v = np.asarray(rotvec_rad, dtype=float)
     angle = float(np.linalg.norm(v))
-    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    K = cross_matrix(v)
     # sin(a)/a and (1 - cos(a))/a^2 in forms that stay exact as a -> 0
     return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
+
+
+def cross_matrix(v: Float[ndarray, " 3"]) -> Float[ndarray, "3 3"]:
+    """Matrix of v x, shape (3, 3)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def rigid(R_a_b: Float[ndarray, "... 3 3"], t_a_b: ArrayLike) -> Float[ndarray, "*k 4 4"]:

@@ -66,6 +66,10 @@ class Assembly:
         """Names of the made parts between hub and lidar."""
         return [name for name in self.made if self.parts[name].seat is not None]
 
+    def thing(self, body: str) -> str:
+        """The part, or the bought product that a body is a piece of."""
+        return self.bodies[body].product if body in self.bodies else body
+
     def mesh(self, name: str) -> TriMesh:
         """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
         if name not in self._meshes:

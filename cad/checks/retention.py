@@ -24,6 +24,7 @@ from cad.layout.loads import STANDARD_GRAVITY
 from cad.layout.names import DECK, LIDAR, TRIPOD
 from cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
 from design.arrays import Array
+from design.frames import cross_matrix
 from design.scanner import Scanner
 
 SHOCK_G = 5.0
@@ -50,9 +51,9 @@ def material_of(assembly: Assembly, body: str) -> Material:
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     """Parts and products that have no way to the deck but through a joint."""
     layout = assembly.layout
-    ways = [(_node(assembly, other.part), _node(assembly, other.onto)) for other in joints_of(layout) if other != joint]
+    ways = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
     ways += layout.drive.borne
-    everything = {name for way in ways for name in way} | {_node(assembly, joint.part), _node(assembly, joint.onto)}
+    everything = {name for way in ways for name in way} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
     reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}
     while fresh:
         fresh = {b for way in ways for a, b in (way, way[::-1]) if a in fresh} - reached
@@ -134,8 +135,8 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
     if abs(along[0, 2]) > AXIAL or not _radial(joint):
         arms = start - start.mean(axis=0)
         stiffness = sum((arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
-        turned = np.linalg.pinv(stiffness, rcond=1e-9) @ _cross(centre_m - start.mean(axis=0))
-        shares += np.array([-_cross(arm) @ turned for arm in arms])
+        turned = np.linalg.pinv(stiffness, rcond=1e-9) @ cross_matrix(centre_m - start.mean(axis=0))
+        shares += np.array([-cross_matrix(arm) @ turned for arm in arms])
     pulls = np.linalg.norm(np.einsum("ni,nij->nj", along, shares), axis=1)
     across = shares - np.einsum("ni,nj,njk->nik", along, along, shares)
     return float(pulls.max()), float(np.linalg.norm(across, ord=2, axis=(1, 2)).max())
@@ -147,12 +148,3 @@ def _radial(joint: Joint) -> bool:
         abs(axis.along[2]) < 1e-6 and abs(axis.start[0] * axis.along[1] - axis.start[1] * axis.along[0]) < 1e-6
         for axis in joint.axes
     )
-
-
-def _cross(v: Array) -> Array:
-    """Matrix of v x."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def _node(assembly: Assembly, body: str) -> str:
-    return assembly.bodies[body].product if body in assembly.bodies else body

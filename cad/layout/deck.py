@@ -17,6 +17,7 @@ from cad import outlines
 from cad.layout.drive import DriveLayout, Mounted
 from cad.layout.envelope import rotor_radius
 from cad.layout.hub import Hub
+from cad.layout.joints import triple
 from cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
 from cad.layout.names import BASE_MOUNT
 from cad.screws import SCREWS, Screw
@@ -90,12 +91,12 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
-        normal=_triple(normal),
-        along=_triple(along),
-        centre=_triple(centre),
+        normal=triple(normal),
+        along=triple(along),
+        centre=triple(centre),
         flat=flat,
-        t_world_rot=_triple(np.round(offset, 6)),
-        back_centre=_triple(back),
+        t_world_rot=triple(np.round(offset, 6)),
+        back_centre=triple(back),
         back_half=half,
         screw=screw,
         deck_holes=deck_holes,
@@ -191,7 +192,3 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
         return half, half, half * (2 - math.sqrt(2))
     x, y = (max(size / 2, PAD_HALF) + HOLE_MARGIN for size in pattern.size_mm)
     return x, y, 12.0
-
-
-def _triple(v: Array) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])

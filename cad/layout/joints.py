@@ -153,7 +153,7 @@ def placed_axes(
     axes: Iterable[ScrewAxis], R: Array, t: Sequence[float] | Array = (0.0, 0.0, 0.0)
 ) -> tuple[ScrewAxis, ...]:
     """The same in the rotation frame; R is the pose of their frame in it, t its origin."""
-    return tuple(ScrewAxis(_triple(R @ axis.start + np.asarray(t)), _triple(R @ axis.along)) for axis in axes)
+    return tuple(ScrewAxis(triple(R @ axis.start + np.asarray(t)), triple(R @ axis.along)) for axis in axes)
 
 
 def round_wall_mm(inner_radius: float, outer: float, hole: float) -> float:
@@ -188,5 +188,6 @@ def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) ->
     return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))
 
 
-def _triple(v: Array) -> tuple[float, float, float]:
+def triple(v: Array) -> tuple[float, float, float]:
+    """A point or a direction as a record holds it."""
     return float(v[0]), float(v[1]), float(v[2])

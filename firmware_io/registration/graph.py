@@ -122,7 +122,7 @@ def _residual(
     residual = np.concatenate([Rotation.from_matrix(turned).as_rotvec(), R @ (u - T_i_j[:3, 3])])
     J_i, J_j = np.zeros((6, 6)), np.zeros((6, 6))
     J_i[:3, :3] = -seen[:3, :3].T
-    J_i[3:, :3] = R @ _cross(u)
+    J_i[3:, :3] = R @ frames.cross_matrix(u)
     J_i[3:, 3:] = -R
     J_j[:3, :3] = np.eye(3)
     J_j[3:, 3:] = turned
@@ -131,7 +131,3 @@ def _residual(
 
 def _moved(T: Pose, step: Float64[ndarray, " 6"]) -> Pose:
     return T @ frames.rigid(frames.rotvec_to_matrix(step[:3]), step[3:])
-
-
-def _cross(u: Float64[ndarray, " 3"]) -> Float64[ndarray, "3 3"]:
-    return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])

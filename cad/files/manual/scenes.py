@@ -54,7 +54,7 @@ def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:
     for (thing, step), own in zip(steps, _closed(steps, joints), strict=True):
         ready = _bench_of({thing}, benches)
         comes = {thing, *step.brings} | ready
-        held = {thing_of(body, assembly) for joint, _ in own for body in (joint.part, joint.onto)} - {DECK}
+        held = {assembly.thing(body) for joint, _ in own for body in (joint.part, joint.onto)} - {DECK}
         beside = held - comes
         if beside & stands:
             comes |= _bench_of(beside, benches)
@@ -74,11 +74,6 @@ def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:
 def _bench_of(things: set[str], benches: Sequence[set[str]]) -> set[str]:
     """What hangs together with some things that are on the bench."""
     return {other for bench in benches if bench & things for other in bench}
-
-
-def thing_of(body: str, assembly: Assembly) -> str:
-    """The part, or the bought product that a body is a piece of."""
-    return assembly.bodies[body].product if body in assembly.bodies else body
 
 
 def _closed(steps: Sequence[tuple[str, Step]], joints: Sequence[Joint]) -> list[tuple[tuple[Joint, str], ...]]:
@@ -120,7 +115,7 @@ def _scene(
 
 def _bodies(things: set[str], assembly: Assembly) -> Iterator[str]:
     for name in (*assembly.made, *assembly.bought):
-        if thing_of(name, assembly) in things:
+        if assembly.thing(name) in things:
             yield name
 
 

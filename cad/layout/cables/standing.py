@@ -20,6 +20,7 @@ from cad.layout.cables.ties import foot_ties_of
 from cad.layout.cables.way import Ending, short_way
 from cad.layout.deck import FOOT_THICKNESS, Deck
 from cad.layout.direct.stack import STATOR_EXIT
+from cad.layout.joints import triple
 from cad.layout.layout import Layout
 from cad.layout.modules.ring_cover import RingCover, cover_of
 from cad.layout.names import SERVO_CABLE, STATOR_LEADS
@@ -125,7 +126,7 @@ def _way(layout: Layout, room: StandingRoom, leaving: Leaving, lane: int) -> Pat
     deck, half = layout.deck, leaving.diameter / 2
     place, out = leaving.places[0]
     if deck.flat and out @ np.array(deck.normal) < -0.5:  # by a hole of the deck
-        return Path((_point(place), _point(place + THROUGH_DECK * out)), leaving.radius)
+        return Path((triple(place), triple(place + THROUGH_DECK * out)), leaving.radius)
     lengths, held = tuple(leaving.inside + length for length in LEAVES), leaving.inside + half + CLEAR
     used = held if leaving.stiff else 0.0
     starts = [Ending(place[None], out, lengths, used, held) for place, out in leaving.places]
@@ -169,7 +170,3 @@ def _beside_case(layout: Layout, half: float) -> list[Ending]:
         end = reach * out + np.array([0.0, 0.0, z])
         found.append(Ending(end[None], -out, (9.0, 14.0), half, half))
     return found
-
-
-def _point(at: Array) -> tuple[float, float, float]:
-    return float(at[0]), float(at[1]), float(at[2])
