@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from design.arrays import Times
-from firmware_io.lidar.device_clock import DeviceClock, host_times
+from firmware_io.lidar.device_clock import DeviceClock
 
 DELAY_NS = 21_000_000
 LATE_MS, PPM, SEEDS = 20.0, 50.0, 3
@@ -47,7 +47,8 @@ def main() -> None:
         for seed in range(SEEDS):
             true_ns, stamp_ms, arrival_ns = sensor(seconds, period_ms, wander, seed)
             clock = DeviceClock(round(period_ms) / 1e3, smallest_delay_ns=DELAY_NS)
-            off_ms = np.abs(host_times(clock, stamp_ms, arrival_ns)[0] - true_ns) / 1e6
+            stream = zip(stamp_ms.tolist(), arrival_ns.tolist(), strict=True)
+            off_ms = np.abs(np.array([clock.update(*scan).time_ns for scan in stream]) - true_ns) / 1e6
             since_s = (true_ns - true_ns[0]) / 1e9
             found.append([f(off_ms[since_s > after]) for after in (10, 30) for f in (np.median, np.max)])
         a, b, c, d = np.max(found, axis=0)

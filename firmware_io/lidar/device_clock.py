@@ -22,10 +22,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from jaxtyping import Int64, Real
-from numpy import ndarray
-
 from design.errors import DeviceError
 from firmware_io.lidar.tick_line import StampLine, half_hull, middle_slope
 
@@ -165,11 +161,6 @@ class DeviceClock:
         self._sync: TimeSync | None = None
         self._begin_anew()
 
-    @property
-    def rate(self) -> float:
-        """Sensor seconds per host second, less one."""
-        return -self._slope / 1e6
-
     def synchronise(self, sync: TimeSync) -> None:
         """Keep the results within what a time synchronisation in this life of the sensor's clock allows."""
         self._sync = sync
@@ -261,18 +252,3 @@ class DeviceClock:
         since_ms = stamp_ms - sync.stamp_ms + between_ms
         half_ns = sync.half_width_ns + 500_000 + abs(since_ms) * _RATE_MAX * 1e6
         return sync.host_ns + round(since_ms * 1e6), round(half_ns)
-
-
-def host_times(
-    clock: DeviceClock, stamp_ms: Real[ndarray, " n"], arrival_ns: Int64[ndarray, " n"]
-) -> tuple[Int64[ndarray, " n"], Int64[ndarray, " n"]]:
-    """Host times of the first beams [ns] and their uncertainty [ns], as a stream of scans would get them.
-
-    Args:
-        clock: a fresh clock; it is used up.
-        stamp_ms: unwrapped stamps, shape (n,).
-        arrival_ns: when they came, shape (n,).
-    """
-    moments = [clock.update(ms, ns) for ms, ns in zip(stamp_ms.tolist(), arrival_ns.tolist(), strict=True)]
-    times = np.array([moment.time_ns for moment in moments], np.int64)
-    return times, np.array([moment.uncertainty_ns for moment in moments], np.int64)

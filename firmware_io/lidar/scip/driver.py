@@ -238,7 +238,6 @@ class ScipLidar:
         return clock
 
     def _raw(self, taken: measurement.Measurement, arrival_ns: int) -> RawScan:
-        range_m, codes = parameters.ranges_m(taken.value, self.parameters)
         stamp_ms = self._counter.unwrap(taken.stamp_ms, arrival_ns)
         if 0 <= self._stamp_ms < stamp_ms:
             period_ms = self.parameters.scan_period_s * 1e3 * (self._skip + 1)
@@ -250,9 +249,8 @@ class ScipLidar:
             arrival_ns=arrival_ns,
             first_step=taken.window.first_step,
             cluster=taken.window.cluster,
-            range_m=range_m,
+            range_m=parameters.ranges_m(taken.value, self.parameters),
             intensity=taken.intensity.astype("float32"),
-            codes=codes,
         )
 
 

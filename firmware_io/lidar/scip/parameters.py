@@ -96,16 +96,7 @@ def parameters(told: Mapping[str, str]) -> Parameters:
     return known
 
 
-def ranges_m(value: Integers, of: Parameters, characters: int = 3) -> tuple[Float32s, dict[int, int]]:
-    """Ranges, NaN where the number is an error code, and how often each code came.
-
-    Args:
-        value: shape (n,), as sent.
-        of: the sensor's parameters.
-        characters: with 2, the largest number stands for everything beyond it.
-    """
-    largest = min(of.range_max_mm, 4094) if characters == 2 else of.range_max_mm
-    valid = (value >= of.range_min_mm) & (value <= largest)
-    range_m = np.where(valid, value / 1e3, np.nan).astype(np.float32)
-    codes, counts = np.unique(value[~valid], return_counts=True)
-    return range_m, dict(zip(codes.tolist(), counts.tolist(), strict=True))
+def ranges_m(value: Integers, of: Parameters) -> Float32s:
+    """Ranges of numbers as sent, shape (n,); NaN where they are error codes."""
+    valid = (value >= of.range_min_mm) & (value <= of.range_max_mm)
+    return np.where(valid, value / 1e3, np.nan).astype(np.float32)

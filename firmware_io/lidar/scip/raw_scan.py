@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from jaxtyping import Float32
@@ -24,7 +23,6 @@ class RawScan:
         cluster: steps per value.
         range_m: shape (n,), NaN where nothing was measured.
         intensity: shape (n,), or (0,) where none was asked for.
-        codes: error code -> how many values had it.
     """
 
     stamp_ms: int
@@ -34,7 +32,6 @@ class RawScan:
     cluster: int
     range_m: Float32[ndarray, " n"]
     intensity: Float32[ndarray, " m"]
-    codes: Mapping[int, int]
 
 
 def to_laser_scan(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:

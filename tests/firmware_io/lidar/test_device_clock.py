@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.errors import DeviceError
-from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, host_times, synchronised
+from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
 from firmware_io.lidar.tick_line import StampLine
 
 DELAY_NS = 21_000_000
@@ -23,6 +23,12 @@ def sensor(seconds, period_ms, *, ppm=50.0, late_ms=20.0, spread="even", seed=0,
     late = {"even": rng.uniform(0, late_ms, count), "tail": rng.exponential(late_ms, count)}[spread]
     arrival_ns = np.maximum.accumulate(true_ns + DELAY_NS + np.rint(late * 1e6).astype(np.int64))
     return true_ns, np.floor(shown_ms).astype(np.int64), arrival_ns
+
+
+def host_times(clock, stamp_ms, arrival_ns):
+    """Host times of the first beams and their uncertainty [ns], as a stream of scans gets them."""
+    moments = [clock.update(ms, ns) for ms, ns in zip(stamp_ms.tolist(), arrival_ns.tolist(), strict=True)]
+    return np.array([(moment.time_ns, moment.uncertainty_ns) for moment in moments]).T
 
 
 def errors_ms(clock, true_ns, stamp_ms, arrival_ns):
@@ -44,7 +50,6 @@ def test_an_hour_with_packets_up_to_20_ms_late(period_ms, after_s):
     assert np.median(np.abs(error_ms[late])) < 0.2
     assert np.abs(error_ms[late]).max() < 1.0
     assert np.mean(np.abs(error_ms[late]) < 2 * uncertainty_ms[late]) > 0.95
-    assert clock.rate == pytest.approx(50e-6, abs=5e-6)
 
 
 @pytest.mark.parametrize("spread", ["even", "tail"])
