@@ -1,39 +1,21 @@
-"""Records that come with the package by name, or from a file that a person names."""
+"""Tables of records that come with the package by name, or from a file that a person names."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import ValidationError
+from typing import Any
 
 from design.errors import TaskError
-from design.record import Record, explain, read_toml
-
-R = TypeVar("R", bound=Record)
-
-
-def named_record(path: Path, kind: type[R], shipped: Path, what: str) -> tuple[R, Path]:
-    """A record from a TOML file, or from one of the folder `shipped` by its bare name; and the file it came from.
-
-    Args:
-        path: the file, or the name.
-        kind: of record.
-        shipped: folder of those that come with the package.
-        what: the word for it in messages, such as "task".
-
-    Raises:
-        TaskError: there is none, or it is malformed.
-    """
-    table, source = named_table(path, shipped, what)
-    try:
-        return kind.model_validate(table), source
-    except ValidationError as error:
-        raise TaskError(explain(error, source, kind)) from error
+from design.record import read_toml
 
 
 def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:
-    """The table that such a record is made of, and the file it came from.
+    """The table of a TOML file, or of one of the folder `shipped` by its bare name; and the file it came from.
+
+    Args:
+        path: the file, or the name.
+        shipped: folder of those that come with the package.
+        what: the word for it in messages, such as "task".
 
     Raises:
         TaskError: there is none, or it is not TOML.

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from design.catalogue.catalogue import Catalogue, load_catalogue
 from design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from design.errors import TaskError, suggest
 from design.motion import LONGEST_S, SHORTEST_S
-from design.record import Record
+from design.record import Record, explain
 from design.task.angle_ranges import AngleRanges
-from design.task.named_record import named_record
+from design.task.named_record import named_table
 from design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.front import COLUMNS
 
@@ -102,7 +102,11 @@ def load_study(path: Path) -> LoadedStudy:
     Raises:
         TaskError: the file is missing or malformed, a task cannot be read, or a product is unknown.
     """
-    study, source = named_record(path, Study, SHIPPED, "study")
+    table, source = named_table(path, SHIPPED, "study")
+    try:
+        study = Study.model_validate(table)
+    except ValidationError as error:
+        raise TaskError(explain(error, source, Study)) from error
     products = load_catalogue(*(source.parent / extra for extra in study.catalogue))
     for field, kind in (("sensors", Lidar), ("servos", Servo), ("slip_rings", SlipRing), ("printers", Printer)):
         for name in getattr(study, field):
