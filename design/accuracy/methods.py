@@ -15,7 +15,7 @@ from scipy.special import roots_legendre
 
 from design.arrays import Array, Setting
 from design.density.ball_count import ball_count
-from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_at, simulated_scan
+from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_at
 from design.density.spin import ball_search, mean_count, zones
 from design.density.sweep import mean_count_swept
 from design.errors import TaskError
@@ -171,10 +171,8 @@ def _on_a_grid(
     problem: Problem, angles_rad: Setting, rows: int, count: Callable[[Array, Array, float], Array]
 ) -> float:
     grid = equal_angle_grid(180 / rows)
-    if problem.sweep is None:
-        scan = simulated_scan(problem.bearings_rad, problem.lines, angles_rad)
-    else:
-        scan = scan_at(problem.bearings_rad, problem.sweep.angles_rad(0.5), angles_rad)
+    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    scan = scan_at(problem.bearings_rad, joint_rad, angles_rad)
 
     def moment_of(moment: Moment, _: Array) -> float:
         weight = moment.field.weight_at(grid) * np.sqrt(np.maximum(1 - grid[:, 2] ** 2, 0))

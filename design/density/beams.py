@@ -114,27 +114,16 @@ def blind_zones(
     return zones[zones[:, 1] > zones[:, 0]]
 
 
-def simulated_scan(
-    bearings_rad: Float[ndarray, " beams"], lines: ScanLines, angles_rad: ArrayLike, start_phase_rad: float = 0.0
-) -> Float[ndarray, "n 3"]:
-    """Directions of one full scan in the world (paper, section 4.1), shape (lines * beams, 3), line after line.
-
-    Args:
-        bearings_rad: beam table of the lidar, shape (beams,).
-        lines: scan lines of the turn.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        start_phase_rad: axis angle of the first line.
-    """
-    return scan_at(bearings_rad, lines.angles_rad + start_phase_rad, angles_rad)
-
-
 def scan_at(
     bearings_rad: Float[ndarray, " beams"],
     joint_rad: Float[ndarray, " k"],
     angles_rad: ArrayLike,
     lever: ArrayLike = NO_LEVER,
 ) -> Float[ndarray, "n 3"]:
-    """Directions in the world of all beams at each joint angle, shape (joint angles * beams, 3), line after line."""
+    """Directions in the world (paper, section 4.1) of all beams at each joint angle, line after line.
+
+    Shape (joint angles * beams, 3).
+    """
     alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
     beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser, lever)
     R = frames.R_world_rot(alpha_rot, beta_rot, joint_rad)

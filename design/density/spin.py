@@ -21,7 +21,7 @@ from numpy import ndarray
 from design.arrays import Array
 from design.concurrency.parallel import in_chunks
 from design.density.beams import ScanLines
-from design.density.phase_walk import even_zones, half_width, halves, mean_counts, meetings, seam_zones
+from design.density.phase_walk import even_zones, mean_counts, meetings, seam_zones
 
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 
@@ -95,26 +95,6 @@ def zones(
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
 
 
-def count_at(
-    polar_rad: float,
-    azimuth_rad: float,
-    beam_polar_rad: Float[ndarray, " beams"],
-    beam_azimuth_rad: Float[ndarray, " beams"],
-    lines: ScanLines,
-    ball_rad: float,
-) -> int:
-    """Beams within the ball about one direction of the rotation frame, first line at azimuth 0: floor and ceil."""
-    half = _half_widths(polar_rad, beam_polar_rad, ball_rad)
-    seen = half >= 0
-    first = (azimuth_rad - beam_azimuth_rad[seen] - half[seen]) % (2 * np.pi)
-    last = first + 2 * half[seen]
-    top = lines.count - 1
-    before_seam = np.minimum(np.floor(last / lines.step_rad), top) - np.ceil(first / lines.step_rad) + 1
-    behind_seam = np.minimum(np.floor((last - 2 * np.pi) / lines.step_rad), top) + 1
-    counts = np.maximum(before_seam, 0) + np.maximum(behind_seam, 0)
-    return int(np.where(half[seen] >= np.pi, lines.count, counts).sum())
-
-
 def ball_search(
     beams: Float[ndarray, "beams 3"], directions: Float[ndarray, "n 3"], ball_rad: float
 ) -> Int[ndarray, " n"]:
@@ -132,8 +112,3 @@ def ball_search(
 
     chord = 2 * np.sin(ball_rad / 2)
     return cKDTree(beams).query_ball_point(directions, chord, return_length=True, workers=-1)
-
-
-def _half_widths(t: float, beam_polar: Float[ndarray, " beams"], ball_rad: float) -> Float[ndarray, " beams"]:
-    """delta_b at polar angle t; -1 where the ball never meets the beam."""
-    return np.array([half_width(*halves(t), *halves(b), *halves(ball_rad)) for b in beam_polar])

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scans import simulated_scan
 
 from design.density.ball_count import ball_count
-from design.density.beams import scan_lines, simulated_scan
+from design.density.beams import scan_lines
 from design.density.spin import ball_search
 from design.sphere.directions import equal_angle_grid, spiral
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scans import simulated_scan
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
@@ -16,7 +17,6 @@ from design.density.beams import (
     polar_and_azimuth,
     polar_of_planes,
     scan_lines,
-    simulated_scan,
 )
 
 

@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from quick_tests import samples
+from scans import count_at, simulated_scan
 from scipy.spatial.transform import Rotation
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
-from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines, simulated_scan
+from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines
 from design.density.phase_walk import sort_by_buckets
-from design.density.spin import ball_search, count_at, mean_count, zones
+from design.density.spin import ball_search, mean_count, zones
 from design.frames import R_world_rot
 from design.objective import ball_search as oracle
 from design.objective.problem import problem_of

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from quick_tests import samples
+from scans import count_at
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Multibeam
 from design.density.beams import beam_directions_rot, polar_and_azimuth
-from design.density.spin import ball_search, count_at
+from design.density.spin import ball_search
 from design.density.sweep import SweepLines
 from design.errors import BuildError
 from design.evaluation import comparison as comparison

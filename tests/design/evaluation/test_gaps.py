@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scans import simulated_scan
 from scipy.spatial import ConvexHull
 
 from design.density.ball_count import ball_count
-from design.density.beams import ScanLines, beam_directions_rot, scan_lines, simulated_scan
+from design.density.beams import ScanLines, beam_directions_rot, scan_lines
 from design.errors import TaskError
 from design.evaluation.gaps import gaps, interlaced_period_s
 from design.frames import R_world_rot

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scans import simulated_scan
 
 from design.catalogue.catalogue import load_catalogue
-from design.density.beams import blind_zones, simulated_scan
+from design.density.beams import blind_zones
 from design.density.spin import ball_search
 from design.objective.holes import Hole, heading, holes, percent
 from design.objective.problem import problem_of

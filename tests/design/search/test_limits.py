@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scans import simulated_scan
 
 from design.catalogue.catalogue import load_catalogue
-from design.density.beams import simulated_scan
 from design.density.spin import ball_search
 from design.errors import TaskError
 from design.evaluation.gaps import gaps

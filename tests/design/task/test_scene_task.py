@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scans import simulated_scan
 
-from design.density.beams import simulated_scan
 from design.errors import TaskError
 from design.evaluation.coverage import on_surfaces, points_per_m2
 from design.objective.ball_search import start_phases
