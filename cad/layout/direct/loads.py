@@ -40,14 +40,12 @@ class ShaftMetal:
         modulus_pa: of elasticity.
         waist: diameter of the waist in this metal, as a share of that in aluminium.
         yields_pa: shear stress at which it yields.
-        grows_per_k: thermal expansion.
     """
 
     name: str
     modulus_pa: float
     waist: float
     yields_pa: float
-    grows_per_k: float
 
     def twisted_off_nm(self, waist_diameter: float) -> float:
         """Torque at which a waist yields that is of this diameter in aluminium."""
@@ -55,9 +53,9 @@ class ShaftMetal:
 
 
 # 0.2 % proof stress of 430 MPa (EN 755-2, bars) and 900 MPa (EN ISO 683-2, to 16 mm), by von Mises
-ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6, 23e-6)
+ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6)
 # as stiff as aluminium: (70 / 206) ** 0.25
-STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.76, 0.577 * 900e6, 12e-6)
+STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.76, 0.577 * 900e6)
 
 
 @dataclass(frozen=True, slots=True)

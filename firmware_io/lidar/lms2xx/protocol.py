@@ -18,7 +18,7 @@ from numpy import ndarray
 
 from design.errors import ProtocolError
 
-MODE, STATUS_ASKED, TYPE, VARIANT = 0x20, 0x31, 0x3A, 0x3B
+MODE, TYPE, VARIANT = 0x20, 0x3A, 0x3B
 ANSWER = 0x80
 SCAN = 0xB0
 STREAM, ON_REQUEST = 0x24, 0x25
@@ -76,9 +76,9 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def telegram(command: int, values: bytes = b"", address: int = 0) -> bytes:
+def telegram(command: int, values: bytes = b"") -> bytes:
     """The bytes on the line."""
-    body = struct.pack("<BBHB", _STX, address, 1 + len(values), command) + values
+    body = struct.pack("<BBHB", _STX, 0, 1 + len(values), command) + values
     return body + struct.pack("<H", crc16(body))
 
 

@@ -19,7 +19,7 @@ from firmware_io.twins.sick.lms_twin import LmsTwin, lms_twin, write_telegram
 REQUESTS = [
     (protocol.telegram(protocol.MODE, b"\x24"), "02 00 02 00 20 24 34 08"),
     (protocol.telegram(protocol.MODE, b"\x25"), "02 00 02 00 20 25 35 08"),
-    (protocol.telegram(protocol.STATUS_ASKED), "02 00 01 00 31 15 12"),
+    (protocol.telegram(0x31), "02 00 01 00 31 15 12"),
     (protocol.telegram(protocol.TYPE), "02 00 01 00 3A 1E 12"),
     (protocol.telegram(protocol.MODE, b"\x42"), "02 00 02 00 20 42 52 08"),
     (protocol.telegram(protocol.MODE, b"\x48"), "02 00 02 00 20 48 58 08"),
