@@ -59,11 +59,11 @@ class Trial:
         return float(np.median(self.seconds))
 
 
-def timed(work: Callable[[], T], repeats: int = REPEATS) -> tuple[T, tuple[float, ...]]:
+def timed(work: Callable[[], T]) -> tuple[T, tuple[float, ...]]:
     """What `work` gives, and the seconds of its repeats, shortest first; one more run before them warms up."""
     found = work()
     seconds = []
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
@@ -11,20 +10,20 @@ S = TypeVar("S")
 T = TypeVar("T")
 
 
-def ahead(work: Callable[[S], T], items: Iterable[S], most: int = 1) -> Generator[T, None, None]:
+def ahead(work: Callable[[S], T], items: Iterable[S]) -> Generator[T, None, None]:
     """Results of `work` on each item, in order; an error of the work is raised where its result would stand.
 
-    The items are taken in the thread that asks, at most so many before their results are. Whoever stops asking stops
-    the work: what has not begun never does.
+    The items are taken in the thread that asks, each before the result of the one in front of it is. Whoever stops
+    asking stops the work: what has not begun never does.
     """
-    waiting: deque[Future[T]] = deque()
+    waiting: Future[T] | None = None
     with ThreadPoolExecutor(1) as pool:
         try:
             for item in items:
-                waiting.append(pool.submit(work, item))
-                if len(waiting) > most:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
+                before, waiting = waiting, pool.submit(work, item)
+                if before is not None:
+                    yield before.result()
+            if waiting is not None:
+                yield waiting.result()
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

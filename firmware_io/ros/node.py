@@ -51,6 +51,7 @@ PointsFrame = Literal["world", "rot"]
 _DIAGNOSED_S = 1.0
 _SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
 _FOUND_S = 1.0  # without a further subscription
+_FLUSHED_S = 5.0
 _KEPT = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -163,10 +164,10 @@ class ScannerNode:
                 found, since_s = now, time.monotonic()
             time.sleep(0.02)
 
-    def flush(self, seconds: float = 5.0) -> None:
+    def flush(self) -> None:
         """Wait until those who listen have all that was published."""
         for publisher in (self._scan, self._joint, self._points):
-            publisher.wait_for_all_acked(Duration(seconds=seconds))
+            publisher.wait_for_all_acked(Duration(seconds=_FLUSHED_S))
 
     def wait(self, seconds: float) -> None:
         """Until a parameter is set, at most so long; what watches the diagnostics hears that it waits."""

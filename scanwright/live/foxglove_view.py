@@ -119,11 +119,11 @@ def _channels(recording: Path, angles: Path, context: foxglove.Context) -> Foxgl
 
 
 @contextmanager
-def foxglove_feed(folder: Path, port: int = PORT) -> Iterator[Watch]:
+def foxglove_feed(folder: Path) -> Iterator[Watch]:
     """What `acquire` tells of a scan, to a server in a process of its own: the scan never waits for a viewer."""
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)
-    serving = spawn.Process(target=_serve, args=(receiving, folder, port), daemon=True)
+    serving = spawn.Process(target=_serve, args=(receiving, folder), daemon=True)
     serving.start()
     receiving.close()
     yield Feed(sending)
@@ -131,14 +131,14 @@ def foxglove_feed(folder: Path, port: int = PORT) -> Iterator[Watch]:
         serving.join()
 
 
-def _serve(receiving: Connection, folder: Path, port: int) -> None:
+def _serve(receiving: Connection, folder: Path) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
     context = foxglove.Context()
     own_body = own_body_beside(in_use.path)
     channels = FoxgloveChannels(in_use.angles, own_body, urdf, context, wall_minus_ns=wall_minus_ns)
-    with _server(context, f"scan of {folder.name}", port, lambda line: print(line, flush=True)):
+    with _server(context, f"scan of {folder.name}", PORT, lambda line: print(line, flush=True)):
         for batch in batches(receiving):
             tell(batch, channels)
         channels.close()

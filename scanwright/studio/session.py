@@ -12,9 +12,7 @@ from scanwright.studio.page import Studio
 ALONE_S = 300.0
 
 
-def run_studio(
-    loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str], None], alone_s: float = ALONE_S
-) -> None:
+def run_studio(loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str], None]) -> None:
     """Serve the studio of a task, and print its address.
 
     Task files are saved to the folder that this was started in.
@@ -24,7 +22,6 @@ def run_studio(
         port: of 127.0.0.1; 0 is any that is free.
         out: folder that holds the builds.
         say: is told of progress, and at the end what was refused.
-        alone_s: the time without a visitor after which it ends.
 
     Raises:
         TaskError: the port is taken, or the task has no region.
@@ -35,8 +32,8 @@ def run_studio(
         try:
             print(f"open {gate.address}", flush=True)
             studio.searching.begin()
-            print(f"Ctrl-C ends it; without a visitor it ends by itself after {alone_s / 60:g} minutes", flush=True)
-            wait_until_alone(gate, alone_s)
+            print(f"Ctrl-C ends it; without a visitor it ends by itself after {ALONE_S / 60:g} minutes", flush=True)
+            wait_until_alone(gate, ALONE_S)
         finally:
             studio.close()
         for why, count in gate.refused.items():
