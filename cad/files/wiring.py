@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 from cad.files.schematic import schematic_svg
 from design.catalogue.products import SlotSwitch
+from design.electrics.loads import COMPUTER_W, LEADS_M
 from design.electrics.network import Network
 from design.electrics.rules import broken_rules
 from design.electrics.sizing import OVER_PEAK
-from design.electrics.wiring import COMPUTER_W, LEADS_M, network_of
+from design.electrics.wiring import network_of
 from design.scanner import Scanner
 
 GROUND = (

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from design.catalogue.products import Lidar, Servo, SlipRing, SlotSwitch, Ways
-from design.electrics.network import Box, Branch, Circuit, Drop, Network, Wire
-from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, supply_for, wire_drop_v, wire_for
+from design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
+from design.electrics.loads import (
+    CHANGER,
+    SUPPLY_V,
+    UNKNOWN_A,
+    ElectricLoad,
+    branch_of,
+    drops_of,
+    loads_of,
+)
+from design.electrics.network import Box, Branch, Circuit, Network, Wire
+from design.electrics.sizing import fuse_for, supply_for, wire_for
 from design.scanner import Scanner
 
-SUPPLY_V = 12.0
-COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed
-COMPUTER_V = 5.0
-UNKNOWN_A = 1.0  # of a device whose current nobody tells
-LEADS_M = 1.0  # of each branch
-CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
 USB_A = 0.5  # that a port gives
 DATA = {
     "usb": ("VBUS", "D-", "D+", "GND"),
@@ -63,91 +64,26 @@ RISKS = {
 RISKS["usb-powered"] = RISKS["usb"].replace("power the lidar by its own lead, not by VBUS", "VBUS feeds the lidar")
 
 
-@dataclass(frozen=True, slots=True)
-class _Load:
-    """A device and what it asks of the supply."""
-
-    name: str
-    title: str
-    volts: float  # that it is fed with
-    lasting_a: float
-    peak_a: float
-    bounds_v: tuple[float, float] | None = None
-    behind_ring: bool = False
-
-    @property
-    def set_v(self) -> float:
-        """What its converter is set to: what is lost on the way comes off, so rather the middle of what it bears."""
-        if self.volts == SUPPLY_V or self.bounds_v is None:
-            return self.volts
-        return max(self.volts, round(sum(self.bounds_v) / 2, 1))
-
-    def lost_v(self, mm2: float) -> float:
-        """On its leads, and in the ring."""
-        return wire_drop_v(self.peak_a, mm2, LEADS_M) + (2 * self.peak_a * RING_OHM if self.behind_ring else 0.0)
-
-    @property
-    def from_supply(self) -> float:
-        """Amperes at the supply for one of its own."""
-        return 1.0 if self.volts == SUPPLY_V else self.set_v / SUPPLY_V / CONVERTER
-
-
 def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
     """The wiring of one scanner, and of the switch that its homing flag passes, where it has one.
 
     Raises:
         ValueError: a device draws more than any fuse of the table carries.
     """
-    lidar, servo, ring = scanner.lidar, scanner.servo, scanner.slip_ring
-    loads = [_servo_load(servo), _computer_load()]
-    if lidar.link != "usb-powered":
-        loads.insert(0, _lidar_load(lidar, behind_ring=ring is not None))
-    branches = [_branch(number, load) for number, load in enumerate(loads, start=1)]
+    lidar, ring = scanner.lidar, scanner.slip_ring
+    loads = loads_of(scanner)
+    branches = [branch_of(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
     return Network(
         boxes=tuple(_boxes(scanner, switch, loads, branches, circuits)),
         wires=tuple(_wires(scanner, switch, loads, branches, circuits)),
         circuits=circuits,
         branches=tuple(branches),
-        drops=tuple(_drops(loads, branches)),
+        drops=tuple(drops_of(loads, branches)),
         supply_a=supply_for(sum(branch.peak_a for branch in branches)),
         risks=() if ring is None or lidar.link is None else (RISKS[lidar.link],),
         unknown=tuple(_unknown(scanner)),
     )
-
-
-def _lidar_load(lidar: Lidar, *, behind_ring: bool) -> _Load:
-    peak = lidar.peak_a or UNKNOWN_A
-    volts = fed_with(lidar.supply_v)
-    return _Load("lidar", lidar.name, volts, lidar.current_a or peak, peak, lidar.supply_v, behind_ring)
-
-
-def _servo_load(servo: Servo) -> _Load:
-    """Its lasting current is that of its lasting torque, a fifth of the stall."""
-    stall = servo.stall_a or UNKNOWN_A
-    volts = fed_with(servo.supply_v)
-    peak = stall * volts / servo.rated_v
-    return _Load("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, servo.supply_v)
-
-
-def _computer_load() -> _Load:
-    amps = COMPUTER_W / COMPUTER_V
-    return _Load("computer", "computer", COMPUTER_V, amps / 2, amps)
-
-
-def fed_with(supply_v: tuple[float, float] | None) -> float:
-    """The supply's voltage where a device bears it, else that of a converter."""
-    if supply_v is None or supply_v[0] <= SUPPLY_V <= supply_v[1]:
-        return SUPPLY_V
-    return next((volts for volts in CHANGER if supply_v[0] <= volts <= supply_v[1]), SUPPLY_V)
-
-
-def _branch(number: int, load: _Load) -> Branch:
-    peak = load.peak_a * load.from_supply
-    fuse = fuse_for(peak)
-    least_v = 0.0 if load.bounds_v is None else load.bounds_v[0]
-    mm2 = wire_for(fuse, lambda mm2: load.set_v - load.lost_v(mm2) >= least_v)
-    return Branch(f"F{number}", load.title, load.lasting_a * load.from_supply, peak, fuse, mm2)
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
@@ -180,14 +116,14 @@ def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
     )
 
 
-def _feed(load: _Load) -> str:
+def _feed(load: ElectricLoad) -> str:
     return f"{load.volts:g} V"
 
 
 def _boxes(
     scanner: Scanner,
     switch: SlotSwitch | None,
-    loads: list[_Load],
+    loads: list[ElectricLoad],
     branches: list[Branch],
     circuits: tuple[Circuit, ...],
 ) -> list[Box]:
@@ -243,7 +179,7 @@ def _boxes(
 def _wires(
     scanner: Scanner,
     switch: SlotSwitch | None,
-    loads: list[_Load],
+    loads: list[ElectricLoad],
     branches: list[Branch],
     circuits: tuple[Circuit, ...],
 ) -> list[Wire]:
@@ -298,14 +234,6 @@ def _wires(
             wires.append(Wire(("plug", net), ("ring", inside[net]), net, peaks[net], 0.0, colour))
             wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, colour))
     return wires
-
-
-def _drops(loads: list[_Load], branches: list[Branch]) -> list[Drop]:
-    return [
-        Drop(load.title, load.set_v - load.lost_v(branch.mm2), *load.bounds_v)
-        for load, branch in zip(loads, branches, strict=True)
-        if load.bounds_v is not None
-    ]
 
 
 def _unknown(scanner: Scanner) -> list[str]:

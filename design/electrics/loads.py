@@ -1,0 +1,98 @@
+"""What each device asks of the supply, and the fused branch that gives it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from design.catalogue.products import Lidar, Servo
+from design.electrics.network import Branch, Drop
+from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
+from design.scanner import Scanner
+
+SUPPLY_V = 12.0
+COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed
+COMPUTER_V = 5.0
+UNKNOWN_A = 1.0  # of a device whose current nobody tells
+LEADS_M = 1.0  # of each branch
+CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
+
+
+@dataclass(frozen=True, slots=True)
+class ElectricLoad:
+    """A device and what it asks of the supply."""
+
+    name: str
+    title: str
+    volts: float  # that it is fed with
+    lasting_a: float
+    peak_a: float
+    bounds_v: tuple[float, float] | None = None
+    behind_ring: bool = False
+
+    @property
+    def set_v(self) -> float:
+        """What its converter is set to: what is lost on the way comes off, so rather the middle of what it bears."""
+        if self.volts == SUPPLY_V or self.bounds_v is None:
+            return self.volts
+        return max(self.volts, round(sum(self.bounds_v) / 2, 1))
+
+    def lost_v(self, mm2: float) -> float:
+        """On its leads, and in the ring."""
+        return wire_drop_v(self.peak_a, mm2, LEADS_M) + (2 * self.peak_a * RING_OHM if self.behind_ring else 0.0)
+
+    @property
+    def from_supply(self) -> float:
+        """Amperes at the supply for one of its own."""
+        return 1.0 if self.volts == SUPPLY_V else self.set_v / SUPPLY_V / CONVERTER
+
+
+def loads_of(scanner: Scanner) -> list[ElectricLoad]:
+    """The devices of a scanner; a lidar that feeds on its USB is none."""
+    loads = [_servo_load(scanner.servo), _computer_load()]
+    if scanner.lidar.link != "usb-powered":
+        loads.insert(0, _lidar_load(scanner.lidar, behind_ring=scanner.slip_ring is not None))
+    return loads
+
+
+def _lidar_load(lidar: Lidar, *, behind_ring: bool) -> ElectricLoad:
+    peak = lidar.peak_a or UNKNOWN_A
+    volts = _fed_with(lidar.supply_v)
+    return ElectricLoad("lidar", lidar.name, volts, lidar.current_a or peak, peak, lidar.supply_v, behind_ring)
+
+
+def _servo_load(servo: Servo) -> ElectricLoad:
+    """Its lasting current is that of its lasting torque, a fifth of the stall."""
+    stall = servo.stall_a or UNKNOWN_A
+    volts = _fed_with(servo.supply_v)
+    peak = stall * volts / servo.rated_v
+    return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, servo.supply_v)
+
+
+def _computer_load() -> ElectricLoad:
+    amps = COMPUTER_W / COMPUTER_V
+    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps)
+
+
+def _fed_with(supply_v: tuple[float, float] | None) -> float:
+    """The supply's voltage where a device bears it, else that of a converter."""
+    if supply_v is None or supply_v[0] <= SUPPLY_V <= supply_v[1]:
+        return SUPPLY_V
+    return next((volts for volts in CHANGER if supply_v[0] <= volts <= supply_v[1]), SUPPLY_V)
+
+
+def branch_of(number: int, load: ElectricLoad) -> Branch:
+    """Its branch: a fuse for its peak, and wires on which it still gets what it bears."""
+    peak = load.peak_a * load.from_supply
+    fuse = fuse_for(peak)
+    least_v = 0.0 if load.bounds_v is None else load.bounds_v[0]
+    mm2 = wire_for(fuse, lambda mm2: load.set_v - load.lost_v(mm2) >= least_v)
+    return Branch(f"F{number}", load.title, load.lasting_a * load.from_supply, peak, fuse, mm2)
+
+
+def drops_of(loads: list[ElectricLoad], branches: list[Branch]) -> list[Drop]:
+    """What reaches each device whose bounds are known."""
+    return [
+        Drop(load.title, load.set_v - load.lost_v(branch.mm2), *load.bounds_v)
+        for load, branch in zip(loads, branches, strict=True)
+        if load.bounds_v is not None
+    ]
