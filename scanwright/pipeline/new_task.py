@@ -31,12 +31,12 @@ ANGLES = r"""
 #     from the right     the axis leans        the lidar's front    from behind: the      from behind: the
 #     ahead is -->       ahead                 dips                 axis leans right      lidar's left goes up
 #
-#          | axis          \    / axis           \   | axis              / axis  /             \   | axis
-#          |                \  /                  \  |                  /    \  /               \  |
-#     -----L----->           L                     \ L                       \ L                  \ L
-#          |                / \                      |\                       / \                   |\
-#          |               /   \                     | \                     /   \                  | \
-#          S              S     >                    S  >                   S                       S
+#          | axis            \   / axis            \ | axis               \   / axis             \ | axis
+#          |                  \ /                   \|                     \ /                    \|
+#     -----L----->             L                     L                      L                      L
+#          |                  / \                    |\                    / \                     |\
+#          |                 /   \                   | \                  /   \                    | \
+#          S                S     >                  S  >                S                         S
 #
 # A pair [from, to] is searched, one value fixes the angle. With these ranges nothing is left out.
 """

@@ -46,6 +46,18 @@ def test_every_pair_is_a_task_without_a_warning_or_one_line_says_why_not(here, l
         assert [f"that {lidar} sees" in warning for warning in warnings] == [True] * near
 
 
+def test_every_line_of_the_drawn_angles_passes_through_its_lidar():
+    lines = ANGLES.splitlines()
+    (middle,) = (i for i, line in enumerate(lines) if "-----L----->" in line)
+    lidars = [i for i, sign in enumerate(lines[middle]) if sign == "L"]
+    assert len(lidars) == 5
+    for below in (-2, -1, 1, 2):
+        for place, sign in enumerate(lines[middle + below][1:], 1):
+            if sign in "|/\\":
+                aside = {"|": 0, "/": -below, "\\": below}[sign]
+                assert place - aside in lidars, (below, place, sign)
+
+
 def test_what_was_asked_for_stands_in_the_file(command, here):
     code, out, complaints = command("new", "dog", *DOG, "-o", "FILE.toml")
     assert (code, out) == (0, "wrote FILE.toml\n")
