@@ -9,13 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from cad.drawings.patterns import number
-from cad.drawings.pen import ANGLE, DIAMETER, ORDINATE_X, ORDINATE_Y, TEXT, Pen, Point, width_of
+from cad.drawings.pen import ANCHORS, ANGLE, ARROW, DIAMETER, ORDINATE_X, ORDINATE_Y, TEXT, Pen, Point, width_of
 
 GAP = 1.5  # between an edge and the line that starts at it
 REACH = 6.0  # from the view to the bend of an ordinate
 STEP = TEXT * 1.35  # between two texts
+ARMS = 4.0  # of an angle, beyond its arc
+CLEAR = 0.5  # around a text
 RIGHT = 0.5 * math.pi
 
 
@@ -83,13 +86,18 @@ def thinned(values: dict[float, float]) -> list[tuple[float, float]]:
     return out
 
 
+def leaders_right(callouts: list[Callout], edge: float, scale: float) -> list[tuple[Callout, Point, Point]]:
+    """What is told at the right of a view, from below: the tip of each leader, and where it bends to its text."""
+    order = sorted(callouts, key=lambda callout: (callout.at[1], -callout.at[0], callout.words))
+    places = spread([callout.at[1] * scale for callout in order], TEXT * 1.7)
+    tips = [(callout.at[0] * scale, callout.at[1] * scale) for callout in order]
+    return [(callout, tip, (edge + REACH, y)) for callout, tip, y in zip(order, tips, places, strict=True)]
+
+
 def callouts_right(pen: Pen, callouts: list[Callout], edge: float) -> None:
     """Texts in a column at the right of a view, each with a leader to what it tells of."""
-    order = sorted(callouts, key=lambda callout: (callout.at[1], -callout.at[0], callout.words))
-    places = spread([callout.at[1] * pen.scale for callout in order], TEXT * 1.7)
-    for callout, y in zip(order, places, strict=True):
-        x, own = edge + REACH, pen
-        tip = (callout.at[0] * pen.scale, callout.at[1] * pen.scale)
+    for callout, tip, (x, y) in leaders_right(callouts, edge, pen.scale):
+        own = pen
         if callout.centre is not None:
             across = 2 * callout.centre[0] * pen.scale - tip[0], 2 * callout.centre[1] * pen.scale - tip[1]
             said = f"Ø{number(2 * math.dist(callout.at, callout.centre))}"
@@ -98,6 +106,29 @@ def callouts_right(pen: Pen, callouts: list[Callout], edge: float) -> None:
         own.stroke("DIMENSION", (tip, (x, y), (x + 2.0, y)))
         own.head(tip, math.atan2(tip[1] - y, tip[0] - x))
         own.text((x + 2.8, y - TEXT / 2 + 0.2), callout.words)
+
+
+def text_box(at: Point, words: str, height: float = TEXT, anchor: str = "left") -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of the room around a line of text."""
+    width = width_of(words, height)
+    left = at[0] - ANCHORS[anchor][1] * width
+    return left - CLEAR, at[1] - CLEAR, left + width + CLEAR, at[1] + height + CLEAR
+
+
+def meets(path: Sequence[Point], box: tuple[float, float, float, float]) -> bool:
+    """Whether straight pieces through points enter a box."""
+    for (x0, y0), (x1, y1) in pairwise(path):
+        first, last = 0.0, 1.0
+        for start, step, low, high in ((x0, x1 - x0, box[0], box[2]), (y0, y1 - y0, box[1], box[3])):
+            if step == 0.0:
+                inside = low < start < high
+                first, last = (first, last) if inside else (1.0, 0.0)
+                continue
+            near, far = sorted(((low - start) / step, (high - start) / step))
+            first, last = max(first, near), min(last, far)
+        if first < last:
+            return True
+    return False
 
 
 def angle_between(pen: Pen, at: Point, first: float, second: float, radius: float, words: str) -> None:
@@ -111,12 +142,14 @@ def angle_between(pen: Pen, at: Point, first: float, second: float, radius: floa
         return at[0] + (reach + wide * abs(c)) * c, at[1] + (reach + tall * abs(s)) * s
 
     middle, half, height = (low + high) / 2, width_of(words) / 2 + 0.8, TEXT / 2 + 0.8
-    x, y = out(middle, radius + 2.5, half, height)
+    narrow = (high - low) * radius < 3 * ARROW[0]  # no room for heads between the arms, nor for the box
+    x, y = out(middle, radius + (ARMS + 1.5 if narrow else 2.5), half, height)
     ends = {"defpoint2": out(low, radius), "defpoint3": out(high, radius), "defpoint4": at}
     own = pen.dimension(ANGLE, "<>", (x, y), defpoint=out(middle, radius), **ends)
-    own.arc("DIMENSION", at, radius, low, high)
-    for angle, turn in ((low, -RIGHT), (high, RIGHT)):
-        own.stroke("CENTRE", (at, out(angle, radius + 4.0)))
+    beyond = 2 * ARROW[0] / radius if narrow else 0.0
+    own.arc("DIMENSION", at, radius, low - beyond, high + beyond)
+    for angle, turn in ((low, RIGHT if narrow else -RIGHT), (high, -RIGHT if narrow else RIGHT)):
+        own.stroke("CENTRE", (at, out(angle, radius + ARMS)))
         own.head(out(angle, radius), angle + turn)
     box = [(x - half, y - height), (x + half, y - height), (x + half, y + height), (x - half, y + height)]
     own.stroke("DIMENSION", [*box, box[0]])

@@ -8,17 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from cad import solids
-from cad.drawings.dimensions import Callout, angle_between, callouts_right, centre_mark, ordinates
+from cad.drawings.dimensions import (
+    Callout,
+    angle_between,
+    callouts_right,
+    centre_mark,
+    leaders_right,
+    meets,
+    ordinates,
+    text_box,
+)
 from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
 from cad.drawings.patterns import Pattern, number
-from cad.drawings.pen import Layer, Pen, Point
-from cad.drawings.project import Arc
+from cad.drawings.pen import TEXT, Layer, Pen, Point
+from cad.drawings.project import Arc, Curve
 from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
 NEARLY = 0.2  # an extent that differs less from a radius is that radius, notched
 OVER = 3.0  # of a centre line beyond the part
 MARK = 4.0  # length of the thick ends of a cut
 LETTER = 5.0  # room for the letter beside them
+CAPITALS = 3.5  # its height
+CENTRE_GAP = 3.0  # between the optical centre and its name
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +78,23 @@ def draw(pen: Pen, view: View, sizes: Sizes, part: Part) -> None:
         _outline(pen, view)
         for line in view.hatching:
             pen.stroke("DIMENSION", [pen.paper(point) for point in line])
+    aside = OVER + MARK + LETTER if view.kind == "top" and part.fits else 0.0  # beside the marks of the cut
+    # past the axis, which stands free where the part is at its side
+    beyond = max(right, 0.0 if view.kind == "onto" else OVER) + aside
     if view.kind != "iso":
         _centre_lines(pen, view, part, (left, low, right, high))
+        if view.kind == "top" and part.fits:
+            leaders = [[tip, bend] for _, tip, bend in leaders_right(sizes.callouts, beyond, pen.scale)]
+            at_left = [[(left - aside, y * pen.scale), (left, y * pen.scale)] for y in sizes.beside]
+            _cut_marks(pen, left - OVER, right + OVER, [*leaders, *at_left])
     for middle, radius in sizes.circles:
         pen.arc("CENTRE", pen.paper(middle), radius * pen.scale)
     for middle, radius in sizes.holes:
         centre_mark(pen, pen.paper(middle), radius * pen.scale)
     sign = -1.0 if view.kind == "left" else 1.0  # it looks along the axis that points to the left
     ordinates(pen, sizes.below, low, below=True, sign=sign)
-    aside = OVER + MARK + LETTER if view.kind == "top" and part.fits else 0.0  # beside the marks of the cut
     ordinates(pen, sizes.beside, left - aside, below=False)
-    callouts_right(pen, sizes.callouts, right + aside)
+    callouts_right(pen, sizes.callouts, beyond)
     told = [p for p in part.patterns if len(p.holes) >= 3 and shows_angle(view, p)]
     if told and view.kind in ("front", "left", "angle"):
         _angle(pen, view, told[0], part, high + OVER)
@@ -105,23 +122,52 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
             pen.arc("DIMENSION", (x, y), 1.5)
             centre_mark(pen, (x, y), 1.5)
             if view.kind != "left":
-                pen.text((x - 3.0, y + 1.0), "OPTICAL CENTRE", anchor="right")
+                _name_centre(pen, view, (x, y))
         pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, top)))
     elif parallel(view.towards, Z):
-        if view.kind == "top" and part.fits:
-            _cut_marks(pen, left - OVER, right + OVER)
         pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, high + OVER)))
         pen.stroke("CENTRE", ((left - OVER, 0.0), (right + OVER, 0.0)))
 
 
-def _cut_marks(pen: Pen, left: float, right: float) -> None:
-    """Where the section is cut: thick ends, arrows along which one looks, and its letter."""
+def _name_centre(pen: Pen, view: View, at: Point) -> None:
+    """The words at the optical centre, at the first side of it where no line of the part is struck."""
+    words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP
+    below = y - 1.0 - TEXT
+    choices = [((x - CENTRE_GAP, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP, below), "right")]
+    lines = [[pen.paper(point) for point in _points(curve)] for curve in view.curves]
+    free = (c for c in choices if not any(meets(line, text_box(c[0], words, anchor=c[1])) for line in lines))
+    place, anchor = next(free, choices[0])
+    pen.text(place, words, anchor=anchor)
+
+
+def _points(curve: Curve) -> list[Point]:
+    """Points that a curve of a view passes."""
+    if not isinstance(curve, Arc):
+        return list(curve.points)
+    (x, y), radius = curve.centre, curve.radius
+    turns = [curve.start + (curve.end - curve.start) * k / 16 for k in range(17)]
+    return [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
+
+
+def _cut_marks(pen: Pen, left: float, right: float, taken: list[list[Point]]) -> None:
+    """Where the section is cut: thick ends, arrows along which one looks, and its letter where no line is `taken`."""
     for x, out in ((left, -1.0), (right, 1.0)):
         end = x + out * MARK
         pen.stroke("FRAME", ((x, 0.0), (end, 0.0)))
         pen.stroke("DIMENSION", ((end, -2 * MARK), (end, 0.0)))
         pen.head((end, 0.0), 0.5 * math.pi)
-        pen.text((end + out * 1.5, -2 * MARK), "S", height=3.5, anchor="left" if out > 0 else "right")
+        choices = [
+            ((end + out * 1.5, -2 * MARK), "left" if out > 0 else "right"),
+            ((end, -2 * MARK - CAPITALS - 1.5), "middle"),
+            ((end, 1.5), "middle"),
+        ]
+        free = (
+            choice
+            for choice in choices
+            if not any(meets(line, text_box(choice[0], "S", CAPITALS, choice[1])) for line in taken)
+        )
+        place, anchor = next(free, choices[0])
+        pen.text(place, "S", height=CAPITALS, anchor=anchor)
 
 
 def _holes(sizes: Sizes, view: View, part: Part) -> None:

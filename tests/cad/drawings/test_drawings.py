@@ -14,17 +14,23 @@ import trimesh
 from ezdxf.disassemble import recursive_decompose
 from hypothesis import given
 from hypothesis import strategies as st
+from reportlab.pdfbase.pdfmetrics import stringWidth
+from shapely import LineString, Polygon
+from shapely import box as shapely_box
+from shapely.affinity import rotate, translate
 from svglib.svglib import svg2rlg
 
-from cad.drawings.dimensions import spread
+from cad.drawings.dimensions import angle_between, spread
+from cad.drawings.part import part_of
 from cad.drawings.patterns import number, patterns_of
-from cad.drawings.pen import DIAMETER, TURN, Pen, document_at
+from cad.drawings.pen import CAPITAL, DIAMETER, TURN, Pen, document_at
 from cad.drawings.project import Arc, project
 from cad.drawings.section import HATCH_MM, cut_along_axis, hatching
-from cad.drawings.sheet import A2, A3, Sheet
-from cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
+from cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
+from cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from cad.geometry.holes import rounds_of
 from cad.layout.all_joints import joints_of
+from cad.layout.fits import OnSheet, ToleratedDiameter
 from cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)
@@ -378,3 +384,59 @@ def measured_box():
     own.text((20, 20), "2x Ø40 <90°>", anchor="middle", angle=90.0)
     own.head((0, 0), 0.0)
     return pen.box()
+
+
+def struck(sheet):
+    """Words that a line of the sheet goes through, by the widths of the PDF's own font."""
+    shown = list(drawn_on(sheet))
+    lines = [LineString([(p.x, p.y) for p in o.path.flattening(0.1)]) for o in shown if isinstance(o, Outline)]
+    found = []
+    for words in (item for item in shown if isinstance(item, Words)):
+        width = stringWidth(words.text, "Helvetica", words.height / CAPITAL)
+        left = -{"left": 0.0, "middle": 0.5, "right": 1.0}[words.anchor] * width
+        room = rotate(shapely_box(left, 0.0, left + width, words.height), words.angle, origin=(0, 0))
+        if any(line.intersects(translate(room, *words.at)) for line in lines):
+            found.append(words.text)
+    return found
+
+
+def sheet_with(solid, *, lidar_axis=None, fits=()):
+    part = part_of("part", solid.Solids()[0], lidar_axis, OnSheet(fits), [])
+    return sheet_of(part, Title((("part", "part"),), ("A note.",)), "part")
+
+
+def test_what_is_told_of_a_bar_stands_beyond_the_axis():
+    bar = box((-52, -10, 0), (-12, 10, 20)).cut(upright(1.65, -1, 21, -42, 0), upright(1.65, -1, 21, -26, 0))
+    sheet = sheet_with(bar)
+    assert "2x Ø3.3 THRU" in [words.text for words in drawn_on(sheet) if isinstance(words, Words)]
+    assert struck(sheet) == []
+
+
+def test_the_letters_of_a_section_stand_beside_the_leaders():
+    shaft = upright(14, 0, 4).fuse(upright(6, 0, 112))
+    crossed = shaft.cut(*(cylinder(1.25, (9 * x, -9, 106), (-x, 1, 0), 26) for x in (-1, 1)))
+    sheet = sheet_with(crossed, fits=(ToleratedDiameter(12.0, False, "0/-0.011", "h6"),))
+    assert [words.text for words in drawn_on(sheet) if isinstance(words, Words)].count("S") == 2
+    assert struck(sheet) == []
+
+
+@pytest.mark.parametrize("angle_deg", [2.0, 6.0, 20.0, 55.0, 88.0])
+def test_an_angle_is_told_beside_its_arms(angle_deg):
+    document = document_at(1.0)
+    pen = Pen(document.modelspace(), 1.0, (100, 100))
+    turned = np.pi / 2 + np.radians(angle_deg)
+    angle_between(pen, (0, 0), np.pi / 2, turned, 12.0, f"{angle_deg:g}°")
+    sheet = Sheet(document, 1.0, A3, "angle")
+    assert struck(sheet) == []
+    heads = [item.path for item in drawn_on(sheet) if isinstance(item, Outline) and item.filled]
+    first, second = (Polygon([(p.x, p.y) for p in path.flattening(0.1)]) for path in heads)
+    assert not first.intersects(second)
+
+
+def test_the_optical_centre_is_named_where_nothing_is_drawn():
+    plate = box((-20, -20, -60), (-12, 20, 30)).cut(
+        cylinder(1.5, (-30, 10, 10), X, 30), cylinder(1.5, (-30, -10, 10), X, 30)
+    )
+    sheet = sheet_with(plate.fuse(upright(15, -70, -50)), lidar_axis=X)
+    assert "OPTICAL CENTRE" in [words.text for words in drawn_on(sheet) if isinstance(words, Words)]
+    assert struck(sheet) == []
