@@ -18,6 +18,7 @@ from cad.geometry.inertia import Inertial
 from cad.layout.drive import Cuboid, DriveLayout, Rod
 from design.arrays import Array
 from design.frames import roll_pitch_yaw
+from design.motion import Sweep
 from design.scanner import Scanner
 
 
@@ -30,7 +31,7 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         bodies: mass properties of the links servo, rot (rotation frame) and laser (laser frame).
         meshes: names of the parts whose STL files belong to the links servo and rot.
     """
-    angles, servo = scanner.angles, scanner.servo
+    angles = scanner.angles
     lines = [
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
@@ -39,10 +40,7 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
-        *_joint("spin_joint", "continuous", "servo", "rot", np.eye(4))[:-1],
-        '    <axis xyz="0 0 1"/>',
-        f'    <limit effort="{servo.stall_torque_nm:g}" velocity="{servo.no_load_rpm * math.pi / 30:.6g}"/>',
-        "  </joint>",
+        *_spin_joint(scanner),
         *_joint("laser_mount", "fixed", "rot", "laser", angles.T_rot_laser()),
         "</robot>",
     ]
@@ -55,6 +53,22 @@ def _joint(name: str, kind: str, parent: str, child: str, T: Array) -> list[str]
         f'    <parent link="{parent}"/>',
         f'    <child link="{child}"/>',
         f'    <origin xyz="{_row(T[:3, 3])}" rpy="{_row(roll_pitch_yaw(T[:3, :3]))}"/>',
+        "  </joint>",
+    ]
+
+
+def _spin_joint(scanner: Scanner) -> list[str]:
+    """It turns on and on, but where a cable without a ring holds it between the ends of its sweep."""
+    servo, motion = scanner.servo, scanner.angles.motion
+    kind, ends = "continuous", ""
+    if isinstance(motion, Sweep) and scanner.slip_ring is None:
+        lower, upper = (math.radians(limit) for limit in motion.limits_deg)
+        kind, ends = "revolute", f'lower="{lower:.6g}" upper="{upper:.6g}" '
+    speed = f"{servo.no_load_rpm * math.pi / 30:.6g}"
+    return [
+        *_joint("spin_joint", kind, "servo", "rot", np.eye(4))[:-1],
+        '    <axis xyz="0 0 1"/>',
+        f'    <limit {ends}effort="{servo.stall_torque_nm:g}" velocity="{speed}"/>',
         "  </joint>",
     ]
 

@@ -1,5 +1,6 @@
 """`scanner.urdf` loads in a URDF library and moves like the angle set."""
 
+import io
 from xml.etree import ElementTree
 
 import numpy as np
@@ -57,6 +58,26 @@ def test_the_chain_is_that_of_the_angle_set(name, tmp_path):
         robot.update_cfg({"spin_joint": joint})
         np.testing.assert_allclose(robot.get_transform("laser", "world"), angles.T_world_laser(joint), atol=1e-6)
         np.testing.assert_allclose(robot.get_transform("rot", "world"), angles.T_world_rot(joint), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("ring", "motion", "ends"),
+    [
+        ("UH1256-02-0610-06S", {"mode": "spin", "period_s": 18.0}, None),
+        ("UH1256-02-0610-06S", {"mode": "sweep", "limits_deg": (-90.0, 80.0), "period_s": 12.0}, None),
+        (None, {"mode": "sweep", "limits_deg": (-90.0, 80.0), "period_s": 12.0}, (-90.0, 80.0)),
+    ],
+)
+def test_a_scanner_whose_cable_would_wind_up_has_ends_and_no_other(ring, motion, ends):
+    setting = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=50)
+    angles = AngleSet(task="ends", sensor="UTM-30LX", servo="MX-64R", slip_ring=ring, motion=motion, angles_deg=setting)
+    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    bodies = dict.fromkeys(("servo", "rot", "laser"), ANY_BODY)
+    text = urdf_text(scanner, drive_of(scanner), bodies, {"servo": [], "rot": []})
+    joint = yourdfpy.URDF.load(io.StringIO(text)).joint_map["spin_joint"]
+    assert joint.type == ("continuous" if ends is None else "revolute")
+    if ends is not None:
+        np.testing.assert_allclose(np.degrees((joint.limit.lower, joint.limit.upper)), ends, atol=1e-3)
 
 
 def test_meshes_are_found_beside_the_file_and_are_metres(made):
