@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from cad.assembly.assembly import Assembly
 from cad.layout.belt.stack import BeltStack
+from cad.layout.cables.leads import RotorLead
 from cad.layout.cables.words import leads_words, standing_words
 from cad.layout.joints import screws
 from cad.layout.names import (
@@ -43,12 +46,6 @@ LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
 STANDING_TITLE = "Cables that stand still"
 STANDING_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on one is not felt at its plug"
-CAPSULE_STEP = Step(
-    "Capsule into the tower",
-    "Lead the rotor's leads up the shaft and out by one of its windows, and slide the disc into the tower from "
-    f"below until the soft tube sits in the shaft. {screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
-    "turned by hand, the shaft takes the rotor along without slipping",
-)
 
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
@@ -60,7 +57,7 @@ def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
 def _of_bought(assembly: Assembly) -> dict[str, Step]:
     layout, leads, steps = assembly.layout, assembly.leads, {LIDAR: LIDAR_STEP}
     if layout.scanner.slip_ring is not None:
-        steps[RING] = CAPSULE_STEP if isinstance(layout.stack, BeltStack) else RING_STEP
+        steps[RING] = _capsule_step(leads) if isinstance(layout.stack, BeltStack) else RING_STEP
     if any(lead.path is not None for lead in leads):
         steps[ROTOR_LEADS] = Step(LEADS_TITLE, leads_words(layout, leads), LEADS_CHECK)
     if any(lead.path is not None for lead in assembly.standing):
@@ -68,3 +65,16 @@ def _of_bought(assembly: Assembly) -> dict[str, Step]:
     if layout.deck.flat:
         steps[DECK] = ON_DECK
     return steps
+
+
+def _capsule_step(leads: Sequence[RotorLead]) -> Step:
+    """Every cable of the lidar gets its leads by a window that the step of the leads tells, where a way was found."""
+    windows = "its windows"
+    if any(lead.path is not None for lead in leads):
+        windows += f', those of each cable by the one that the step "{LEADS_TITLE}" tells'
+    return Step(
+        "Capsule into the tower",
+        f"Lead the rotor's leads up the shaft and out by {windows}, and slide the disc into the tower from below "
+        f"until the soft tube sits in the shaft. {screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
+        "turned by hand, the shaft takes the rotor along without slipping",
+    )

@@ -50,11 +50,12 @@ def _ties(layout: Layout, laid: Sequence[RotorLead]) -> list[str]:
     """How they are tied."""
     seat, places, said = layout.linkage.hub_tie, tied_at(layout, laid), []
     if seat is not None and HUB in places:
-        way = "in the groove of the tongue, under the bar" if seat.grooved else "over the tongue"
-        said.append(
-            "Pull a cable tie through the two slots of the hub's tongue, "
-            f"{way}, and close it around what leaves the ring below: a pull on it ends there."
+        tie = (
+            "Close the cable tie that waits in the groove of the hub's tongue, under the bar, "
+            if seat.grooved  # laid in with the bar, since none gets under it later
+            else "Pull a cable tie through the two slots of the hub's tongue, over the tongue, and close it "
         )
+        said.append(f"{tie}around what leaves the ring below: a pull on it ends there.")
     elif SHAFT in places:
         said.append("Close a cable tie around shaft and bundles, just below the hub: a pull on them ends there.")
     elif NECK in places:

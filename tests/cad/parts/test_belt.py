@@ -336,6 +336,8 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     (tie,) = [row for part, row in rows.items() if "cable tie" in part]  # the capsule needs none
     assert (tie.quantity, tie.note.split(";")[0]) == (2, "1 at the shaft, 1 at the foot of the mount")
     assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
+    assert len(set(re.findall(r"by the shaft's window at (\d+) deg", text))) == 2
+    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" tells' in text
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
+from cad.assembly.steps import steps_of
 from cad.checks.remarks import left_out_of
 from cad.layout.cables.leads import tied_mm
 from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
 from cad.layout.cables.ties import foot_ties_of
 from cad.layout.cables.words import tied_at
 from cad.layout.deck import FOOT_THICKNESS
-from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, HUB_TIE, PLATE_TIE
+from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
 
 TIE = (2.5, 1.1)  # width and thickness
 
@@ -82,6 +83,15 @@ def test_a_tie_is_counted_for_every_tongue_and_for_the_foot_of_a_mount(tied):
     plates = 0 if PLATE_TIE in left_out else len(layout.scanner.lidar.cable_y_mm)
     foot = 0 if layout.deck.flat else 1
     assert tied_at(layout, tied.leads) == ["hub"] + plates * ["plate"] + foot * ["foot of the mount"]
+
+
+def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied):
+    steps = dict(steps_of(tied))
+    words = steps[ROTOR_LEADS].words
+    waits = COUNTERWEIGHT in steps and "First lay a cable tie" in steps[COUNTERWEIGHT].words
+    assert waits == tied.layout.linkage.hub_tie.grooved
+    assert ("Close the cable tie that waits in the groove" in words) == waits
+    assert ("Pull a cable tie through the two slots of the hub's tongue" in words) != waits
 
 
 def test_what_has_no_tongue_is_told(parts_of):
