@@ -202,7 +202,7 @@ def _wiring(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomI
         yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
     if scanner.slip_ring is not None:
         circuits = scanner.slip_ring.circuits
-        part = "plug, socket and heat shrink for the leads of the slip ring"
+        part = "plug, socket, crimps and heat shrink for the leads of the slip ring"
         yield BomItem(
             "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
         )
@@ -293,10 +293,11 @@ def _with_it(drive: DriveLayout, joints: list[Joint]) -> Iterator[BomItem]:
     if any("retaining ring" in part for part, _ in drive.needs):
         note = "reads 0.01 mm; price unknown"
         yield BomItem("tool", "dial indicator on a stand", quantity=1, source="assembly.md", note=note)
-    if any(part.startswith(("cable tie", "a soft tube")) for part, _ in drive.needs) or any(
-        joint.inserts for joint in joints
-    ):
-        yield BomItem("tool", "soldering iron", quantity=1, source="assembly.md", note="leads, inserts; price unknown")
+    if any(part.startswith(("cable tie", "a soft tube")) for part, _ in drive.needs):
+        note = "for the leads; price unknown"
+        yield BomItem("tool", "crimping pliers", quantity=1, source="assembly.md", note=note)
+    if any(joint.inserts for joint in joints):
+        yield BomItem("tool", "soldering iron", quantity=1, source="assembly.md", note="for the inserts; price unknown")
 
 
 def _ranged(item: BomItem) -> BomItem:

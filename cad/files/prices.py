@@ -49,6 +49,7 @@ EACH: dict[str, tuple[tuple[str, float, float], ...]] = {
         ("hexagon keys", 8.0, 25.0),
         ("torque", 30.0, 150.0),
         ("indicator", 25.0, 70.0),
+        ("crimping", 15.0, 50.0),
         ("soldering", 20.0, 70.0),
         ("meter", 15.0, 60.0),
     ),

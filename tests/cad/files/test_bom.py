@@ -75,6 +75,14 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
     assert all(row["number"] or row["supplier"] for row in rows if row["kind"] in ("bought", "screw", "nut"))
 
 
+def test_the_tools_are_those_that_the_steps_ask_for(rows, made):
+    steps = (made.folder / "assembly.md").read_text(encoding="utf-8")
+    tools = {row["part"] for row in rows if row["kind"] == "tool"}
+    assert ("join the leads" in steps) == ("crimping pliers" in tools)
+    assert ("heat-set insert" in steps) == ("soldering iron" in tools)
+    assert any("crimps" in row["part"] for row in rows)
+
+
 def test_a_spare_of_each_fuse_is_counted_and_paid(rows, made):
     wiring = (made.folder / "wiring.md").read_text(encoding="utf-8")
     for row in rows:
