@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from statistics import median_high
 from typing import Literal
 
 import numpy as np
@@ -169,7 +170,7 @@ def assemble_recording(
     width = int(source.beams.max()) if organised else 0
     counts: Counter[int] = Counter()
     written = 0
-    clouds: list[Path] = []
+    clouds: dict[Path, int] = {}  # with their scans
 
     def rows_of(block: Block) -> NDArray[np.void]:
         block, with_joint = beams.limited(block), "joint_rad" in columns
@@ -182,7 +183,8 @@ def assemble_recording(
 
     for which, tagged in groupby(_by_cloud(source.blocks(), cloud_from_rows), key=itemgetter(0)):
         path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
-        comments = _comments(source, angles, width, int(np.sum(cloud_from_rows == which)), lag_s, poses is not None)
+        scans = int(np.sum(cloud_from_rows == which))
+        comments = _comments(source, angles, width, scans, lag_s, poses is not None)
         before = counts[Verdict.POINT]
         with PlyWriter(path, fields, comments) as cloud:
             for _ in ahead(cloud.write, (rows_of(block) for _, block in tagged)):
@@ -193,7 +195,7 @@ def assemble_recording(
         if counts[Verdict.POINT] == before:
             path.unlink()
         else:
-            clouds.append(path)
+            clouds[path] = scans
             written += cloud.rows
     beam_count = int(source.beams.sum())
     return AssembleSummary(
@@ -206,7 +208,10 @@ def assemble_recording(
         height=source.beams.size,
         padding=width * source.beams.size - beam_count if width else 0,
         left_out=_left_out(counts),
-        said=(said, *_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
+        said=(
+            *(said, *_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
+            *_about_slivers(clouds, per),
+        ),
     )
 
 
@@ -281,6 +286,15 @@ def _about_own_body(own_body: OwnBody | None, source: Recording) -> Iterator[str
     bearing_rad = next(iter(source.scans())).bearing_rad
     if unknown := own_body.unknown(bearing_rad):
         yield f"warning: {unknown} of {bearing_rad.size} beams have no bearing in the own-body mask: not masked"
+
+
+def _about_slivers(clouds: dict[Path, int], per: Per) -> Iterator[str]:
+    """Clouds of what was left over where the recording began or ended: no place can be told for them alone."""
+    usual = median_high(clouds.values()) if clouds else 0
+    of = f"the usual {usual:,} scans of {'a turn' if per == 'turn' else 'half a turn'}"
+    for path, scans in clouds.items():
+        if scans < usual / 2:
+            yield f"warning: {path.stem} holds {scans:,} of {of}: leave it out where clouds are registered"
 
 
 def _comments(source: Recording, angles: AngleSet, width: int, scans: int, lag_s: float, on_map: bool) -> list[str]:

@@ -185,6 +185,9 @@ def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path)
         assert [part.size for part in rows] == [20 * height for height in heights]
         assert b"".join(part.tobytes() for part in rows) == read_ply(tmp_path / "w.ply").tobytes()
         assert f"comment height {heights[-1]}\n".encode() in summary.clouds[-1].read_bytes()[:400]
+        told = [line.partition(": leave it out")[0] for line in summary.said if "leave it out" in line]
+        small = ["warning: half_005 holds 2 of the usual 10 scans of half a turn"]
+        assert told == (small if per == "half" else []), "12 of 20 scans are more than half of a turn"
 
 
 def test_a_turn_without_a_point_is_no_cloud(tmp_path):
