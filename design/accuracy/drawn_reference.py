@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
 from design.accuracy.drawn_regions import Layer, drawn_in, layers_of
 from design.arrays import Array, Ints, Setting
-from design.concurrency.compiled import njit
 from design.motion import Spin, StopAndGo, Sweep
 from design.task.task import LoadedTask
 

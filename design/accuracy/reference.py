@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from numba import njit
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 from scipy.special import roots_legendre
 
 from design.accuracy.drawn_reference import counted_J
 from design.arrays import Array, Setting
-from design.concurrency.compiled import njit
 from design.objective.problem import Problem
 from design.sphere.polar_rule import breaks_of
 from design.task.task import LoadedTask

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, Int, Int64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array
-from design.concurrency.compiled import njit
 from design.concurrency.parallel import in_chunks
 
 MOST_ROWS = 1440

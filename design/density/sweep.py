@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Ints
-from design.concurrency.compiled import njit
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
 from design.density.phase_walk import TIE, half_width, meetings, sort_by_buckets

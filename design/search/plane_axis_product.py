@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Ints, Mask
 from design.concurrency.blocked_product import blocked_product, product
-from design.concurrency.compiled import njit
 from design.concurrency.parallel import in_chunks
 from design.objective.named_objectives import Moment, Objective
 from design.search.constraints import Constraint

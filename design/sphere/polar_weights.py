@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array
-from design.concurrency.compiled import njit
 from design.concurrency.parallel import in_chunks
 from design.errors import TaskError
 from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float32, Float64, UInt8
+from numba import njit
 from numpy import ndarray
 
 from design.angles import AngleSet
 from design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
-from design.concurrency.compiled import njit
 from design.concurrency.parallel import in_chunks
 from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Floats, Ints
-from design.concurrency.compiled import njit
 from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping
 from firmware_io.calibration.tiles import FlatTiles

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Floats, Ints
-from design.concurrency.compiled import njit
 from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
 
 _Q = COUNT

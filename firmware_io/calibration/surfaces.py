@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Floats, Ints, Mask
-from design.concurrency.compiled import njit
 from design.errors import RecordingError
 from firmware_io.calibration.model import Mount, beam_rays
 from firmware_io.calibration.solve import Grouping

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Array, Floats, Ints
-from design.concurrency.compiled import njit
 from design.errors import RecordingError
 from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
 from firmware_io.samples import AxisCurve

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64, UInt8
+from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
@@ -24,7 +25,6 @@ from design import frames
 from design.angles import AngleSet
 from design.arrays import Floats, Times
 from design.camera import Camera
-from design.concurrency.compiled import njit
 from design.errors import TaskError
 from design.task.task import LoadedTask
 from firmware_io.clouds.ply import PlyWriter, read_header, read_ply

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int8
+from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
 from design.arrays import Floats
-from design.concurrency.compiled import njit
 from design.errors import RecordingError
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100

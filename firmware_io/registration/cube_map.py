@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
+from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
 from design.arrays import Floats
-from design.concurrency.compiled import njit
 
 
 @njit(cache=True)

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float64, Int64
+from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
 from design.arrays import Floats
-from design.concurrency.compiled import njit
 from firmware_io.registration.cube_map import cells_of, solid_angles_sr
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds

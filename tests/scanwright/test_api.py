@@ -42,15 +42,6 @@ def test_loading_a_task_loads_neither_kernel_nor_compiler_nor_pictures():
     assert not loaded & {"cadquery", "OCP", "scipy.spatial", "numba", "matplotlib", "trimesh"}
 
 
-def test_a_kernel_runs_without_the_linear_algebra_of_scipy_and_others_keep_it():
-    kernel = "from design.density.phase_walk import half_width; half_width(0.1, 0.9, 0.1, 0.9, 0.1, 0.9)"
-    loaded = loaded_after(f"import design.search.optimum; {kernel}")
-    assert "numba.np.arraymath" in loaded
-    assert "scipy.linalg" not in loaded
-    product = "import numba, numpy as np; assert numba.njit(lambda a: a @ a)(np.eye(2) * 3).sum() == 18"
-    assert "scipy.linalg" in loaded_after(f"import design.concurrency.compiled; {product}")
-
-
 def test_every_public_name_is_a_documented_function_and_no_other_is_there():
     assert set(sw.__all__) == {name for name, value in vars(api).items() if isfunction(value)}
     for name in sw.__all__:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
+from numba import njit
 from numpy import ndarray
 
 from design.arrays import Float32s, Floats, Ints
-from design.concurrency.compiled import njit
 
 UNKNOWNS = 13
 """Three of the plane, six of the pose (rotation vector [rad], translation [m]), four of the calibration."""
