@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from design.errors import TaskError
+from design.errors import TaskError, suggest
 from design.record import read_toml
 
 
@@ -21,7 +21,13 @@ def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], P
         TaskError: there is none, or it is not TOML.
     """
     source = _found(path, shipped, what)
-    return read_toml(source, f"the {what} file"), source
+    try:
+        return read_toml(source, f"the {what} file"), source
+    except TaskError as error:
+        if not isinstance(error.__cause__, FileNotFoundError):
+            raise
+        beside = [str(other) for other in source.parent.glob("*.toml")]
+        raise TaskError(f"{path}: no such {what} file{suggest(str(path), [*beside, *names_in(shipped)])}") from error
 
 
 def names_in(shipped: Path) -> list[str]:
@@ -44,4 +50,5 @@ def _found(path: Path, shipped: Path, what: str) -> Path:
         raise TaskError(f"{path}: this is no regular file, so no {what} file")
     if path.is_symlink():
         raise TaskError(f"{path}: this is a link that leads to no file")
-    raise TaskError(f"{path}: no such {what} file, and no shipped {what} of that name: {', '.join(names_in(shipped))}")
+    known = suggest(path.name, names_in(shipped))
+    raise TaskError(f"{path}: no such {what} file, and no shipped {what} of that name{known}")

@@ -240,9 +240,18 @@ def test_a_byte_order_mark_is_no_statement_and_utf_16_is_named(tmp_path):
         load_task(path)
 
 
-def test_an_unknown_task_name_lists_the_shipped_ones(tmp_path):
-    with pytest.raises(TaskError, match="ceiling, ground_ahead, indoor_urg, low_cost, pitching, rolling, uniform"):
-        load_task(tmp_path.relative_to(tmp_path.parent) / "ground")
+def test_a_task_that_is_not_there_gets_the_one_that_was_meant_or_those_that_are(tmp_path):
+    (tmp_path / "my_task.toml").write_text(BASE)
+    shipped = "ceiling, ground_ahead, indoor_urg, low_cost, pitching, rolling, uniform"
+    for path, advice in (
+        (Path("ground"), "no shipped task of that name; did you mean 'ground_ahead'?"),
+        (Path("quite_another"), shipped),
+        (Path("ground_ahead.toml"), "no such task file; did you mean 'ground_ahead'?"),
+        (tmp_path / "my_tsk.toml", f"no such task file; did you mean '{tmp_path / 'my_task.toml'}'?"),
+        (Path("none/there.toml"), f"no such task file; known: capsule_ring, {shipped}"),
+    ):
+        with pytest.raises(TaskError, match=re.escape(advice)):
+            load_task(path)
 
 
 def test_what_is_there_and_is_no_task_file_is_called_what_it_is(tmp_path):
