@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cad.layout.cables.joint import LENGTH, WALL
+from cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
 from cad.layout.cables.leads import leads_of, outlet_mm
 from cad.layout.cables.path import Path
 from cad.layout.cables.room import room_of
@@ -104,6 +104,34 @@ def test_joints_touch_neither_the_hub_nor_the_other_lead(setting):
             if other is not lead:
                 nearest = np.linalg.norm(points[:, None] - other.path.points(0.5), axis=2).min()
                 assert nearest > thick + other.diameter / 2
+
+
+class Wall:
+    """Room behind a wall across y: nothing with y below it is free."""
+
+    def __init__(self, at):
+        self.at = at
+
+    def free(self, points, half, gap):
+        return points[:, 1] - half - gap > self.at
+
+
+def test_a_joint_goes_as_far_from_the_middle_as_it_must_and_stays_there_where_nothing_is_free():
+    path = Path(((0, 0, 0), (0, 0, 20), (0, 60, 20)), 5.0)  # the last piece is straight from y = 5 to 60
+    half, middle = 1.0, np.array([0, 32.5, 20])
+    for wall, off in ((-10.0, 0.0), (30.0, 4.9), (100.0, 0.0)):
+        joint = joint_of(path, half, Wall(wall), [])
+        points = joint.points()
+        away = joint.middle[1] - middle[1]
+        assert off == 0.0 or points[:, 1].min() > wall + half + WALL
+        assert off - 0.1 <= away < off + STEP + 0.1
+        np.testing.assert_allclose(joint.middle[[0, 2]], middle[[0, 2]], atol=1e-12)
+    beside = np.array([[0.0, y, 20.0] for y in np.arange(20.0, 35.0)])
+    clear = joint_of(path, half, Wall(-10.0), [(beside, 3.0)]).points()[:, 1]
+    assert clear.min() > 34.0 + 3.0 or clear.max() < 20.0 - 3.0
+    assert joint_of(Path(((0, 0, 0), (0, 0, 20), (0, 16, 20)), 5.0), half, Wall(-10.0), []) is None, (
+        "11 mm are too short"
+    )
 
 
 def test_where_no_way_is_wide_enough_there_is_none():
