@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from design.angles import AngleSet
 from design.atomic_file import check_place
+from design.catalogue.catalogue import load_catalogue
+from design.catalogue.products import Lidar
 from design.concurrency.ahead import ahead
 from design.errors import RecordingError, suggest
 from firmware_io.assembly.axis_curve import axis_curve
@@ -40,6 +42,7 @@ _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
+_STEP_ERROR = 0.02  # of a whole number of the sensor's steps: clusters are told as such, rounded
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
 
@@ -209,7 +212,9 @@ def assemble_recording(
         padding=width * source.beams.size - beam_count if width else 0,
         left_out=_left_out(counts),
         said=(
-            *(said, *_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
+            said,
+            *_about_sensor(source, angles.sensor),
+            *(*_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
             *_about_slivers(clouds, per),
         ),
     )
@@ -251,6 +256,30 @@ def _by_cloud(found: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Ite
 
 def _left_out(counts: Counter[int]) -> dict[str, int]:
     return {reason.name.lower(): counts[reason] for reason in Verdict if reason and counts[reason]}
+
+
+def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
+    """Scans that the sensor of the angle set cannot have made: the cloud would be as whole, and bent."""
+    named = load_catalogue().products.get(sensor)
+    if not isinstance(named, Lidar):
+        return
+    scan = next(iter(source.scans()))
+    own_deg, found_deg = np.degrees(named.bearings_rad()), np.degrees(np.sort(scan.bearing_rad))
+    if found_deg.size < 2:
+        return
+    step_deg, grid_deg = 360 / named.steps_per_turn, math.degrees(abs(scan.angle_increment_rad))
+    if own_deg.size >= named.steps_per_turn - 1:  # drivers give what turns all around any grid, but no gap
+        other = np.ptp(found_deg) < 0.9 * 360
+    else:
+        steps = grid_deg / step_deg
+        beyond = found_deg[0] < own_deg[0] - grid_deg or found_deg[-1] > own_deg[-1] + grid_deg
+        other = beyond or abs(steps - max(round(steps), 1)) > _STEP_ERROR * steps
+    if other:
+        yield (
+            f"warning: its beams go from {found_deg[0]:.4g} to {found_deg[-1]:.4g} deg, {grid_deg:.3g} deg apart, "
+            f"those of {sensor} from {own_deg[0]:.4g} to {own_deg[-1]:.4g} deg, {step_deg:.3g} deg apart: are these "
+            "the angles of another scanner?"
+        )
 
 
 def _about_gaps(source: Recording) -> Iterator[str]:

@@ -77,6 +77,34 @@ def write(path, scans, log):
     return path
 
 
+@pytest.mark.parametrize(
+    ("sensor", "first_deg", "last_deg", "beams", "other"),
+    [
+        ("UTM-30LX", -135, 135, 1081, False),
+        ("UTM-30LX", -135, 134.25, 360, False),  # clusters of three
+        ("UTM-30LX", -90, 90, 721, False),
+        ("UTM-30LX", -119.5, 119.5, 681, True),  # a URG-04LX
+        ("UTM-30LX", -180, 179.5, 720, True),
+        ("UTM-30LX", 0, 0, 1, False),
+        ("STL27L", -180, 179, 360, False),  # a driver's own grid
+        ("STL27L", -135, 135, 1081, True),
+        ("nobody's", -135, 135, 1081, False),
+    ],
+)
+def test_the_beams_of_another_sensor_are_told(tmp_path, sensor, first_deg, last_deg, beams, other):
+    step_rad = np.radians((last_deg - first_deg) / max(beams - 1, 1))
+    scan = a_scan(
+        beams=beams, angle_min_rad=np.radians(first_deg), angle_increment_rad=step_rad, time_increment_s=0.02 / beams
+    )
+    recording = write(tmp_path / "r.mcap", [scan], a_log(0.0, 1.0))
+    angles = angle_set().model_copy(update={"sensor": sensor})
+    said = [
+        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").said if "another scanner" in line
+    ]
+    assert len(said) == other
+    assert all(sensor in line and f"from {first_deg} to {last_deg:.4g} deg" in line for line in said)
+
+
 @settings(max_examples=50, deadline=None)
 @given(angles=any_angles, seed=st.integers(0, 99), start=angle_deg, stop=angle_deg, lag_s=st.floats(-0.5, 0.5))
 def test_the_slow_obvious_loop_agrees(angles, seed, start, stop, lag_s):
