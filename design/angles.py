@@ -28,7 +28,7 @@ from design import frames
 from design.arrays import Pose, Rotation, Setting, Vector
 from design.errors import TaskError
 from design.motion import Motion
-from design.record import Record, explain, read_text
+from design.record import A_FILE_FOR_A_FOLDER, Record, explain, read_text
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
@@ -114,8 +114,15 @@ def load_angles(path: str | Path) -> AngleSet:
     Raises:
         TaskError: the file is missing, is not JSON, or is not an angle set.
     """
+    path = Path(path)
     try:
-        text = read_text(Path(path))
+        text = read_text(path)
+    except IsADirectoryError as error:
+        within = path / "angles.json"
+        advice = f": name {within}" if within.is_file() else " without an angles.json, not an angle set"
+        raise TaskError(f"{path}: this is a folder{advice}") from error
+    except NotADirectoryError as error:
+        raise TaskError(f"{path.parent}: {A_FILE_FOR_A_FOLDER} {path.name}") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot read the angle set: {error.strerror}") from error
     except ValueError as error:

@@ -30,6 +30,10 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
+A_FILE_FOR_A_FOLDER = "this is a file; name the folder of a build, which holds"
+"""What is told to those who name a file of a build folder where the folder is meant; a file's name follows."""
+
+
 def read_text(path: Path) -> str:
     """The text of a file in UTF-8, also where it begins with a byte order mark, as Windows' Notepad writes it.
 
@@ -55,6 +59,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(read_text(path))
+    except NotADirectoryError as error:
+        raise TaskError(f"{path.parent}: {A_FILE_FOR_A_FOLDER} {path.name}") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
     except RecursionError as error:

@@ -1,6 +1,7 @@
 """The angle set: what the file says is what the frames do."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from design.angles import STANDARD_DEG, Angles, AngleSet, load_angles
 from design.errors import TaskError
+from design.task.task import load_task
 
 degrees = st.floats(-360, 360)
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
@@ -69,6 +71,19 @@ def test_every_key_of_the_contract_survives_a_round_trip(tmp_path):
     assert json.loads(one.to_json()) == full_table()
     assert list(json.loads(one.to_json())) == list(full_table())
     assert one.to_json().endswith("}\n")
+
+
+def test_a_folder_for_the_file_and_a_file_for_the_folder_are_told_what_to_name(tmp_path):
+    with pytest.raises(TaskError, match=r"this is a folder without an angles\.json, not an angle set"):
+        load_angles(tmp_path)
+    path = written(tmp_path, full_table())
+    with pytest.raises(TaskError, match=f"^{re.escape(f'{tmp_path}: this is a folder: name {path}')}$"):
+        load_angles(tmp_path)
+    says = re.escape(f"{path}: this is a file; name the folder of a build, which holds ")
+    with pytest.raises(TaskError, match=f"^{says}angles.json$"):
+        load_angles(path / "angles.json")
+    with pytest.raises(TaskError, match=f"^{says}task.toml$"):
+        load_task(path / "task.toml")
 
 
 def test_what_a_file_may_leave_out_is_zero_or_null(tmp_path):
@@ -202,7 +217,7 @@ def test_an_unreadable_file_is_one_line(tmp_path):
     (tmp_path / "latin.json").write_bytes(b"\xff\xfe")
     for path, reason in [
         (tmp_path / "none.json", "No such file"),
-        (tmp_path, "directory"),
+        (tmp_path, "folder"),
         (tmp_path / "latin.json", "UTF-8"),
     ]:
         with pytest.raises(TaskError, match=reason) as caught:
