@@ -36,6 +36,7 @@ STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
 WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
 FASTEST_RPM = 120.0
 SWEEP_RAD = 4 * math.pi
+BACK_RAD = 1.0  # farther than an axis that turns on for ever swings
 LEAST_RAD = math.radians(7.0)
 
 
@@ -176,14 +177,22 @@ def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: A
         yield f"angles jump by {np.median(wraps):.4g}, a whole turn in {other}: is the unit {other}?"
         return
     moved_rad, seconds = np.abs(np.diff(log.position_rad)), np.diff(log.time_ns) / 1e9
-    travel_rad, span_rad = float(moved_rad.sum()), float(np.ptp(log.position_rad))
+    span_rad, back_rad = float(np.ptp(log.position_rad)), _way_back_rad(log.position_rad)
     fastest_rpm = float(np.median(moved_rad / seconds)) / (2 * math.pi) * 60 if seconds.size else 0.0
     if angle_unit == "rad" and fastest_rpm > FASTEST_RPM:
         yield f"the axis turns at {fastest_rpm:.0f} rpm, faster than any servo: is the unit deg?"
-    elif angle_unit == "rad" and span_rad > SWEEP_RAD and travel_rad > 1.5 * span_rad:
+    elif angle_unit == "rad" and span_rad > SWEEP_RAD and back_rad > BACK_RAD:
         yield f"the axis goes to and fro over {span_rad / (2 * math.pi):.1f} turns: is the unit deg?"
     elif angle_unit == "deg" and 0 < span_rad < LEAST_RAD:
         yield f"the axis moves over {math.degrees(span_rad):.2g} deg only: is the unit rad?"
+
+
+def _way_back_rad(position_rad: Floats) -> float:
+    """How far the axis ever was behind where it had been, on the way that it goes on the whole; none if empty."""
+    if not position_rad.size:
+        return 0.0
+    onward = position_rad if position_rad[-1] >= position_rad[0] else -position_rad
+    return float(np.max(np.maximum.accumulate(onward) - onward))
 
 
 def _nanoseconds(text: str, scale: int) -> int:

@@ -328,6 +328,8 @@ UNITS = {
         lambda k: 30 + 29.5 * np.sin(k / 40),
         "to and fro over 9.4 turns: is the unit deg?",
     ),
+    "far out, a little back": ("rad", lambda k: 0.2 * min(k, 560 - k), "over 8.9 turns: is the unit deg?"),
+    "on and on, not quite even": ("rad", lambda k: 0.3 * k + 0.4 * np.sin(k), ""),
     "hardly moves": ("deg", lambda k: np.sin(k / 30), "over 2 deg only: is the unit rad?"),
     "rad": ("rad", lambda k: (k * 0.05) % (2 * np.pi), ""),
     "deg": ("deg", lambda k: (k * 3.1 + 0.2) % 360, ""),
