@@ -46,14 +46,14 @@ def at_most(
     fails, may_fail = value > limit, value + (doubt or 0.0) > limit
     severity: Severity = "error" if fails else "warning" if may_fail else "pass"
     relation = "over" if fails else "of"
-    message = f"{where}: {what}: {doubted(value, doubt)} {unit}, {relation} {limit:.3g}"
+    message = f"{where}: {what}: {doubted(value, doubt)} {unit}, {relation} {figures(limit)}"
     return Check(kind, severity, tidy(value), tidy(limit), unit, where, message)
 
 
 def at_least(kind: str, value: float, limit: float, unit: str, where: str, what: str) -> Check:
     """A check that fails below its limit."""
     fails = value < limit
-    message = f"{where}: {what}: {value:.3g} {unit}, {'under' if fails else 'at least'} {limit:.3g}"
+    message = f"{where}: {what}: {figures(value)} {unit}, {'under' if fails else 'at least'} {figures(limit)}"
     return Check(kind, "error" if fails else "pass", tidy(value), tidy(limit), unit, where, message)
 
 
@@ -78,7 +78,13 @@ def horn_check(scanner: Scanner, moment_nm: float, what: str) -> Check:
 
 def doubted(value: float, doubt: float | None) -> str:
     """A value, and how far it may be off where that is told."""
-    return f"{value:.3g}" if doubt is None else f"{value:.3g} +- {doubt:.1g}"
+    return figures(value) if doubt is None else f"{figures(value)} +- {doubt:.1g}"
+
+
+def figures(value: float) -> str:
+    """Three figures, in full where they stand before the point: nobody reads 8.7e+04 mm3 off a printer."""
+    short = f"{value:.3g}"
+    return f"{float(short):,.0f}" if "e+" in short else short
 
 
 def spot(point: Array) -> str:

@@ -250,6 +250,15 @@ def test_a_limit_within_the_doubt_of_a_value_warns():
     assert at_most("k", 1.6, 1.5, "mm", "w", "what", 0.5).severity == "error"
 
 
+def test_large_numbers_are_written_in_full():
+    assert at_most("k", 9.79, 2854.0, "N", "w", "load").message == "w: load: 9.79 N, of 2,850"
+    assert at_most("k", 87_040.0, 4e5, "mm3", "w", "support", 3e-3).message == (
+        "w: support: 87,000 +- 0.003 mm3, of 400,000"
+    )
+    assert at_least("k", 999.7, 1234.5, "mm", "w", "what").message == "w: what: 1,000 mm, under 1,230"
+    assert at_least("k", 1e-5, 0.5, "mm", "w", "what").message == "w: what: 1e-05 mm, under 0.5"
+
+
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
     found = {c.kind: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.3, -0.03))}
