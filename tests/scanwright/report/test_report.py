@@ -1,6 +1,7 @@
 """`report.html`: made of the files alone, whole, the same bytes again, nothing fetched, nothing smuggled in."""
 
 import html
+import json
 import re
 import shutil
 from pathlib import Path
@@ -171,6 +172,14 @@ def test_the_code_of_the_page_asks_for_what_is_there(folder, page):
     assert set(re.findall(r"\bbody\.(\w+)", code)) <= {*shown["bodies"][0], "array", "count", "type"}
     ball = sphere(load_task(Path("ground_ahead")), None).data()
     assert set(re.findall(r"scene\.(\w+)", (PAGE / "sphere.js").read_text())) <= ball.keys()
+
+
+def test_one_of_a_thing_is_not_told_as_many(tmp_path):
+    (tmp_path / "angles.json").write_text(ANGLES.to_json())
+    entries = [{"what": "a", "why": "b", "saved": saved, "unit": "parts"} for saved in (1, 2)]
+    (tmp_path / "left_out.json").write_text(json.dumps({"schema": "scanwright/left_out/1", "left_out": entries}))
+    left_out = Page(report_html(tmp_path)).text["left-out"]
+    assert "1 part" in left_out and "1 parts" not in left_out and "2 parts" in left_out
 
 
 def test_the_table_of_settings_names_the_lowest(page):

@@ -155,6 +155,8 @@ def test_a_phone_needs_no_sideways_scroll(browser, folder):
     page = browser.open((folder / "report.html").as_uri(), 390, 844, device_scale_factor=2, has_touch=True)
     page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
     assert page.evaluate("document.documentElement.scrollWidth") == 390
+    heights = "[...document.querySelectorAll('#sphere-place .mark')].map((mark) => mark.offsetHeight)"
+    assert len(set(page.evaluate(heights)) - {0}) == 1  # no word of the ball is broken at the edge
     assert lilac(shot_of(page, "#canvas")).mean() > 0.01
     small = page.evaluate(
         "[...document.querySelectorAll('p, td, dd, dt, li, summary, label, button')]"
