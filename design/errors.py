@@ -2,6 +2,7 @@
 
     ScanwrightError            wrong input: a line for each fault, exit 2
      +-- TaskError             a task file or a catalogue file is missing, malformed or inconsistent
+     +-- NumericalError        a result fails the program's own check: a fault of Scanwright, not of the input; exit 1
      +-- BuildError            a part, a drawing or a build folder cannot be made as asked
      +-- RecordingError        a recording is unreadable, or lacks what the command needs
      +-- SceneError            a mesh is unreadable, or holds nothing that a beam can hit
@@ -28,6 +29,13 @@ class ScanwrightError(Exception):
 
 class TaskError(ScanwrightError):
     """A task file or a catalogue file is missing, malformed or inconsistent."""
+
+
+class NumericalError(ScanwrightError, ArithmeticError):
+    """A result fails the program's own check: a fault of Scanwright that its users can only report."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(f"{message}; this is a fault of Scanwright: please report it with the task file")
 
 
 class BuildError(ScanwrightError):

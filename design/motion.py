@@ -16,6 +16,7 @@ from design.arrays import Array
 from design.record import Record
 
 SHORTEST_S, LONGEST_S = 1e-3, 600.0
+NARROWEST_SWEEP_DEG = 0.1  # about one step of a servo's encoder
 
 
 class Spin(Record):
@@ -58,8 +59,10 @@ class Sweep(Record):
     @model_validator(mode="after")
     def _can_be_done(self) -> Sweep:
         lower, upper = self.limits_deg
-        if not -180 <= lower <= upper <= 180:
+        if not -180 <= lower < upper <= 180:
             raise ValueError(f"limits_deg = {[lower, upper]} does not rise within -180 .. 180")
+        if upper - lower < NARROWEST_SWEEP_DEG:
+            raise ValueError(f"limits_deg = {[lower, upper]}: a sweep is {NARROWEST_SWEEP_DEG:g} deg wide at least")
         least = 2 * np.sqrt((upper - lower) / self.accel_deg_s2)
         if self.period_s / 2 < least * (1 - 1e-12):
             raise ValueError(

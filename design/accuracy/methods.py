@@ -37,7 +37,7 @@ def by_segments(problem: Problem, angles_rad: Setting, nodes: int) -> float:
 def by_mean_count(problem: Problem, angles_rad: Setting, nodes: int) -> float:
     """As `by_segments`, with g of the mean count: the bound, which cannot see the gaps of a fast scan."""
 
-    def moment_of(moment: Moment, _: Array) -> float:
+    def moment_of(moment: Moment) -> float:
         rule, polar, _ = polar_rule(problem, angles_rad, nodes, moment.field)
         g = moment.g(mean_count(rule.polar_rad, polar, problem.lines, problem.ball_rad))
         return _gathered(moment, g, rule.fine)
@@ -75,10 +75,10 @@ def by_harmonics(problem: Problem, angles_rad: Setting, band: int) -> float:
     basis = np.polynomial.legendre.legvander(z, band)
     degrees = 2 * np.arange(band + 1) + 1
 
-    def moment_of(moment: Moment, table: Array) -> float:
+    def moment_of(moment: Moment) -> float:
         if moment.gathered == "highest":
             raise TaskError("a lowest count is no sum of harmonics")
-        of_g = basis.T @ (w * _zonal(problem, angles_rad, t, moment, table))
+        of_g = basis.T @ (w * _zonal(problem, angles_rad, t, moment))
         of_weight = basis.T @ (w * moment.field.on_circles(axis, t)[0])
         return float((degrees * of_g * of_weight).sum() / (2 * of_weight[0]))
 
@@ -100,7 +100,7 @@ def by_mean_count_swept(problem: Problem, angles_rad: Setting, directions: int) 
     assert problem.sweep is not None
     lines, beams = problem.sweep, problem.beams_rot(angles_rad[2:])
 
-    def moment_of(moment: Moment, _: Array) -> float:
+    def moment_of(moment: Moment) -> float:
         samples = sample_set(moment.field, None, directions, 0)
         turned = samples.directions @ R_world_rot(angles_rad[0], angles_rad[1])
         return _gathered(moment, moment.g(mean_count_swept(turned, beams, lines, problem.ball_rad)), samples.weights)
@@ -131,10 +131,9 @@ def methods_for(problem: Problem) -> dict[str, tuple[Method, str, tuple[int, ...
     return METHODS if problem.sweep is None else SWEPT
 
 
-def _joined(problem: Problem, moment_of: Callable[[Moment, Array], float]) -> float:
-    """J from its moments; each is given with its g of every count."""
-    moments = [moment_of(m, table) for m, table in zip(problem.objective.moments, problem.tables, strict=True)]
-    return float(problem.objective.join(np.array(moments)))
+def _joined(problem: Problem, moment_of: Callable[[Moment], float]) -> float:
+    """J from its moments."""
+    return float(problem.objective.join(np.array([moment_of(moment) for moment in problem.objective.moments])))
 
 
 def _gathered(moment: Moment, g: Float[ndarray, " n"], weight: Float[ndarray, " n"]) -> float:
@@ -142,12 +141,10 @@ def _gathered(moment: Moment, g: Float[ndarray, " n"], weight: Float[ndarray, " 
     return float(g[seen].max() if moment.gathered == "highest" else weight[seen] @ g[seen] / weight[seen].sum())
 
 
-def _zonal(
-    problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"], moment: Moment, table: Array
-) -> Float[ndarray, " n"]:
+def _zonal(problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"], moment: Moment) -> Float[ndarray, " n"]:
     """What a moment gathers at polar angles: the mean of g over the phases, or g of the least count."""
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
-    found = zones(t, polar, azimuth, problem.lines, problem.ball_rad, table)
+    found = zones(t, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
     return moment.g(found.least) if moment.gathered == "highest" else found.mean_g
 
 
@@ -160,9 +157,9 @@ def _from_rings(
 ) -> float:
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
 
-    def moment_of(moment: Moment, table: Array) -> float:
+    def moment_of(moment: Moment) -> float:
         weight = (moment.field.on_circles(axis, t)[0] * width).astype(precision)
-        return _gathered(moment, _zonal(problem, angles_rad, t, moment, table).astype(precision), weight)
+        return _gathered(moment, _zonal(problem, angles_rad, t, moment).astype(precision), weight)
 
     return _joined(problem, moment_of)
 
@@ -174,7 +171,7 @@ def _on_a_grid(
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     scan = scan_at(problem.bearings_rad, joint_rad, angles_rad)
 
-    def moment_of(moment: Moment, _: Array) -> float:
+    def moment_of(moment: Moment) -> float:
         weight = moment.field.weight_at(grid) * np.sqrt(np.maximum(1 - grid[:, 2] ** 2, 0))
         seen = weight > 0
         counts = problem.lines.repeats * count(scan, grid[seen], problem.ball_rad)

@@ -182,7 +182,8 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
     at = np.radians([60.0])
-    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g[0])
+    g = problem.objective.moments[0].g
+    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, g).mean_g[0])
     axis = [float(np.sin(at[0])), 0.0, float(np.cos(at[0]))]
     return [
         row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)

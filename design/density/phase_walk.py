@@ -120,13 +120,15 @@ def windows_at(
 @njit(cache=True, nogil=True, error_model="numpy")
 def even_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, count: int, g: Array
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Ints]:
     """Statistics over the start phase where all gaps between lines are alike: one gap stands for all.
 
-    Returned are means of g and of the count, lowest and highest count, (polar angles,) each.
+    Returned are means of g and of the count, lowest and highest count, and the entries of g that each polar angle needs
+    at most, (polar angles,) each. Where g has fewer, the statistics are left 0.
     """
     n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    need = np.zeros(n, np.int64)
     at = np.empty(2 * len(beam_steps))
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     for i in range(n):
@@ -136,6 +138,9 @@ def even_zones(
             inside += at[k + 1] - at[k]
             at[k], at[k + 1] = at[k] - np.floor(at[k]), at[k + 1] - np.floor(at[k + 1])
             balance += at[k] - at[k + 1]
+        need[i] = whole * count + int(inside) + edges + 2
+        if need[i] > len(g):
+            continue
         mean[i] = whole * count + inside
         # what the mean count leaves when all steps are done is open from the start, whatever ties with what
         level = whole * count + int(np.floor(inside + balance + 0.5))
@@ -153,7 +158,7 @@ def even_zones(
         if 1.0 - here > TIE:
             lowest, highest = min(lowest, level), max(highest, level)
         least[i], most[i] = lowest, highest
-    return mean_g, mean, least, most
+    return mean_g, mean, least, most, need
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -169,7 +174,7 @@ def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) 
 @njit(cache=True, nogil=True, error_model="numpy")
 def seam_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, g: Array
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Ints]:
     """The same where the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
 
     In each gap an edge makes one step: ahead of it in the turn where the lines come through the seam, behind it later
@@ -178,6 +183,7 @@ def seam_zones(
     """
     n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    need = np.zeros(n, np.int64)
     count = int(np.ceil(turn))
     seam = turn - (count - 1)
     size = 4 * len(beam_steps)
@@ -188,9 +194,13 @@ def seam_zones(
         edges, whole = windows_at(i, ends, polar, beams, ball, beam_steps, turn, edge)
         pieces = 2 * edges + 1
         inside, balance = 0.0, 0.0
+        for k in range(0, edges, 2):
+            inside += edge[k + 1] - edge[k]
+        need[i] = whole * count + int(inside) + edges + 2
+        if need[i] > len(g):
+            continue
         for k in range(edges):
             sign = 1 - 2 * (k % 2)
-            inside -= sign * edge[k]
             edge[k] -= turn * np.floor(edge[k] / turn)
             gap[k] = min(int(edge[k]), count - 1)
             behind = edge[k] - gap[k]
@@ -250,4 +260,4 @@ def seam_zones(
             here += width[j]
         mean_g[i] /= turn
         least[i], most[i] = lowest, highest
-    return mean_g, mean, least, most
+    return mean_g, mean, least, most, need

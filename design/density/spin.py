@@ -12,16 +12,18 @@ so it adds as many counts at azimuth p as lines lie in [p - p_b - delta_b, p - p
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from design.arrays import Array
+from design.arrays import Array, Counts, Ints
 from design.concurrency.parallel import in_chunks
 from design.density.beams import ScanLines
 from design.density.phase_walk import even_zones, mean_counts, meetings, seam_zones
+from design.density.value_table import walked
 
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 
@@ -62,7 +64,7 @@ def zones(
     beam_azimuth_rad: Float[ndarray, " beams"],
     lines: ScanLines,
     ball_rad: float,
-    g: Float[ndarray, " counts"],
+    g: Callable[[Counts], Array],
 ) -> Zones:
     """Exact statistics over the start phase at polar angles t.
 
@@ -75,7 +77,7 @@ def zones(
         beam_azimuth_rad: azimuth of each beam in the rotation frame, shape (beams,).
         lines: scan lines of the turn.
         ball_rad: ball radius.
-        g: value of g for every number of measured lines 0, 1, .. lines * beams, each with all its repeats.
+        g: of counts of beams, element by element.
     """
     order = np.argsort(beam_polar_rad, kind="stable")
     polar_b, azimuth_b = beam_polar_rad[order], beam_azimuth_rad[order] % (2 * np.pi)
@@ -84,14 +86,13 @@ def zones(
 
     beam_steps = azimuth_b / lines.step_rad
 
-    def walked(chunk: slice) -> tuple[Array, Array, Array, Array]:
-        met = meetings(polar_rad[chunk], polar_b, ball_rad)
+    def walk(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
+        met = meetings(polar_rad[which], polar_b, ball_rad)
         if even:
-            return even_zones(*met, beam_steps, lines.count, g)
-        return seam_zones(*met, beam_steps, turn, g)
+            return even_zones(*met, beam_steps, lines.count, table)
+        return seam_zones(*met, beam_steps, turn, table)
 
-    parts = in_chunks(walked, len(polar_rad), smallest=512)
-    mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    mean_g, mean, least, most = walked(walk, len(polar_rad), g, lines.repeats, smallest=512)
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
 
 

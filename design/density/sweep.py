@@ -8,6 +8,7 @@ in 0 .. 1, so the count is a step function of s, and its statistics over s are e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,12 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints
+from design.arrays import Array, Counts, Ints
 from design.concurrency.parallel import in_chunks
 from design.density.beams import polar_and_azimuth
 from design.density.phase_walk import TIE, half_width, meetings, sort_by_buckets
 from design.density.spin import Zones
+from design.density.value_table import walked
 from design.motion import Sweep
 
 
@@ -73,17 +75,19 @@ def zones_swept(
     beams_rot: Float[ndarray, "beams 3"],
     lines: SweepLines,
     ball_rad: float,
-    g: Float[ndarray, " counts"],
+    g: Callable[[Counts], Array],
 ) -> Zones:
     """Exact statistics over the start phase at directions of the rotation frame; arguments as `mean_count_swept`.
 
-    `g` holds its value for every count 0, 1, .. lines * beams.
+    `g` is of counts, element by element.
     """
     t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
     numbers = lines.numbers()
-    parts = in_chunks(lambda chunk: _zones(*meetings(t[chunk], t_b, ball_rad), p[chunk], p_b, numbers, g), len(t))
-    mean_g, mean, least, most = (np.concatenate([part[i] for part in parts]) for i in range(4))
-    return Zones(mean_g, mean, least, most)
+
+    def walk(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
+        return _zones(*meetings(t[which], t_b, ball_rad), p[which], p_b, numbers, table)
+
+    return Zones(*walked(walk, len(t), g, 1, smallest=1))
 
 
 def _sorted(
@@ -157,9 +161,10 @@ def _mean(ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Ar
 @njit(cache=True, nogil=True, error_model="numpy")
 def _zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, p: Array, p_b: Array, numbers: Array, g: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Walk the start phase from 0 to 1 per direction; see `zones_swept`."""
+) -> tuple[Array, Array, Array, Array, Ints]:
+    """Walk the start phase from 0 to 1 per direction; see `zones_swept`, and `even_zones` for `need`."""
     n = len(p)
+    need = np.zeros(n, np.int64)
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     at, rise = np.empty(12 * len(p_b)), np.empty(12 * len(p_b), np.int64)
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
@@ -180,6 +185,9 @@ def _zones(
                     at[steps], rise[steps] = 0.0, 0
                 at[steps + 1], rise[steps + 1] = last - np.floor(last), -1
                 steps += 2
+        need[i] = level + steps // 2 + 2
+        if need[i] > len(g):
+            continue
         sort_by_buckets(at, steps, order, starts)
         here, lowest, highest = 0.0, 1 << 62, 0
         for j in range(steps):
@@ -194,4 +202,4 @@ def _zones(
         if 1.0 - here > TIE:
             lowest, highest = min(lowest, level), max(highest, level)
         least[i], most[i] = lowest, highest
-    return mean_g, mean, least, most
+    return mean_g, mean, least, most, need

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.spatial import ConvexHull
 
-from design.arrays import Plane, Setting, Vector
+from design.arrays import Array, Plane, Setting, Vector
 from design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
 from design.frames import R_rot_laser, R_world_rot
 from design.objective.problem import NODES, Problem
@@ -149,12 +149,17 @@ def _families(
 def _in_fan(bearings_rad: Float[ndarray, " beams"], asked_rad: Float[ndarray, "2 n"]) -> Bool[ndarray, "2 n"]:
     """Whether a beam is no farther than half of the usual step: a fan may have a hole, where the housing stands."""
     turn = 2 * np.pi
-    beams_rad = np.sort(bearings_rad % turn)
+    beams_rad, asked_rad = np.sort(_within_a_turn(bearings_rad)), _within_a_turn(asked_rad)
     around_rad = np.concatenate([beams_rad[-1:] - turn, beams_rad, beams_rad[:1] + turn])
-    asked_rad = asked_rad % turn
     behind = np.searchsorted(around_rad, asked_rad, "right")
     nearest_rad = np.minimum(asked_rad - around_rad[behind - 1], around_rad[behind] - asked_rad)
     return nearest_rad <= np.median(np.diff(np.sort(bearings_rad))) / 2 * (1 + 1e-9)
+
+
+def _within_a_turn(angle_rad: Array) -> Array:
+    """Angles from 0 to below a whole turn: the remainder of what is just below 0 is rounded to a turn."""
+    rest = angle_rad % (2 * np.pi)
+    return np.where(rest < 2 * np.pi, rest, 0.0)
 
 
 def _between_families(

@@ -18,12 +18,10 @@ import numpy as np
 from design.arrays import Array, Counts
 from design.errors import TaskError
 from design.sphere.painting import MAP, VALUE
-from design.sphere.polar_rule import circle_rule
 from design.sphere.regions import Field, field_of
+from design.sphere.total_weight import total_weight
 from design.task.shapes import Region
 from design.task.task import LoadedTask
-
-INTEGRAL_CIRCLES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +87,9 @@ def kl(field: Field) -> Objective:
     """
     support = _mapped(field, lambda w: (w > 0).astype(float))
     least = _least(field)  # in units of it no weight has a negative logarithm
-    logarithms = _mapped(field, lambda w: w * np.log(np.where(w > 0, w / least, 1.0)))
-    entropy = _integral(logarithms) / _integral(field) + np.log(least)
-    shift = entropy - np.log(_integral(field) / _integral(support))
+    logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
+    entropy = total_weight(logarithms) / total_weight(field) + np.log(least)
+    shift = entropy - np.log(total_weight(field) / total_weight(support))
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift)
 
@@ -113,7 +111,7 @@ def required(loaded: LoadedTask, field: Field) -> Objective:
         part = field_of(loaded, _asking(level, asked))
         part = replace(part, background=field.background * (asked == level))
         if len(part.patches):
-            moments.append(Moment(part, _shortfall(level), share=_integral(part)))
+            moments.append(Moment(part, _shortfall(level), share=total_weight(part)))
     total = sum(moment.share for moment in moments)
     shared = tuple(replace(moment, share=moment.share / total) for moment in moments if moment.share > 0)
     if len(shared) == 1:
@@ -181,8 +179,3 @@ def _least(field: Field) -> float:
     painted += [row[VALUE] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]
     values = np.concatenate(painted)
     return float(values[values > 0].min())
-
-
-def _integral(field: Field) -> float:
-    """`int w dO` outside the masks, by circles about z: exact along each."""
-    return float(circle_rule(field, np.array([0.0, 0.0, 1.0]), np.empty(0), INTEGRAL_CIRCLES).fine.sum())

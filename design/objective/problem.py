@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Array, Plane
+from design.arrays import Plane
 from design.catalogue.products import Lidar
 from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
 from design.density.sweep import SweepLines
@@ -35,7 +35,6 @@ class Problem:
         sweep: the trajectory, where the servo sweeps.
         ball_rad: ball radius.
         objective: what is minimised.
-        tables: g of each moment for every possible count of measured lines, (moments, lines * beams + 1).
         grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
         nodes: quadrature nodes that a score starts with, from the task's `tolerance` or `budget_s`.
         tolerance: a score takes more nodes as long as it states a larger error.
@@ -47,7 +46,6 @@ class Problem:
     sweep: SweepLines | None
     ball_rad: float
     objective: Objective
-    tables: tuple[Array, ...]
     grid_step_deg: float | None
     nodes: int = NODES
     tolerance: float = 1e-3
@@ -78,15 +76,13 @@ class Problem:
 
     def with_objective(self, objective: Objective) -> Problem:
         """The same scanner with another aim."""
-        return replace(self, objective=objective).with_beams(self.bearings_rad, self.lines, self.sweep)
+        return replace(self, objective=objective)
 
     def with_beams(
         self, bearings_rad: Float[ndarray, " beams"], lines: ScanLines, sweep: SweepLines | None = None
     ) -> Problem:
         """The same task for other beams on other lines."""
-        counts = lines.repeats * np.arange(lines.count * len(bearings_rad) + 1.0)
-        tables = tuple(moment.g(counts) for moment in self.objective.moments)
-        return replace(self, bearings_rad=bearings_rad, lines=lines, sweep=sweep, tables=tables)
+        return replace(self, bearings_rad=bearings_rad, lines=lines, sweep=sweep)
 
 
 def problem_of(loaded: LoadedTask) -> Problem:
@@ -113,7 +109,6 @@ def problem_of(loaded: LoadedTask) -> Problem:
         sweep=None,
         ball_rad=float(np.radians(density.ball_radius_deg)),
         objective=objective_of(loaded, field),
-        tables=(),
         grid_step_deg=step_deg,
         nodes=nodes,
         tolerance=density.tolerance or (np.inf if density.budget_s else 1e-3),

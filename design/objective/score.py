@@ -142,7 +142,7 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
     """A moment by quadrature over the polar angle."""
     moment = problem.objective.moments[index]
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
-    z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[index])
+    z = zones(rule.polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
     blind = np.zeros(len(rule.polar_rad), dtype=bool)
     for low, high in problem.blind_zones(polar):
         blind |= (low < rule.polar_rad) & (rule.polar_rad < high)
@@ -169,7 +169,7 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     beams = problem.beams_rot(angles_rad[2:])
     sets = sample_sets(moment.field, problem.grid_step_deg, nodes // SETS, SETS)
     directions = np.concatenate([samples.directions for samples in sets]) @ R
-    z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, problem.tables[index])
+    z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
     blind = blind_to_sweep(problem, directions, beams, z.mean)
     lower = moment.g(z.mean)
     found, first = [], 0

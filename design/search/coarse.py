@@ -236,8 +236,8 @@ def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) ->
     def rows(plane: Array) -> tuple[Array, Array]:
         beams, azimuths = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, *plane))
         out = []
-        for moment, table in zip(problem.objective.moments, problem.tables, strict=True):
-            z = zones(polar, beams, azimuths, problem.lines, problem.ball_rad, table)
+        for moment in problem.objective.moments:
+            z = zones(polar, beams, azimuths, problem.lines, problem.ball_rad, moment.g)
             out.append(z.mean_g if moment.gathered == "mean" else moment.g(z.least))
         return np.stack(out), z.least
 

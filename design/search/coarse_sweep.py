@@ -100,8 +100,8 @@ def _exact(problem: Problem, directions: Array, beams: Array) -> tuple[Array, Ar
     """What one plane gives at the directions, shape (moments, n), and the least count there, shape (n,)."""
     assert problem.sweep is not None
     rows = []
-    for moment, table in zip(problem.objective.moments, problem.tables, strict=True):
-        z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, table)
+    for moment in problem.objective.moments:
+        z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
         rows.append(z.mean_g if moment.gathered == "mean" else moment.g(z.least))
     return np.stack(rows), z.least
 

@@ -33,7 +33,7 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
         ("max_line_gap_deg", gap, limits.max_line_gap_deg),
         ("max_blind_cone_deg", cone, limits.max_blind_cone_deg),
     ):
-        if limit is not None and values.min() > limit:
+        if limit is not None and values.min() > limit * (1 + 1e-9) + 1e-9:
             hint = "; a longer period narrows it" if name == "max_line_gap_deg" else ""
             raise TaskError(f"limits.{name} = {limit:g}: the scan planes of this task reach {values.min():.3g}{hint}")
     keep = planes_keep(problem, shown, limits)

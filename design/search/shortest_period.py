@@ -77,8 +77,7 @@ def shortest_period_s(
 
     def enough(count: int) -> bool:
         lines = ScanLines(count, 2 * np.pi / count)
-        flat = np.zeros(count * len(problem.bearings_rad) + 1)
-        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, flat)
+        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
         return bool(found.least.min() >= least)
 
     upper = 1

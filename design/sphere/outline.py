@@ -11,8 +11,8 @@ from numpy import ndarray
 
 from design.concurrency.blocked_product import product
 from design.concurrency.parallel import in_chunks
+from design.sphere.corners import around, edge_corners
 from design.sphere.painting import MAP
-from design.sphere.polar_rule import around, edge_corners
 from design.sphere.regions import Field, frames_about
 
 AROUND = 3600  # points of each edge: what an arc reaches further between two of them is below 4e-7 rad
@@ -91,16 +91,22 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
         for layers in (field.weight, field.mask)
         for row in layers.rows[layers.rows[:, 0] == MAP]
     ]
-    points = np.concatenate([np.empty((0, 3)), *cells, edge_corners(field)])
-    return tuple(arcs), points[_begins(field, points)]
+    points = np.concatenate([np.empty((0, 3)), *cells])
+    corners = edge_corners(field)
+    begun = corners.points[_on_both_sides(corners.weights)]
+    return tuple(arcs), np.concatenate([points[_begins(field, points)], begun])
 
 
 def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
     """Whether there is weight on one side of points and none on another."""
     if not len(points):
         return np.zeros(0, dtype=bool)
-    weighted = field.weight_at(around(points).reshape(-1, 3)).reshape(len(points), -1) > 0
-    return np.asarray(weighted.any(axis=1) & ~weighted.all(axis=1))
+    return _on_both_sides(field.weight_at(around(points).reshape(-1, 3)).reshape(len(points), -1))
+
+
+def _on_both_sides(weights: Float[ndarray, "n looks"]) -> Bool[ndarray, " n"]:
+    """Whether some of the weights around each point are above 0, and others not."""
+    return np.asarray((weights > 0).any(axis=1) & ~(weights > 0).all(axis=1))
 
 
 def _on_cells(table: Float[ndarray, "rows columns"], row: Float[ndarray, " 14"]) -> Float[ndarray, "n 3"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from design.arrays import Array, Ints
+from design.arrays import Array, Ints, Mask
 
 ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""
@@ -52,6 +52,24 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
     r = min(int(theta / np.pi * height), height - 1)
     c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
     return tables[int(row[1]), r, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _masked(x: float, y: float, z: float, rows: Array, tables: Array) -> bool:
+    """Whether any mask hides the direction: masks unite, and a table hides only where it is above 0."""
+    for i in range(rows.shape[0]):  # noqa: SIM110 - numba compiles no generator
+        if _holds(x, y, z, rows[i]) and _of_cell(x, y, z, rows[i], tables) > 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def masked_at(directions: Array, rows: Array, tables: Array) -> Mask:
+    """Whether any mask hides each direction, (directions,)."""
+    out = np.empty(directions.shape[0], np.bool_)
+    for i in range(directions.shape[0]):
+        out[i] = _masked(directions[i, 0], directions[i, 1], directions[i, 2], rows, tables)
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -155,7 +173,7 @@ def circle_means(
                 x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
                 y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]
                 z = u * frame[0, 2] + v * frame[1, 2] + ct * frame[2, 2]
-                if _value(x, y, z, mask_rows, mask_tables, 0.0) > 0.0:
+                if _masked(x, y, z, mask_rows, mask_tables):
                     continue
                 share += arc
                 weight += arc * _value(x, y, z, weight_rows, weight_tables, background)

@@ -1,4 +1,4 @@
-"""Weights and masks on the sphere: painted in order, the last region that contains a direction wins.
+"""Weights and masks on the sphere: of weights the last region that contains a direction wins; masks unite.
 
 Every edge of a band, a cone, a rectangle on a plane or a map cell lies in a plane `x . m = c`. So along a circle about
 any axis the weight is piecewise constant between the circle's crossings with those planes, and its integral over the
@@ -29,6 +29,7 @@ from design.sphere.painting import (
     VALUE,
     circle_means,
     first_patch,
+    masked_at,
     values_at,
 )
 from design.sphere.rectangle import edge_normals
@@ -79,7 +80,7 @@ class Field:
 
     def masked_at(self, directions: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
         """Whether unit vectors (n, 3) are hidden by the robot, shape (n,)."""
-        return _paint(self.mask, directions, 0.0) > 0
+        return _masked(self.mask, directions)
 
     @property
     def planes(self) -> Float[ndarray, "edges 4"]:
@@ -172,7 +173,7 @@ def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_
         one = _layers([region], maps, lambda _: 1.0)
         here = _paint(one, flat, -1.0).reshape(shape)
         painted = np.where(here >= 0, weight_of(region) * np.maximum(here, 0.0), painted)
-    robot = _paint(_layers(loaded.task.mask, maps, value_of), flat, 0.0).reshape(shape) > 0
+    robot = _masked(_layers(loaded.task.mask, maps, value_of), flat).reshape(shape)
     lidar = loaded.lidar
     seen = surface.within(lidar.range_min_mm / 1000, lidar.practical_range_m)
     hidden = MapRegion(shape="map", file="")
@@ -269,3 +270,7 @@ def _stack(tables: list[Array]) -> Array:
 
 def _paint(layers: Layers, directions: Float[ndarray, "n 3"], background: float) -> Float[ndarray, " n"]:
     return values_at(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables, background)
+
+
+def _masked(layers: Layers, directions: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
+    return masked_at(np.ascontiguousarray(directions, dtype=float), layers.rows, layers.tables)

@@ -31,6 +31,8 @@ def _divides_the_half_circle(step: float) -> float:
 LEAST_M, MOST_M = 1e-3, 1e4
 Length = Annotated[Number, Field(ge=LEAST_M, le=MOST_M)]
 Far = Annotated[Number, Field(ge=-1e4, le=1e4)]
+Turn = Annotated[Number, Field(ge=-360, le=360)]
+Heading = Annotated[Number, Field(ge=-720, le=720)]
 THINNEST_DEG = 1e-3
 STRIPS = 20_000  # of the area of a plane
 LITTLE = 1e-3  # share of a plane beyond a range that is worth no word
@@ -53,7 +55,9 @@ class BandRegion(Record):
 
     shape: Literal["band"] = Field(description="between two heights and two headings")
     theta_deg: Span = Field(default=(0.0, 180.0), description="from straight up: 0 is up, 90 level, 180 down")
-    phi_deg: Span = Field(default=(-180.0, 180.0), description="from ahead towards the left: 0 is ahead, 90 left")
+    phi_deg: tuple[Heading, Heading] = Field(
+        default=(-180.0, 180.0), description="from ahead towards the left: 0 is ahead, 90 left"
+    )
     value: Value = 1.0
     required: Required = None
 
@@ -63,6 +67,9 @@ class BandRegion(Record):
             raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
         if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
             raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
+        for name, (low, high) in (("theta_deg", self.theta_deg), ("phi_deg", self.phi_deg)):
+            if high - low < THINNEST_DEG:
+                raise ValueError(f"{name} = {[low, high]} is too narrow: widen it to {THINNEST_DEG:g} deg at least")
         return self
 
 
@@ -104,7 +111,9 @@ class Placed(Record):
     file: str = Field(description=".stl, .ply, .obj, .dae or .glb, beside the task")
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
     sensor_m: Triple = Field(default=(0.0, 0.0, 0.0), description="the optical centre in the mesh: x, y, z")
-    rpy_deg: Triple = Field(default=(0.0, 0.0, 0.0), description="axes of the world in the mesh: roll, pitch, yaw")
+    rpy_deg: tuple[Turn, Turn, Turn] = Field(
+        default=(0.0, 0.0, 0.0), description="axes of the world in the mesh: roll, pitch, yaw"
+    )
     step_deg: GridStep = Field(default=2.0, description="between the rays that are cast at it")
 
 

@@ -116,6 +116,14 @@ class Task(Record):
             raise ValueError("a weight of shape = 'box' needs a [scene] that it stands in")
         return self
 
+    @field_validator("mask")
+    @classmethod
+    def _masks_hide(cls, masks: tuple[MaskRegion, ...]) -> tuple[MaskRegion, ...]:
+        for i, mask in enumerate(masks):
+            if not mask.value > 0:
+                raise ValueError(f"{i}: a mask of value = 0 hides nothing, as masks unite: leave it out")
+        return masks
+
     @field_validator("motion", mode="before")
     @classmethod
     def _spins_if_not_told(cls, motion: Any) -> Any:

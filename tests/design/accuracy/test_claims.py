@@ -124,7 +124,7 @@ def test_an_angle_that_is_fixed_and_the_same_angle_searched():
 
 def every_segment(field, axis, more_rad):
     breaks = breaks_of(field, axis, more_rad)
-    return list(pairwise(breaks))
+    return np.array(list(pairwise(breaks)))
 
 
 def every_direction(field, _, wanted, count):

@@ -39,7 +39,7 @@ def test_the_reference_is_right_without_any_of_our_quadrature(ground):
     problem = problem_of(replace(task, task=narrow))
 
     t = np.linspace(*band, 400_001)
-    g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.tables[0]).mean_g
+    g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.objective.moments[0].g).mean_g
     total = simpson(g * np.sin(t), x=t)
     expected = total / (np.cos(band[0]) - np.cos(band[1]))
     truth = smooth_reference(problem, ANGLES)

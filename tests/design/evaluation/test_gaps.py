@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from design.density.ball_count import ball_count
 from design.density.beams import ScanLines, beam_directions_rot, scan_lines
 from design.errors import TaskError
-from design.evaluation.gaps import gaps, interlaced_period_s
+from design.evaluation.gaps import _in_fan, gaps, interlaced_period_s
 from design.frames import R_world_rot
 from design.objective.problem import problem_of
 from design.search.shortest_period import shortest_period_s
@@ -45,6 +45,15 @@ def test_half_a_turn_against_a_simulated_one(uniform, angles_deg):
     full = seen(uniform.bearings_rad, lines, angles, directions, radius)
     missed = full & ~seen(uniform.bearings_rad, half, angles, directions, radius)
     assert gaps(uniform, angles).half_turn_misses == pytest.approx(missed.mean(), abs=0.012)
+
+
+@pytest.mark.parametrize("first_deg", [-120.0, -90.0, 0.0])
+@pytest.mark.parametrize("off_rad", [-1e-17, 0.0, 1e-17])
+def test_a_bearing_on_the_seam_of_a_turn_is_one_of_the_fan(first_deg, off_rad):
+    bearings = np.radians(first_deg + np.arange(0.0, 240.0, 30.0))
+    asked = np.array([[off_rad, -2 * np.pi + off_rad, 2 * np.pi + off_rad], [np.pi, np.radians(first_deg - 20), np.pi]])
+    expected = [[True, True, True], [first_deg > -120.0 + 60, False, first_deg > -120.0 + 60]]
+    np.testing.assert_array_equal(_in_fan(bearings, asked), expected)
 
 
 @pytest.mark.parametrize("angles_deg", SETTINGS[:4])

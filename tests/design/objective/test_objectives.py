@@ -9,7 +9,7 @@ import pytest
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
 from design.objective.ball_search import ball_score
-from design.objective.named_objectives import homogeneity, kl, worst
+from design.objective.named_objectives import Moment, homogeneity, kl, worst
 from design.objective.problem import problem_of
 from design.objective.score import quick_J, score
 from design.search import families
@@ -82,9 +82,11 @@ def test_kl_and_homogeneity_of_an_even_scan_are_those_of_its_statistics():
     p = problem("log", (AHEAD,))
     setting = np.radians([0, 90, 0, -90])
     plain = score(p, setting).J
-    count = p.lines.repeats * np.arange(p.lines.count * len(p.bearings_rad) + 1.0)
-    mean = score(replace(p, tables=(count,)), setting).J
-    square = score(replace(p, tables=(count**2,)), setting).J
+
+    def mean_of(g):
+        return score(p.with_objective(replace(p.objective, moments=(Moment(p.field, g),))), setting).J
+
+    mean, square = mean_of(np.positive), mean_of(np.square)
     assert score(p.with_objective(kl(p.field)), setting).J == pytest.approx(plain + np.log1p(mean), abs=1e-4)
     even = score(p.with_objective(homogeneity(p.field)), setting).J
     assert even == pytest.approx(np.log(square / mean**2), abs=1e-4)

@@ -1,62 +1,14 @@
 """Weights and masks against a slow obvious loop, and their circle means against dense sampling and closed forms."""
 
 from math import acos, atan2, cos, degrees, hypot, pi, radians, sin, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
 from quick_tests import samples
+from random_fields import field, random_case
 from scipy.spatial.transform import Rotation
 
-from design.catalogue.catalogue import load_catalogue
 from design.sphere.outline import reach_about
-from design.sphere.regions import field_of
-from design.task.task import LoadedTask, Task
-
-
-def field(weight, mask=(), maps=(), background=0.0):
-    """A field from tables as a task file holds them; `maps` are the tables of the map regions, weights first."""
-    task = Task.model_validate(
-        {
-            "name": "t",
-            "sensor": "UTM-30LX",
-            "servo": "MX-64R",
-            "motion": {"period_s": 1.0},
-            "weight": weight,
-            "mask": mask,
-            "density": {"background": background},
-        }
-    )
-    return field_of(LoadedTask(task, Path(), load_catalogue(), tuple(maps)))
-
-
-def random_region(rng, kind):
-    value = round(float(rng.uniform(0, 3)), 3)
-    if kind == "band":
-        theta = np.sort(rng.uniform(0, 180, 2))
-        if rng.random() < 0.3:
-            theta[rng.integers(2)] = 0 if rng.random() < 0.5 else 180
-        start = rng.uniform(-360, 360)
-        phi = [start, start + rng.uniform(0, 360)] if rng.random() < 0.8 else [-180, 180]
-        return {"shape": kind, "theta_deg": sorted(theta), "phi_deg": phi, "value": value}
-    if kind == "cone":
-        half = float(rng.uniform(1, 170))
-        return {"shape": kind, "axis": rng.normal(size=3).tolist(), "half_angle_deg": half, "value": value}
-    if kind == "map":
-        return {"shape": kind, "file": "unused.npy", "value": value}
-    return {"shape": kind, "value": value}
-
-
-def random_case(seed):
-    rng = np.random.default_rng(seed)
-    weight = [random_region(rng, k) for k in rng.choice(["all", "band", "band", "cone", "map"], rng.integers(1, 5))]
-    mask = [random_region(rng, k) for k in rng.choice(["band", "cone", "map"], rng.integers(0, 3))]
-    maps = [
-        rng.integers(0, 4, (rng.integers(1, 7), rng.integers(1, 10))).astype(float)
-        for region in [*weight, *mask]
-        if region["shape"] == "map"
-    ]
-    return weight, mask, maps, float(rng.choice([0.0, 0.25]))
 
 
 def slow_value(direction, regions, maps, background):
@@ -92,7 +44,9 @@ def test_weights_and_masks_agree_with_the_slow_obvious_loop(seed):
     directions = np.random.default_rng(seed).normal(size=(300, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     of_weights = maps[: sum(region["shape"] == "map" for region in weight)]
-    masked = [slow_value(d, mask, maps[len(of_weights) :], 0.0) > 0 for d in directions]
+    of_masks = iter(maps[len(of_weights) :])
+    each = [(region, [next(of_masks)] if region["shape"] == "map" else []) for region in mask]
+    masked = [any(slow_value(d, [region], table, 0.0) > 0 for region, table in each) for d in directions]
     painted = [slow_value(d, weight, of_weights, background) for d in directions]
     np.testing.assert_array_equal(f.masked_at(directions), masked)
     np.testing.assert_array_equal(f.weight_at(directions), np.where(masked, 0.0, painted))

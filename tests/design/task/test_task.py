@@ -116,6 +116,18 @@ WRONG = {
     "band phi reversed": (weight('shape = "band"\nphi_deg = [60, -60]'), ["weight.0", "phi_deg", "60", "rise"]),
     "band more than round": (weight('shape = "band"\nphi_deg = [-200, 200]'), ["weight.0", "phi_deg", "360"]),
     "band of one number": (weight('shape = "band"\ntheta_deg = 95'), ["weight.0.theta_deg", "95"]),
+    "band of no height": (weight('shape = "band"\ntheta_deg = [90, 90]'), ["weight.0", "theta_deg", "0.001 deg"]),
+    "band of no width": (weight('shape = "band"\nphi_deg = [30, 30]'), ["weight.0", "phi_deg", "0.001 deg"]),
+    "band far around": (weight('shape = "band"\nphi_deg = [0, 1e308]'), ["weight.0", "phi_deg", "720"]),
+    "mesh turned by far": (
+        weight('shape = "mesh"\nfile = "m.stl"\nrpy_deg = [0, 0, 1e300]', "mask"),
+        ["mask.0.rpy_deg", "360"],
+    ),
+    "mask that hides nothing": (weight('shape = "all"\nvalue = 0', "mask"), ["mask", "hides nothing", "leave it out"]),
+    "sweep of no width": (
+        swap('mode = "spin"', 'mode = "sweep"\nlimits_deg = [10, 10]'),
+        ["motion", "limits_deg", "does not rise"],
+    ),
     "angle out of range": (BASE + "[angles]\nbeta_rot_deg = 91\n", ["angles", "beta_rot_deg", "91", "90"]),
     "range out of bounds": (BASE + "[angles]\nalpha_rot_deg = [0, 181]\n", ["angles", "alpha_rot_deg", "180"]),
     "range reversed": (BASE + "[angles]\nalpha_laser_deg = [10, -10]\n", ["angles", "alpha_laser_deg", "rise"]),
@@ -195,7 +207,6 @@ def test_wrong_input_is_one_line_that_names_file_and_field(tmp_path, text, words
     "lines",
     [
         'shape = "all"\nvalue = 0',
-        'shape = "band"\ntheta_deg = [90, 90]',
         'shape = "all"\n[[mask]]\nshape = "all"',
         'shape = "cone"\naxis = [0, 0, 1]\nhalf_angle_deg = 5\n[[mask]]\nshape = "band"\ntheta_deg = [0, 6]',
     ],

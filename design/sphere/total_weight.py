@@ -1,0 +1,58 @@
+"""The integral of a weight over the sphere, by a rule of its own: what every quadrature of the same weight must sum to.
+
+Circles about the world's z axis, the axis of bands and maps: between the polar angles at which a circle touches an
+edge or passes a corner the mean along it is smooth. Panels between all of these, of weight zero or not, are halved
+until their Gauss sums agree.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from design.errors import NumericalError
+from design.sphere.corners import edge_corners, polar_about, touched_points
+from design.sphere.regions import Field
+
+UP = np.array([0.0, 0.0, 1.0])
+RELATIVE_ERROR = 1e-5  # a hundredth of what a quadrature may be off by
+MOST_HALVINGS = 40
+NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+@lru_cache(maxsize=64)
+def total_weight(field: Field) -> float:
+    """`int w dO` outside the masks [sr], to a relative error of 1e-5; 0.0 if no direction has a weight.
+
+    Raises:
+        NumericalError: the sum does not settle.
+    """
+    planes = np.concatenate([field.planes, field.map_planes])
+    points = np.concatenate([touched_points(planes, UP), edge_corners(field).points])
+    breaks = np.unique(np.concatenate([[0.0, np.pi], polar_about(UP, points)]))
+    ends = np.stack([breaks[:-1], breaks[1:]], axis=1)
+    sums = _panel_sums(field, ends)
+    settled = 0.0
+    for _ in range(MOST_HALVINGS):
+        middle = ends.mean(axis=1)
+        ends = np.stack([ends[:, 0], middle, middle, ends[:, 1]], axis=1).reshape(-1, 2)
+        halves = _panel_sums(field, ends).reshape(-1, 2)
+        change = np.abs(halves.sum(axis=1) - sums)
+        if change.sum() <= RELATIVE_ERROR * (settled + halves.sum()):
+            return float(settled + halves.sum())
+        # what changes by less than its share of the allowance is good enough, however many others there are
+        again = change > RELATIVE_ERROR / 2 * (settled + halves.sum()) / len(change)
+        settled += float(halves[~again].sum())
+        ends, sums = ends[np.repeat(again, 2)], halves[again].ravel()
+    raise NumericalError("weight: its integral over the sphere does not settle")
+
+
+def _panel_sums(field: Field, ends: Float[ndarray, "panels 2"]) -> Float[ndarray, " panels"]:
+    """Gauss sums of the weight over ranges of the polar angle about z."""
+    half = np.diff(ends, axis=1) / 2
+    polar = ends.mean(axis=1, keepdims=True) + half * NODES
+    means, _ = field.on_circles(UP, polar.ravel())
+    return np.asarray((2 * np.pi * half * NODE_WEIGHTS * np.sin(polar) * means.reshape(polar.shape)).sum(axis=1))
