@@ -40,7 +40,7 @@ def find_servo(
         servo_id: its number; None if it is alone.
         baud: the only speed to ask at; None for all that are known.
         unmute: whether to set a servo that answers nothing but pings to answer everything: never, only if that setting
-            is gone with the power, or always.
+            is gone with the power (else its torque is turned off), or always.
 
     Raises:
         ServoSetupError: it is mute, and may not be unmuted.
@@ -68,6 +68,10 @@ def find_servo(
             if found is not None:
                 strangers.append(f"servo {unit.id} has model number {found} in protocol {bus.packets.protocol}")
             elif unit.table.can_be_mute and mute == here:
+                if (
+                    unmute == "until power-off"
+                ):  # who is going to drive it wants it without torque, and cannot read that
+                    bus.write_unanswered(unit.id, unit.table.torque, unit.table.torque.encode(0))
                 raise mute_servo(bus.port, unit.table, unit.id)
             elif unit.table.can_be_mute:
                 mute = here

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from datetime import datetime
-from itertools import count
 from pathlib import Path
 from typing import Literal
 
@@ -91,7 +90,7 @@ def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder
         file = keep_settings(undo_folder, unit, [(one.register, one.now, one.needed) for one in changes])
     except DeviceError:
         if unit.was_mute and (level := unit.table.status_return):  # it had to answer before its model was known
-            unit.bus.write_unanswered(unit.id, level, level.encode(0))
+            unit.set_answers(level, 0)
         raise
     yield file
     for change in changes:
@@ -123,8 +122,6 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Registe
         DeviceError: the file cannot be written; nothing was changed then.
     """
     model, at = unit.table.model, f"{datetime.now():%Y%m%d-%H%M%S}"
-    names = (f"servo-{model}-{unit.id}-{at}{again}.json" for again in ("", *(f"-{k}" for k in count(2))))
-    file = next(path for name in names if not (path := folder / name).exists())
     kept = ServoSettings(
         schema_name="scanwright/servo-settings/1",
         port=unit.bus.port,
@@ -135,8 +132,7 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Registe
             ServoSetting(register_name=register.name, before=was, after=needed) for register, was, needed in changes
         ),
     )
-    _write(file, kept)
-    return file
+    return _write(folder, f"servo-{model}-{unit.id}-{at}", kept)
 
 
 def restore(file: Path, port: str | None) -> Iterator[str]:
@@ -202,15 +198,19 @@ def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple
     elif register == table.status_return and needed == table.answers_all:
         unit.answer_everything()
     elif register == table.status_return:  # from here on it may not answer, nor be read back
-        unit.bus.write_unanswered(unit.id, register, register.encode(needed))
+        unit.set_answers(register, needed)
         return unit, f"{unit}: {register}: {was} -> {needed}; it was not read back"
     else:
         unit.set_kept(register, needed)
     return now, f"{unit}: {register}: {was} -> {now.count(register)}"
 
 
-def _write(file: Path, kept: ServoSettings) -> None:
-    """The file is on the disk before anything is changed."""
+def _write(folder: Path, stem: str, kept: ServoSettings) -> Path:
+    """Write a file of a new name, which is on the disk before anything is changed; the file."""
+    file, again = folder / f"{stem}.json", 1
+    while os.path.lexists(file):  # two changes within a second
+        again += 1
+        file = folder / f"{stem}-{again}.json"
     try:
         with file.open("x", encoding="utf-8") as out:
             out.write(kept.model_dump_json(by_alias=True, indent=2) + "\n")
@@ -218,3 +218,4 @@ def _write(file: Path, kept: ServoSettings) -> None:
             os.fsync(out.fileno())
     except OSError as error:
         raise DeviceError(f"{file}: cannot write, so nothing was changed: {error.strerror}") from error
+    return file
