@@ -40,8 +40,8 @@ class DeviceFinding:
     Attributes:
         verdict: whether something must be done.
         says: what was seen; ends with the remedy if something is wrong.
-        set_up: port of the servo whose set-up is the remedy; None if it is not.
-        undo: file from which a change can be undone; None if nothing was changed.
+        set_up: port of the servo whose set-up is the remedy, or was made; None if there is no such servo.
+        undo: file from which that set-up can be undone; None if it was not made.
     """
 
     verdict: Literal["ok", "warning", "wrong"]
@@ -99,12 +99,12 @@ def fix(out: Path | None, servo: str | None, servo_id: int | None) -> Iterator[D
         yield DeviceFinding("wrong", "a servo is set up only on a port that was named: name it with --servo PORT")
         return
     model, spins = _servo_of(None if out is None else load_angles(out / "angles.json"))
-    yield from _told(settings.set_up(port, model, servo_id, Path() if out is None else out, spins=spins))
+    yield from _told(settings.set_up(port, model, servo_id, Path() if out is None else out, spins=spins), port)
 
 
 def restore(file: Path, servo: str | None) -> Iterator[DeviceFinding]:
     """Set a servo back to what `fix` found; `servo` is its port where that has another name now."""
-    yield from _told(settings.restore(file, servo))
+    yield from _told(settings.restore(file, servo), servo)
 
 
 def _servo_of(angles: AngleSet | None) -> tuple[str | None, bool | None]:
@@ -114,9 +114,9 @@ def _servo_of(angles: AngleSet | None) -> tuple[str | None, bool | None]:
     return angles.servo, None if angles.motion is None else isinstance(angles.motion, Spin)
 
 
-def _told(steps: Iterator[str | Path]) -> Iterator[DeviceFinding]:
+def _told(steps: Iterator[str | Path], port: str | None) -> Iterator[DeviceFinding]:
     yield from _guarded(
-        DeviceFinding("ok", f"the old settings are kept in {step}", undo=step)
+        DeviceFinding("ok", f"the old settings are kept in {step}", port, step)
         if isinstance(step, Path)
         else DeviceFinding("ok", step)
         for step in steps

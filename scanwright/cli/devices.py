@@ -244,10 +244,10 @@ def doctor(
     wrong = False
     for finding in findings:
         remedy = ""
-        if finding.set_up is not None:
+        if finding.set_up is not None and finding.undo is not None:
+            remedy = f": `{undo_command(finding.set_up, finding.undo)}` restores them"
+        elif finding.set_up is not None:
             remedy = f": `{set_up_command(finding.set_up, out, servo_id)}` sets it"
-        elif finding.undo is not None:
-            remedy = f": `{undo_command(servo or 'PORT', finding.undo)}` restores them"
         print(f"{finding.verdict:8} {finding.says}{remedy}", flush=True)
         wrong |= finding.verdict == "wrong"
     raise typer.Exit(1 if wrong else 0)

@@ -48,7 +48,8 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
         servo_id: number of the servo, if one was given.
 
     Raises:
-        ServoSetupError: nobody is there to be asked, the person declines, or a setting does not last; nothing moves.
+        ServoSetupError: nobody is there to be asked, or a setting does not last; nothing moves.
+        typer.Exit: the person declines, code 2; nothing moves.
     """
     from firmware_io.servo.fitness import ServoSetupError
     from firmware_io.servo.settings import set_up
@@ -62,19 +63,19 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
             if names & written:
                 error.add_note("it was written and did not last: the servo has restarted; look at its supply")
                 raise
-            if not _agrees(error):
-                error.add_note(
-                    f"to change that, and keep a file to undo it: `{set_up_command(error.port, out, servo_id)}`"
-                )
+            remedy = f"`{set_up_command(error.port, out, servo_id)}` writes that, and keeps a file to undo it"
+            if not (sys.stdin.isatty() and sys.stderr.isatty()):
+                error.add_note(remedy)
                 raise
+            if not _agrees(error):
+                complain(f"nothing was written, nothing was moved; {remedy}")
+                raise typer.Exit(2) from None
             written |= names
             print_steps(error.port, set_up(error.port, error.model, error.servo_id, out, agreed=error.changes))
 
 
 def _agrees(error: ServoSetupError) -> bool:
-    """Whether a person at a terminal, who sees the list, agrees to write it."""
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return False
+    """Whether the person at the terminal, who sees the list, agrees to write it."""
     for line in str(error).splitlines():
         complain(line)
     number = len(error.changes)
