@@ -11,6 +11,7 @@
           +-- DeviceTimeoutError  ... because nothing came in time
           +-- ProtocolError    ... because what came is no valid packet
           +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
+          +-- ServoSetupError  ... because its settings must change first (`firmware_io.servo.fitness`, with the list)
 
 A command prints the message and exits with 2; anything else is a bug and gets its traceback. The message is one line,
 or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as far as they apply.

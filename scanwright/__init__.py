@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         read_cloud,
         register,
         scan,
+        set_up_servo,
         simulate,
         write_cloud,
     )
@@ -55,6 +56,7 @@ __all__ = [
     "read_cloud",
     "register",
     "scan",
+    "set_up_servo",
     "simulate",
     "write_cloud",
 ]

@@ -200,8 +200,6 @@ def trial(name: str, seed: int) -> Outcome:
     ):
         out = Path(folder)
         (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        if protocol == "TMCL":  # as `servo-setup --baud 1000000` leaves it: at its 9600 it tells nine angles a second
-            twins.servo.memory[1065] = 11
         return inside(out, twins, INSIDE[fault]) if fault in INSIDE else outside(out, twins, SIGNALS.get(fault))
 
 

@@ -11,6 +11,7 @@ from design.motion import Motion, Spin
 from firmware_io.scan.acquire import acquire
 from firmware_io.scan.live_feed import NOBODY, Both, Watch
 from firmware_io.scan.plan import ScanPlan
+from firmware_io.servo.fitness import ServoSetupError
 
 AGAIN_S = 3.0
 _ASKED_S = 1.0
@@ -49,6 +50,9 @@ def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None], viewer: 
         steered: is told of the scan, and says what shall happen.
         say: is told what is going on.
         viewer: is told of the scan too.
+
+    Raises:
+        ServoSetupError: settings of the servo that outlast the power must change first.
     """
     watch = Both(steered, viewer)
     while True:
@@ -60,6 +64,8 @@ def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None], viewer: 
             acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), say, watch)
         except Interrupted:
             say("stopped, as a parameter asks")
+        except ServoSetupError:  # trying again would not help: somebody must agree
+            raise
         except DeviceError as error:
             line = f"{error}; trying again in {AGAIN_S:g} s"
             steered.failed(line)

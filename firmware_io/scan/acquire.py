@@ -44,6 +44,7 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     What ends it early carries as notes what the devices answered to that.
 
     Raises:
+        ServoSetupError: settings of the servo that outlast the power must change first; nothing was moved.
         DeviceError: a device is absent, another one than the angle set names, or fails.
         RecordingError: the recording cannot be written.
     """
@@ -57,7 +58,9 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
     )  # loads the message types: half a second that must not fall into the recording
     with _unturned_until_opened() as opened, ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
-        servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id))
+        servo = stack.enter_context(
+            open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id, spins=isinstance(plan.motion, Spin))
+        )
         opened.set()
         check_model(plan.angles, lidar)
         tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")

@@ -18,6 +18,7 @@ import numpy as np
 
 from design.angles import AngleSet, load_angles
 from design.errors import DeviceError
+from design.motion import Spin
 from firmware_io.device_ports import emulated, lidar_ports, servo_ports
 from firmware_io.lidar.families import open_lidar
 from firmware_io.scan.acquire import check_model
@@ -26,6 +27,7 @@ from firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
 from firmware_io.serial_port import latency_timer
 from firmware_io.servo import settings
 from firmware_io.servo.examine import examine_servo
+from firmware_io.servo.fitness import ServoSetupError
 
 _LOOK_S = 4.0
 _BOUND_MS = 2.0
@@ -33,10 +35,19 @@ _BOUND_MS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class DeviceFinding:
-    """One line of the diagnosis; `says` ends with the remedy where something is wrong."""
+    """One line of the diagnosis.
+
+    Attributes:
+        verdict: whether something must be done.
+        says: what was seen; ends with the remedy if something is wrong.
+        set_up: port of the servo whose set-up is the remedy, or was made; None if there is no such servo.
+        undo: file from which that set-up can be undone; None if it was not made.
+    """
 
     verdict: Literal["ok", "warning", "wrong"]
     says: str
+    set_up: str | None = None
+    undo: Path | None = None
 
 
 def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
@@ -55,9 +66,9 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
     if twins is not None and lidar is None and servo is None:
         yield DeviceFinding("ok", f"the scanner of {out} is emulated by process {twins.pid}")
         lidars, servos = [twins.lidar], [twins.servo]
-    model = angles.servo if angles else None
+    model, spins = _servo_of(angles)
     examinations = [_guarded(_examine_lidar(port, angles)) for port in lidars]
-    examinations += [_guarded(_examine_servo(port, model, servo_id)) for port in servos]
+    examinations += [_guarded(_examine_servo(port, model, servo_id, spins=spins)) for port in servos]
     with ThreadPoolExecutor(max(len(examinations), 1)) as side_by_side:  # as a scan asks them
         for findings in side_by_side.map(list[DeviceFinding], examinations):
             yield from findings
@@ -85,25 +96,40 @@ def fix(out: Path | None, servo: str | None, servo_id: int | None) -> Iterator[D
     twins = None if out is None else emulated(out)
     port = servo or (twins.servo if twins else None)
     if port is None:
-        yield DeviceFinding("wrong", "--fix writes, so it does not guess: name the servo's port with --servo PORT")
+        yield DeviceFinding("wrong", "a servo is set up only on a port that was named: name it with --servo PORT")
         return
-    model = None if out is None else load_angles(out / "angles.json").servo
-    yield from _told(settings.fix(port, model, servo_id, Path() if out is None else out))
+    model, spins = _servo_of(None if out is None else load_angles(out / "angles.json"))
+    yield from _told(settings.set_up(port, model, servo_id, Path() if out is None else out, spins=spins), port)
 
 
 def restore(file: Path, servo: str | None) -> Iterator[DeviceFinding]:
     """Set a servo back to what `fix` found; `servo` is its port where that has another name now."""
-    yield from _told(settings.restore(file, servo))
+    yield from _told(settings.restore(file, servo), servo)
 
 
-def _told(lines: Iterator[str]) -> Iterator[DeviceFinding]:
-    yield from _guarded(DeviceFinding("ok", line) for line in lines)
+def _servo_of(angles: AngleSet | None) -> tuple[str | None, bool | None]:
+    """Model of the servo, and whether it spins, as far as an angle set says so."""
+    if angles is None:
+        return None, None
+    return angles.servo, None if angles.motion is None else isinstance(angles.motion, Spin)
+
+
+def _told(steps: Iterator[str | Path], port: str | None) -> Iterator[DeviceFinding]:
+    yield from _guarded(
+        DeviceFinding("ok", f"the old settings are kept in {step}", port, step)
+        if isinstance(step, Path)
+        else DeviceFinding("ok", step)
+        for step in steps
+    )
 
 
 def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
     """A device that fails ends its own examination only."""
     try:
         yield from examination
+    except ServoSetupError as error:
+        for change in error.changes:
+            yield DeviceFinding("wrong", f"{error.port}: servo {error.servo_id}: {change}", set_up=error.port)
     except DeviceError as error:
         for line in (str(error), *getattr(error, "__notes__", ())):
             yield DeviceFinding("wrong", line)
@@ -149,8 +175,10 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding
     yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
 
 
-def _examine_servo(port: str, model: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
-    found = examine_servo(port, model, servo_id)
+def _examine_servo(
+    port: str, model: str | None, servo_id: int | None, *, spins: bool | None
+) -> Iterator[DeviceFinding]:
+    found = examine_servo(port, model, servo_id, spins=spins)
     yield DeviceFinding("ok", f"{found.who} ({found.model}), {found.speaks}")
     if found.reports:
         says = f"{found.who} reports {found.reports}: find out why before it turns again; `scan` resets it"
@@ -158,7 +186,7 @@ def _examine_servo(port: str, model: str | None, servo_id: int | None) -> Iterat
     if found.has_torque:
         yield DeviceFinding("warning", f"{found.who} has its torque on: something has driven it, and it may move")
     for unfit in found.unfit:
-        yield DeviceFinding("warning", f"{found.who}: {unfit}: `scanwright doctor --fix --servo {port}` sets it")
+        yield DeviceFinding("warning", f"{found.who}: {unfit}", set_up=port)
     if found.slow_adapter:
         yield DeviceFinding("warning", f"{port}: {found.slow_adapter}")
     yield DeviceFinding("ok", f"{port}: {found.voltage_V:.1f} V, {found.temperature_degC:.0f} deg C")

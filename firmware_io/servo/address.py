@@ -1,4 +1,4 @@
-"""`scanwright servo-setup`: another number or speed for a servo, with care: a mistake makes it hard to find again."""
+"""Give a servo another number or speed, with care: a mistake makes it hard to find again."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _IDS = range(253)
 
 def set_address(
     port: str, new_id: int | None, new_baud: int | None, from_id: int | None, from_baud: int | None, folder: Path
-) -> Iterator[str]:
-    """Set number and speed of a servo; each change in words, as it is made and read back.
+) -> Iterator[str | Path]:
+    """Set number and speed of a servo; yields as `settings.set_up`.
 
     Args:
         port: of the servo.
@@ -27,7 +27,7 @@ def set_address(
         new_baud: bits per second that it gets; None to keep its own.
         from_id: its number now; None if it is the only servo that answers, at whatever speed.
         from_baud: its speed now; None to look at all that are known.
-        folder: gets the file with what it had, from which `doctor --restore` sets it back.
+        folder: gets the file that undoes the changes.
 
     Raises:
         DeviceError: nothing to do, not one servo but none or several could be meant, the number is taken, the servo

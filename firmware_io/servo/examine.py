@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from firmware_io.servo.find import find_servo, listen_first, open_bus
-from firmware_io.servo.fitness import Unfit, slow_adapter, unfit_settings
+from firmware_io.servo.fitness import SettingChange, slow_adapter, unfit_settings
 
 _READS = 100
 
@@ -36,7 +36,7 @@ class ServoExamination:
     speaks: str
     reports: str | None
     has_torque: bool
-    unfit: tuple[Unfit, ...]
+    unfit: tuple[SettingChange, ...]
     slow_adapter: str | None
     reads_hz: float
     bound_ms: float
@@ -44,13 +44,14 @@ class ServoExamination:
     temperature_degC: float  # noqa: N815
 
 
-def examine_servo(port: str, model: str | None, servo_id: int | None) -> ServoExamination:
+def examine_servo(port: str, model: str | None, servo_id: int | None, *, spins: bool | None = None) -> ServoExamination:
     """Listen, then ask.
 
     Args:
         port: of the servo.
         model: what it must be; None for any that is known.
         servo_id: its number; None if it is alone.
+        spins: as in `fitness.needed_settings`.
 
     Raises:
         DeviceError: somebody else speaks on this port, no servo answers, several do, or it is another model.
@@ -60,7 +61,7 @@ def examine_servo(port: str, model: str | None, servo_id: int | None) -> ServoEx
         unit = find_servo(bus, model, servo_id)
         table = unit.table
         reports, has_torque = unit.told(unit.present()), unit.has_torque()
-        unfit = tuple(unfit_settings(unit))
+        unfit = tuple(unfit_settings(unit, spins=spins))
         bus.return_delay_ns = unit.value(table.return_delay_ns)
         began_s = time.monotonic()
         answers = [unit.present() for _ in range(_READS)]

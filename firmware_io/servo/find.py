@@ -1,9 +1,10 @@
-"""Find a servo on a port: its speed, its packets, its model. It is told nothing, but to answer where it is mute."""
+"""Find a servo on a port: its speed, its packets, its model. Only a mute servo is written to, and only on request."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import Literal
 
 from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from firmware_io.servo.bus.bus import ServoBus
@@ -11,6 +12,9 @@ from firmware_io.servo.bus.packet_format import PacketFormat
 from firmware_io.servo.bus.registers import ControlTable
 from firmware_io.servo.bus.unit import PING_S, ServoUnit
 from firmware_io.servo.families import all_families, all_tables
+from firmware_io.servo.fitness import mute_servo
+
+Unmute = Literal["never", "until power-off", "for good"]
 
 _PATIENT_PING_S = 0.2
 _LISTEN_S = 0.3
@@ -26,19 +30,21 @@ def open_bus(port: str) -> ServoBus:
 
 
 def find_servo(
-    bus: ServoBus, model: str | None, servo_id: int | None, *, baud: int | None = None, unmute: bool = False
+    bus: ServoBus, model: str | None, servo_id: int | None, *, baud: int | None = None, unmute: Unmute = "never"
 ) -> ServoUnit:
-    """Set the bus to the speed and the packets that a servo answers to. Only asks, unless it is to unmute.
+    """Set the bus to the speed and the packets that a servo answers to. Only reads, unless it may unmute the servo.
 
     Args:
         bus: a fresh one.
         model: what it must be; None for any that is known.
         servo_id: its number; None if it is alone.
         baud: the only speed to ask at; None for all that are known.
-        unmute: let a servo that answers nothing but pings answer everything.
+        unmute: whether to set a servo that answers nothing but pings to answer everything: never, only if that setting
+            is gone with the power (else its torque is turned off), or always.
 
     Raises:
-        DeviceError: none answers, several do, it is another model, or it is mute.
+        ServoSetupError: it is mute, and may not be unmuted.
+        DeviceError: none answers, several do, or it is another model.
     """
     if model is not None and model not in {table.model for table in all_tables()}:
         known = ", ".join(sorted({table.model for table in all_tables()}))
@@ -50,7 +56,7 @@ def find_servo(
         strangers = []
         for unit in _answering(bus, model, servo_id, baud, wait_s):
             found = _identity(unit)
-            if was_mute := found is None and unmute and unit.table.can_be_mute:
+            if was_mute := found is None and _may_unmute(unit.table, unmute):
                 unit.answer_everything()
                 found = _identity(unit)
             if isinstance(found, ControlTable):
@@ -62,11 +68,11 @@ def find_servo(
             if found is not None:
                 strangers.append(f"servo {unit.id} has model number {found} in protocol {bus.packets.protocol}")
             elif unit.table.can_be_mute and mute == here:
-                level, wanted = unit.table.status_return, unit.table.answers_all
-                raise DeviceError(
-                    f"{bus.port}: servo {unit.id} answers pings only: its {level} is 0; "
-                    f"`scanwright doctor --fix --servo {bus.port}` sets it to {wanted}"
-                )
+                if (
+                    unmute == "until power-off"
+                ):  # who is going to drive it wants it without torque, and cannot read that
+                    bus.write_unanswered(unit.id, unit.table.torque, unit.table.torque.encode(0))
+                raise mute_servo(bus.port, unit.table, unit.id)
             elif unit.table.can_be_mute:
                 mute = here
         if any(stranger in met for stranger in strangers):  # not once: a late answer may be taken for another one's
@@ -76,6 +82,13 @@ def find_servo(
     who = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
     speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _ways(model, baud)))
     raise DeviceTimeoutError(f"{bus.port}: {who} at {speeds} baud: look at its power, its cable, its id")
+
+
+def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
+    level = table.status_return
+    if level is None or not table.can_be_mute:
+        return False
+    return unmute == "for good" or (unmute == "until power-off" and not table.is_kept(level))
 
 
 def listen_first(bus: ServoBus) -> None:

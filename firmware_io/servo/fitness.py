@@ -1,96 +1,124 @@
-"""What a servo's settings must be: what is not as the driver wants it, and what is set before it is driven."""
+"""The settings that the driver needs in a servo: which differ, why each matters, and the error that lists them."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from design.errors import DeviceError, DeviceTimeoutError
+from design.errors import DeviceError
 from firmware_io.serial_port import latency_timer
 from firmware_io.servo.bus.registers import ControlTable, Register, Setting
-from firmware_io.servo.bus.unit import PING_S, ServoUnit
+from firmware_io.servo.bus.unit import ServoUnit
 
-_REBOOT_S = 3.0
 _READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
-_HARM_NEUTRAL = "which turns or shifts the angles"
+_MUTE = "so that it answers nothing but pings"
+_ANSWERS_LESS = "so that it does not answer what it is told"
+_NEUTRAL = "which turns or shifts the angles"
+_MODE = {True: "so that it does not turn continuously", False: "so that it does not go to every angle"}
 
 
 @dataclass(frozen=True, slots=True)
-class Unfit:
-    """A setting of a servo that is not as the driver wants it.
+class SettingChange:
+    """A setting of a servo that must change.
 
     Attributes:
-        register: which.
-        was: its count.
-        wanted: the count it should have.
-        harm: what it does as it is.
+        register: its register.
+        now: its count.
+        needed: the count that the driver needs.
+        why: what the setting does as it is.
     """
 
     register: Register
-    was: int
-    wanted: int
-    harm: str
+    now: int
+    needed: int
+    why: str
 
     def __str__(self) -> str:
-        return f"{self.register} is {self.was}, {self.harm}; {self.wanted} is right"
+        return f"{self.register} is {self.now}, {self.why}; {self.needed} is right"
 
 
-def prepare(unit: ServoUnit) -> tuple[str, ...]:
-    """Take the torque, clear faults, set what the driver relies on; what the user should know or do.
+class ServoSetupError(DeviceError):
+    """Settings that outlast the power must change before the servo can be used; nothing was written, nothing moved.
 
-    Raises:
-        DeviceError: a setting that the angles rely on cannot be made.
+    Attributes:
+        port: of the servo.
+        model: name, as in the catalogue; None if the servo does not answer a question for it.
+        servo_id: its number on the bus.
+        changes: the settings, in the order in which they can be written.
     """
-    notes, table, bus = [], unit.table, unit.bus
-    unit.answer_everything()
-    stopped = unit.write(table.torque, 0)
-    if reported := unit.told(unit.present() if table.alarms else stopped):
-        notes.append(f"it reported {reported} and was reset: find out why before it turns again")
-        _recover(unit)
-    for register, count in table.neutral:
-        if (was := unit.set_kept(register, count)) != count:
-            notes.append(f"{register} was {was}, {_HARM_NEUTRAL}: set to {count}")
-    delay = table.return_delay_ns
-    bus.return_delay_ns = unit.value(delay)
-    try:
-        if was := unit.set_kept(delay, 0):
-            notes.append(f"{delay} was {was} ({was * delay.unit / 1e3:g} us): set to 0")
-        bus.return_delay_ns = 0.0
-    except DeviceError as error:
-        notes.append(f"{delay} is {bus.return_delay_ns / 1e3:g} us and cannot be set to 0: {error}")
-    bus.lower_latency()
-    if timer := slow_adapter(bus.port):
-        notes.append(timer)
-    notes += [f"{unfit}: `scanwright doctor --fix` sets it" for unfit in _slow(unit)]
-    return tuple(notes)
+
+    def __init__(self, port: str, model: str | None, servo_id: int, changes: Sequence[SettingChange]) -> None:
+        self.port, self.model, self.servo_id, self.changes = port, model, servo_id, tuple(changes)
+        number = len(self.changes)
+        registers = "1 register that outlasts" if number == 1 else f"{number} registers that outlast"
+        head = f"{port}: servo {servo_id} ({model or 'model unknown'}): {registers} the power must change first"
+        super().__init__("\n".join([f"{head}; nothing was written", *(f"  {change}" for change in self.changes)]))
 
 
-def unfit_settings(unit: ServoUnit) -> list[Unfit]:
-    """What is not, or was not, as the driver wants it; only asks. The order is the one in which it can be set."""
-    table = unit.table
-    level, delay = table.status_return, table.return_delay_ns
-    levels = () if level is None else ((level, table.answers_all),)
-    wanted: list[tuple[Setting, str]] = [
-        *((setting, "so that it does not answer what it is told") for setting in levels),
-        *((setting, _HARM_NEUTRAL) for setting in table.neutral),
-        ((delay, 0), f"so that its answers come {unit.value(delay) / 1e3:g} us late"),
+def needed_settings(table: ControlTable, *, spins: bool | None) -> list[tuple[Setting, str]]:
+    """The settings that the driver cannot do without, and what another count does.
+
+    Args:
+        table: of the servo.
+        spins: whether it must turn continuously (True) or go to angles (False); None if that is not known yet.
+    """
+    level = () if table.status_return is None else ((table.status_return, table.answers_all),)
+    mode = () if spins is None else table.mode(spins=spins)
+    return [
+        *((setting, _ANSWERS_LESS) for setting in level),
+        *((setting, _NEUTRAL) for setting in table.neutral),
+        *((setting, _MODE[bool(spins)]) for setting in mode),
     ]
-    known = [(register, unit.count(register), count, harm) for (register, count), harm in wanted]
-    muted = (
-        [Unfit(level, 0, table.answers_all, "so that it answers nothing but pings")] if unit.was_mute and level else []
-    )
-    return [*muted, *(Unfit(*one) for one in known if one[1] != one[2]), *_slow(unit)]
+
+
+def set_up_counts(table: ControlTable, baud: int, *, spins: bool | None) -> dict[Register, int]:
+    """The counts of a servo that is set up: `needed_settings`, no return delay, and a speed that suffices."""
+    counts = {register: count for (register, count), _ in needed_settings(table, spins=spins)}
+    counts[table.return_delay_ns] = 0
+    return counts | (dict([table.fast]) if _reading_s(table, baud) > _READ_S else {})
+
+
+def mode_changes(unit: ServoUnit, *, spins: bool) -> list[SettingChange]:
+    """The settings of one mode that differ; only reads."""
+    return _differing(unit, [(setting, _MODE[spins]) for setting in unit.table.mode(spins=spins)])
+
+
+def needed_changes(unit: ServoUnit, *, spins: bool | None) -> list[SettingChange]:
+    """The settings that differ and that the driver cannot do without; only reads. `spins` as in `needed_settings`.
+
+    A servo that was mute and was made to answer has that change first: it was made, and must be kept and undone.
+    """
+    level = unit.table.status_return
+    muted = [SettingChange(level, 0, unit.table.answers_all, _MUTE)] if unit.was_mute and level else []
+    return muted + _differing(unit, needed_settings(unit.table, spins=spins))
+
+
+def improvements(unit: ServoUnit) -> list[SettingChange]:
+    """The settings that differ and that the driver can do without, if less well; only reads."""
+    delay = unit.table.return_delay_ns
+    late = f"so that its answers come {unit.value(delay) / 1e3:g} us late"
+    return [*_differing(unit, [((delay, 0), late)]), *_slow(unit)]
+
+
+def unfit_settings(unit: ServoUnit, *, spins: bool | None = None) -> list[SettingChange]:
+    """All of `needed_changes` and `improvements`, in the order in which they can be written; only reads."""
+    return needed_changes(unit, spins=spins) + improvements(unit)
+
+
+def mute_servo(port: str, table: ControlTable, servo_id: int) -> ServoSetupError:
+    """The error of a servo that answers nothing but pings, and keeps that without power."""
+    assert table.status_return is not None
+    return ServoSetupError(port, None, servo_id, [SettingChange(table.status_return, 0, table.answers_all, _MUTE)])
 
 
 def settable(table: ControlTable) -> dict[str, Register]:
-    """The settings that `unfit_settings` may name, and the number of the servo, by their names."""
+    """The registers that a set-up may write, and the number of the servo, by their names."""
     registers = [
         *([table.status_return] if table.status_return else []),
         table.return_delay_ns,
         table.baud,
         table.id,
-        *(register for register, _ in table.neutral),
+        *(register for register, _ in (*table.neutral, *table.wheel, *table.joint)),
     ]
     return {register.name: register for register in registers}
 
@@ -110,26 +138,20 @@ def slow_adapter(port: str) -> str | None:
     )
 
 
-def _recover(unit: ServoUnit) -> None:
-    """Let it turn again: the torque limit, which is less after a shutdown; without such a register by a restart."""
-    table = unit.table
-    if table.alarms:  # to read it was enough
-        return
-    if table.torque_limit and table.max_torque:
-        unit.bus.write(unit.id, table.torque_limit, unit.read(table.max_torque).data)
-        return
-    unit.bus.reboot(unit.id)
-    end_s = time.monotonic() + _REBOOT_S
-    while not unit.bus.ping(unit.id, PING_S):
-        if time.monotonic() > end_s:
-            raise DeviceTimeoutError(f"{unit}: no answer {_REBOOT_S:g} s after its restart")
+def _differing(unit: ServoUnit, needed: list[tuple[Setting, str]]) -> list[SettingChange]:
+    known = [SettingChange(register, unit.count(register), count, why) for (register, count), why in needed]
+    return [change for change in known if change.now != change.needed]
 
 
-def _slow(unit: ServoUnit) -> Iterator[Unfit]:
-    """Its speed, where it keeps the servo from being read 100 times a second."""
-    table, bus = unit.table, unit.bus
-    wire_s = sum(bus.packets.overhead + register.size for register in table.present) * 10 / bus.baud
-    if wire_s > _READ_S:
+def _reading_s(table: ControlTable, baud: int) -> float:
+    """How long the bytes of one reading take."""
+    return sum(table.packets.overhead + register.size for register in table.present) * 10 / baud
+
+
+def _slow(unit: ServoUnit) -> Iterator[SettingChange]:
+    """Its speed, if the servo cannot be read 100 times a second."""
+    table, baud = unit.table, unit.bus.baud
+    if (wire_s := _reading_s(table, baud)) > _READ_S:
         register, count = table.fast
-        harm = f"{bus.baud} baud, so that it can be read {1 / wire_s:.0f} times a second at best"
-        yield Unfit(register, unit.count(register), count, harm)
+        why = f"{baud} baud, so that it can be read {1 / wire_s:.0f} times a second at best"
+        yield SettingChange(register, unit.count(register), count, why)

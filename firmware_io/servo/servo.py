@@ -3,9 +3,10 @@
 An error that leaves the `with` statement carries as a note what the servo answered to that: that its torque is off, or
 that it could not be stopped.
 
-`open_servo` finds speed, protocol and model, and makes the servo ready: torque off, no return delay. While it turns,
-`read` it at least every two seconds: turns are counted from what is read, and a servo that nobody listens to is
-stopped (by the guard process, and by the bus watchdog where the servo has one).
+`open_servo` finds speed, protocol and model, and turns the torque off. Settings that outlast the power are written only
+if the caller names a folder for the file that undoes them. While the servo turns, `read` it at least every two seconds:
+turns are counted from what is read, and a servo that nobody listens to is stopped (by the guard process, and by the bus
+watchdog where the servo has one).
 
 What nobody can help: a servo without a watchdog (protocol 1.0, STS, TMCL) that spins goes on when its bus is cut.
 """
@@ -13,6 +14,7 @@ What nobody can help: a servo without a watchdog (protocol 1.0, STS, TMCL) that 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import TracebackType
 from typing import NoReturn, Self
 
@@ -23,8 +25,9 @@ from firmware_io.servo.bus.bus import ServoAnswer
 from firmware_io.servo.bus.registers import RPM
 from firmware_io.servo.bus.unit import ServoUnit
 from firmware_io.servo.find import find_servo, open_bus
-from firmware_io.servo.fitness import prepare
+from firmware_io.servo.fitness import mode_changes
 from firmware_io.servo.guard import SILENCE_S, Guard
+from firmware_io.servo.prepare import prepare, set_agreed
 from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
 from firmware_io.servo.reading import state_of
 
@@ -50,13 +53,14 @@ class ServoDriver:
         step_rad: of its encoder.
     """
 
-    def __init__(self, unit: ServoUnit, warnings: tuple[str, ...]) -> None:
+    def __init__(self, unit: ServoUnit, warnings: tuple[str, ...], undo_folder: Path | None = None) -> None:
         table, bus = unit.table, unit.bus
         self.model, self.protocol, self.id = table.model, table.protocol, unit.id
         self.baud, self.port = bus.baud, bus.port
         self.step_rad = abs(table.position.unit)
         self._unit, self._bus, self._table, self._warnings = unit, bus, table, warnings
         self._product = load_catalogue().get(table.model, Servo)
+        self._undo_folder = undo_folder
         self._spins: bool | None = None  # in wheel mode; None without torque
         self._order: TurnOrder | None = None
         self._known: ServoState | None = None  # the last state with a position, from which turns are counted
@@ -110,6 +114,7 @@ class ServoDriver:
         An AX-12A has no speed loop: it gets that share of its voltage which would give this rate without load.
 
         Raises:
+            ServoSetupError: the servo is set to go to angles, and that outlasts the power.
             DeviceError: the rate is beyond the motor.
         """
         self._check_rate(rate_rad_s)
@@ -123,6 +128,7 @@ class ServoDriver:
         """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
 
         Raises:
+            ServoSetupError: the servo is set to spin, and that outlasts the power.
             DeviceError: the servo has no such angle, or the rate is beyond the motor.
         """
         table = self._table
@@ -141,14 +147,18 @@ class ServoDriver:
         self._order = TurnOrder(rate_rad_s, angle_rad)
 
     def hold(self) -> None:
-        """Stand where it is, with torque on. An AX-12A that spins only loses its drive, for want of a speed loop."""
+        """Stand where it is, with torque on; from rest, in the mode that the servo is set to.
+
+        An AX-12A that is set to spin only loses its drive, for want of a speed loop.
+        """
         self._observe()
         if self._spins is False:
             self._unit.write(self._table.goal, self._here())
         elif self._spins:
             self._unit.write(self._table.wheel_speed, 0.0)
         else:
-            self._enter(spins=False)
+            spinner = bool(mode_changes(self._unit, spins=False)) and not mode_changes(self._unit, spins=True)
+            self._enter(spins=spinner)
         self._rest()
 
     def release(self) -> None:
@@ -228,8 +238,7 @@ class ServoDriver:
         if spins is self._spins:
             return
         self._stop()
-        for register, count in table.wheel if spins else table.joint:
-            self._unit.set_kept(register, count)
+        set_agreed(self._unit, mode_changes(self._unit, spins=spins), self._undo_folder)
         if table.counters:
             self._unit.write(table.wheel_speed, 0.0)  # steps that went on without torque, too
         for counter in table.counters:
@@ -269,21 +278,33 @@ class ServoDriver:
         return self._unit.value(self._table.position) % ((self._table.last + 1) * self._table.position.unit)
 
 
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:
+def open_servo(
+    port: str,
+    model: str | None = None,
+    servo_id: int | None = None,
+    *,
+    spins: bool | None = None,
+    undo_folder: Path | None = None,
+) -> ServoDriver:
     """Find the servo on a port, whatever its family, speed and protocol, and make it ready; it stands, without torque.
 
     Args:
         port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
         model: what it must be; None for any that is known.
         servo_id: its number on the bus; None if it is alone there.
+        spins: whether it is going to spin (True) or to sweep (False), so that a wrong mode is an error at once; None if
+            that is not known yet.
+        undo_folder: lets settings that outlast the power be written, and gets a file that undoes each such change; None
+            if the servo must stay as it is.
 
     Raises:
+        ServoSetupError: such settings must change, and `undo_folder` is None; the servo is without torque.
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
     bus = open_bus(port)
     try:
-        unit = find_servo(bus, model, servo_id, unmute=True)
-        return ServoDriver(unit, prepare(unit))
+        unit = find_servo(bus, model, servo_id, unmute="for good" if undo_folder else "until power-off")
+        return ServoDriver(unit, prepare(unit, spins=spins, undo_folder=undo_folder), undo_folder)
     except BaseException:
         bus.close()
         raise

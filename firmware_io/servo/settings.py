@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
@@ -17,7 +17,7 @@ from firmware_io.servo.bus.registers import Register
 from firmware_io.servo.bus.unit import ServoUnit
 from firmware_io.servo.families import all_tables
 from firmware_io.servo.find import find_servo, open_bus
-from firmware_io.servo.fitness import settable, unfit_settings
+from firmware_io.servo.fitness import SettingChange, settable, unfit_settings
 
 
 class ServoSetting(Record):
@@ -39,38 +39,89 @@ class ServoSettings(Record):
     settings: tuple[ServoSetting, ...] = Field(min_length=1)
 
 
-def fix(port: str, model: str | None, servo_id: int | None, folder: Path) -> Iterator[str]:
-    """Set what is not as the driver wants it; each change in words, as it is made and read back.
+def set_up(
+    port: str,
+    model: str | None,
+    servo_id: int | None,
+    undo_folder: Path,
+    *,
+    spins: bool | None = None,
+    agreed: Sequence[SettingChange] | None = None,
+) -> Iterator[str | Path]:
+    """Write the settings that the driver needs, and those that let it measure better.
 
     Args:
         port: of the servo.
         model: what it must be; None for any that is known.
         servo_id: its number; None if it is alone.
-        folder: gets the file with the counts before.
+        undo_folder: gets the file that undoes the changes.
+        spins: as in `fitness.needed_settings`.
+        agreed: write these changes and no others; None for all of `fitness.unfit_settings`.
+
+    Yields:
+        The undo file, once it is on the disk; then a line for each setting that was written and read back.
 
     Raises:
-        DeviceError: no such servo, it holds its torque, or keeps a count; or the file cannot be written.
+        DeviceError: no such servo, its torque is on, a setting is not as it was agreed upon or does not stay, or the
+            file cannot be written.
     """
     with closing(open_bus(port)) as bus:
-        unit = find_servo(bus, model, servo_id, unmute=True)
+        unit = find_servo(bus, model, servo_id, unmute="for good")
         check_torque(unit)
-        unfit = unfit_settings(unit)
-        if not unfit:
+        changes = unfit_settings(unit, spins=spins) if agreed is None else _still_true(unit, agreed)
+        if changes:
+            yield from write_changes(unit, changes, undo_folder)
+        else:
             yield f"{unit} ({unit.table.model}): every setting is as it should be"
-            return
-        yield keep_settings(folder, unit, [(one.register, one.was, one.wanted) for one in unfit])
-        for one in unfit:
-            yield changed(unit, one.register, one.was, one.wanted)[1]
 
 
-def keep_settings(folder: Path, unit: ServoUnit, changes: list[tuple[Register, int, int]]) -> str:
-    """Write down what is going to be changed: registers, their counts before and after; where, and what undoes it.
+def wanted_changes(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> list[SettingChange]:
+    """The settings that `set_up` would write; only reads. Arguments and errors as for `set_up`."""
+    with closing(open_bus(port)) as bus:
+        return unfit_settings(find_servo(bus, model, servo_id), spins=spins)
+
+
+def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path) -> Iterator[str | Path]:
+    """Keep the counts in a file, write the changes to a servo without torque, read all of them back in the end.
+
+    Yields and raises as `set_up`.
+    """
+    try:
+        file = keep_settings(undo_folder, unit, [(one.register, one.now, one.needed) for one in changes])
+    except DeviceError:
+        if unit.was_mute and (level := unit.table.status_return):  # it had to answer before its model was known
+            unit.set_answers(level, 0)
+        raise
+    yield file
+    for change in changes:
+        unit, line = changed(unit, change.register, change.now, change.needed)
+        yield line
+    for change in changes:
+        if (now := unit.count(change.register)) != change.needed:
+            raise DeviceError(
+                f"{unit}: {change.register}: {change.needed} was written, and it is {now} again: the servo has "
+                "restarted or does not keep it: look at its supply; nothing was moved"
+            )
+
+
+def _still_true(unit: ServoUnit, agreed: Sequence[SettingChange]) -> Sequence[SettingChange]:
+    """The changes, if the settings are what they were when somebody agreed to them."""
+    for change in agreed:
+        muted = unit.was_mute and change.register == unit.table.status_return
+        if not muted and (now := unit.count(change.register)) != change.now:
+            raise DeviceError(
+                f"{unit}: {change.register} is {now}, and was {change.now} before: another servo? nothing was written"
+            )
+    return agreed
+
+
+def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Register, int, int]]) -> Path:
+    """Write a file with the registers that are going to be changed, and their counts before and after; the file.
 
     Raises:
         DeviceError: the file cannot be written; nothing was changed then.
     """
     model, at = unit.table.model, f"{datetime.now():%Y%m%d-%H%M%S}"
-    file = folder / f"servo-{model}-{unit.id}-{at}.json"
     kept = ServoSettings(
         schema_name="scanwright/servo-settings/1",
         port=unit.bus.port,
@@ -78,18 +129,17 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: list[tuple[Register, i
         protocol=unit.table.protocol,
         id=unit.id,
         settings=tuple(
-            ServoSetting(register_name=register.name, before=was, after=wanted) for register, was, wanted in changes
+            ServoSetting(register_name=register.name, before=was, after=needed) for register, was, needed in changes
         ),
     )
-    _write(file, kept)
-    return f"{unit.bus.port}: what it had is kept: `scanwright doctor --restore {file}` sets it back"
+    return _write(folder, f"servo-{model}-{unit.id}-{at}", kept)
 
 
 def restore(file: Path, port: str | None) -> Iterator[str]:
-    """Set back what `fix` has changed, the last change first; each in words, as it is made and read back.
+    """Undo the changes of a file, the last one first; a line for each setting that was written and read back.
 
     Args:
-        file: the one that `fix` wrote.
+        file: one that `keep_settings` wrote.
         port: where the servo is now; None for where it was.
 
     Raises:
@@ -111,7 +161,7 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
             raise DeviceError(f"{file}: {kept.model} of protocol {kept.protocol} has no setting {what}")
     with closing(open_bus(port or kept.port)) as bus:
         now_id = next((one.after for one in kept.settings if known[one.register_name] == expected[0].id), kept.id)
-        unit = find_servo(bus, kept.model, now_id, unmute=True)
+        unit = find_servo(bus, kept.model, now_id, unmute="for good")
         if unit.table != expected[0]:
             raise DeviceError(f"{unit} speaks protocol {unit.table.protocol}, not {kept.protocol}")
         check_torque(unit)
@@ -134,7 +184,7 @@ def check_torque(unit: ServoUnit) -> None:
         )
 
 
-def changed(unit: ServoUnit, register: Register, was: int, count: int) -> tuple[ServoUnit, str]:
+def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple[ServoUnit, str]:
     """Set one, and read it back; the servo as it answers now, and what was done.
 
     Raises:
@@ -142,21 +192,25 @@ def changed(unit: ServoUnit, register: Register, was: int, count: int) -> tuple[
     """
     table, now = unit.table, unit
     if register == table.baud:
-        unit.set_baud(table.bauds[count])
+        unit.set_baud(table.bauds[needed])
     elif register == table.id:
-        now = unit.set_id(count)
-    elif register == table.status_return and count == table.answers_all:
+        now = unit.set_id(needed)
+    elif register == table.status_return and needed == table.answers_all:
         unit.answer_everything()
     elif register == table.status_return:  # from here on it may not answer, nor be read back
-        unit.bus.write_unanswered(unit.id, register, register.encode(count))
-        return unit, f"{unit}: {register}: {was} -> {count}; it was not read back"
+        unit.set_answers(register, needed)
+        return unit, f"{unit}: {register}: {was} -> {needed}; it was not read back"
     else:
-        unit.set_kept(register, count)
+        unit.set_kept(register, needed)
     return now, f"{unit}: {register}: {was} -> {now.count(register)}"
 
 
-def _write(file: Path, kept: ServoSettings) -> None:
-    """The file is on the disk before anything is changed."""
+def _write(folder: Path, stem: str, kept: ServoSettings) -> Path:
+    """Write a file of a new name, which is on the disk before anything is changed; the file."""
+    file, again = folder / f"{stem}.json", 1
+    while os.path.lexists(file):  # two changes within a second
+        again += 1
+        file = folder / f"{stem}-{again}.json"
     try:
         with file.open("x", encoding="utf-8") as out:
             out.write(kept.model_dump_json(by_alias=True, indent=2) + "\n")
@@ -164,3 +218,4 @@ def _write(file: Path, kept: ServoSettings) -> None:
             os.fsync(out.fileno())
     except OSError as error:
         raise DeviceError(f"{file}: cannot write, so nothing was changed: {error.strerror}") from error
+    return file

@@ -16,6 +16,7 @@ from design.angles import AngleSet
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar
 from design.errors import SceneError
+from design.motion import Spin
 from design.scene.ray_caster import Scene, build_scene, cast, load_scene
 from firmware_io.device_ports import Ports
 from firmware_io.lidar.families import family_of
@@ -54,6 +55,7 @@ def emulated_scanner(
     protocol: str | None = None,
     sigma_mm: float | None = None,
     seed: int = 0,
+    factory_servo: bool = False,
 ) -> Iterator[EmulatedScanner]:
     """Run the twins of a scanner's devices while the body runs.
 
@@ -64,6 +66,8 @@ def emulated_scanner(
         protocol: of the servo; None for the one that the model has from the factory.
         sigma_mm: replaces the data sheet's range noise.
         seed: of the noise.
+        factory_servo: give the servo the settings it has from the factory, not those of one that is set up for the
+            motion of the angle set.
 
     Raises:
         SceneError: the sensor would see nothing there.
@@ -84,6 +88,8 @@ def emulated_scanner(
         )
     with ExitStack() as stack:
         servo = stack.enter_context(ServoTwin(angles.servo, protocol, load=load, seed=seed))
+        if not factory_servo:
+            servo.set_up(spins=None if angles.motion is None else isinstance(angles.motion, Spin))
         sight = looking(scene, angles, servo.axis.angle_rad, model, seed)
         twin = stack.enter_context(twin_of(lidar, sight, seed))
         yield EmulatedScanner(Ports(twin.port, servo.port, os.getpid()), twin, servo)

@@ -13,6 +13,7 @@ from scanwright.api.clouds import write_cloud as write_cloud
 from scanwright.api.devices import open_lidar as open_lidar
 from scanwright.api.devices import open_servo as open_servo
 from scanwright.api.devices import scan as scan
+from scanwright.api.devices import set_up_servo as set_up_servo
 from scanwright.api.devices import simulate as simulate
 from scanwright.api.parts import build as build
 from scanwright.api.parts import check as check

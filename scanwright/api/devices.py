@@ -17,20 +17,69 @@ if TYPE_CHECKING:
     from firmware_io.servo.servo import ServoDriver
 
 
-def open_servo(port: str, model: str | None = None, servo_id: int | None = None) -> ServoDriver:
+def open_servo(
+    port: str,
+    model: str | None = None,
+    servo_id: int | None = None,
+    *,
+    spins: bool | None = None,
+    undo_folder: str | Path | None = None,
+) -> ServoDriver:
     """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
 
     Args:
         port: such as "/dev/serial/by-id/...".
         model: what it must be; None for any that is known.
         servo_id: its number on the bus; None if it is alone there.
+        spins: whether it is going to spin (True) or to sweep (False), so that a wrong mode is an error at once; None if
+            that is not known yet.
+        undo_folder: lets settings that outlast the power be written, and gets a file that undoes each such change; None
+            if the servo must stay as it is.
 
     Raises:
+        ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
     from firmware_io.servo.servo import open_servo
 
-    return open_servo(port, model, servo_id)
+    folder = None if undo_folder is None else Path(undo_folder)
+    return open_servo(port, model, servo_id, spins=spins, undo_folder=folder)
+
+
+def set_up_servo(
+    port: str,
+    undo_folder: str | Path,
+    *,
+    spins: bool | None = None,
+    model: str | None = None,
+    servo_id: int | None = None,
+    say: Say = quiet,
+) -> Path | None:
+    """Write the settings that a scan needs to a servo, where they outlast the power.
+
+    Args:
+        port: such as "/dev/serial/by-id/...".
+        undo_folder: gets the file that undoes the changes.
+        spins: whether the servo is going to spin (True) or to sweep (False); None leaves its mode as it is.
+        model: what it must be; None for any that is known.
+        servo_id: its number on the bus; None if it is alone there.
+        say: progress callback; called with one line for each setting.
+
+    Returns:
+        The undo file, for `scanwright servo-setup PORT --undo FILE`; None if every setting was right.
+
+    Raises:
+        DeviceError: no such servo, its torque is on, a setting does not stay, or the file cannot be written.
+    """
+    from firmware_io.servo.settings import set_up
+
+    undo: Path | None = None
+    for step in set_up(port, model, servo_id, Path(undo_folder), spins=spins):
+        if isinstance(step, Path):
+            undo = step
+        else:
+            say(step)
+    return undo
 
 
 def open_lidar(address: str, model: str | None = None) -> LidarDriver:
@@ -86,6 +135,8 @@ def scan(
         say: is told what is being done.
 
     Raises:
+        ServoSetupError: settings of the servo that outlast the power must change first (`set_up_servo` writes them);
+            nothing was written, nothing moved.
         ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
             stopped then, and what was recorded is whole.
     """

@@ -13,6 +13,7 @@ import typer
 from design.errors import DeviceError, require
 from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
 from scanwright.cli.help import Commands
+from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
 
 if TYPE_CHECKING:
     from firmware_io.scan.live_feed import Watch
@@ -71,6 +72,9 @@ def emulate(
     ] = (0.0, 0.0, 0.0),
     noise_mm: Annotated[float | None, typer.Option(min=0, help="Range noise; default is the data sheet's.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
+    factory_servo: Annotated[
+        bool, typer.Option("--factory-servo", help="Servo as it comes from the factory, not yet set up.")
+    ] = False,
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
     from design.angles import load_angles
@@ -83,7 +87,9 @@ def emulate(
     with (
         suppress(KeyboardInterrupt),
         on_duty(),
-        emulated_scanner(angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed) as twins,
+        emulated_scanner(
+            angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed, factory_servo=factory_servo
+        ) as twins,
         announced(out, twins.ports),
     ):
         print(f"lidar {angles.sensor} at {' and '.join(filter(None, [twins.ports.lidar, twins.lidar.address]))}")
@@ -143,7 +149,7 @@ def scan(
     with viewer as watch:
         try:
             with on_duty(), closing(watch):
-                recorded = acquire(plan, say, watch)
+                recorded = asking_first(lambda: acquire(plan, say, watch), out, servo_id)
         except KeyboardInterrupt as stop:
             for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
                 complain(line)
@@ -204,7 +210,7 @@ def ros2(
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
         show(plan.lines())
         with on_duty(), viewer as watch:
-            serve_devices(out, plan, given, Progress(), points, watch)
+            asking_first(lambda: serve_devices(out, plan, given, Progress(), points, watch), out, servo_id)
     except KeyboardInterrupt as stop:
         for line in ("stopped", *notes_of(stop)):
             complain(line)
@@ -219,10 +225,10 @@ def doctor(
     servo_id: ServoId = None,
     fix: Annotated[
         bool,
-        typer.Option("--fix", help="Set what keeps the servo from working well; keeps the old settings in a file."),
+        typer.Option("--fix", help="Set up the servo first, as servo-setup does; keeps a file to undo it."),
     ] = False,
     restore: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Set the servo back to what --fix found, and stop.")
+        Path | None, typer.Option(metavar="FILE.json", help="Undo the changes of --fix or servo-setup, and stop.")
     ] = None,
 ) -> None:
     """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
@@ -237,7 +243,12 @@ def doctor(
         findings = chain(fixed, examination.examine(out, lidar, servo, servo_id))
     wrong = False
     for finding in findings:
-        print(f"{finding.verdict:8} {finding.says}", flush=True)
+        remedy = ""
+        if finding.set_up is not None and finding.undo is not None:
+            remedy = f": `{undo_command(finding.set_up, finding.undo)}` restores them"
+        elif finding.set_up is not None:
+            remedy = f": `{set_up_command(finding.set_up, out, servo_id)}` sets it"
+        print(f"{finding.verdict:8} {finding.says}{remedy}", flush=True)
         wrong |= finding.verdict == "wrong"
     raise typer.Exit(1 if wrong else 0)
 
@@ -245,19 +256,43 @@ def doctor(
 @app.command("servo-setup")
 def servo_setup(
     port: Annotated[str, typer.Argument(metavar="PORT", help="Serial port of the servo.")],
-    new_id: Annotated[int | None, typer.Option("--id", metavar="N", help="Number that it gets, 0 to 252.")] = None,
+    scanner: Annotated[
+        Path | None, typer.Option(metavar="OUT", help="Build folder whose motion the servo is set up for.")
+    ] = None,
+    new_id: Annotated[int | None, typer.Option("--id", metavar="N", help="New number, 0 to 252; sets no more.")] = None,
     new_baud: Annotated[
-        int | None, typer.Option("--baud", metavar="B", help="Speed that it gets, such as 1000000.")
+        int | None, typer.Option("--baud", metavar="B", help="New speed, such as 1000000; sets no more.")
     ] = None,
     from_id: Annotated[
-        int | None, typer.Option(min=0, max=252, metavar="N", help="Its number now; needed where several answer.")
+        int | None, typer.Option(min=0, max=252, metavar="N", help="Its number now; needed if several answer.")
     ] = None,
     from_baud: Annotated[
         int | None, typer.Option(metavar="B", help="Its speed now; default is to look at all.")
     ] = None,
+    undo: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Undo the changes of an earlier set-up, and stop.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be written, and stop.")] = False,
 ) -> None:
-    """Give a servo another number or speed; reads it back, and keeps what it had for `doctor --restore`."""
+    """Write the settings that a scan needs to the servo; keeps a file to undo it."""
+    from design.angles import load_angles
+    from design.motion import Spin
+    from firmware_io.servo import settings
     from firmware_io.servo.address import set_address
 
-    for line in set_address(port, new_id, new_baud, from_id, from_baud, Path()):
-        print(line, flush=True)
+    numbers = new_id is not None or new_baud is not None
+    if sum([numbers, undo is not None, scanner is not None or dry_run]) > 1:
+        raise DeviceError("--id and --baud, --undo, --scanner and --dry-run: one at a time")
+    folder = scanner or Path()
+    if undo is not None:
+        print_steps(port, settings.restore(undo, port))
+    elif numbers:
+        print_steps(port, set_address(port, new_id, new_baud, from_id, from_baud, folder))
+    else:
+        angles = None if scanner is None else load_angles(scanner / "angles.json")
+        model, motion = (None, None) if angles is None else (angles.servo, angles.motion)
+        spins = None if motion is None else isinstance(motion, Spin)
+        if dry_run:
+            show(map(str, settings.wanted_changes(port, model, from_id, spins=spins)))
+        else:
+            print_steps(port, settings.set_up(port, model, from_id, folder, spins=spins))

@@ -6,7 +6,7 @@ from virtual_bus import VirtualBus
 from firmware_io.lidar.scip import dialogue, driver
 from firmware_io.lidar.sick import dialogue as cola_dialogue
 from firmware_io.lidar.sick import driver as sick_driver
-from firmware_io.servo import examine, fitness
+from firmware_io.servo import examine, prepare
 from firmware_io.servo.bus import bus, serial_line, unit
 
 
@@ -34,7 +34,7 @@ def virtual_bus(monkeypatch):
             return made
 
         monkeypatch.setattr(serial_line, "open_serial_port", open_port)
-        for module in (serial_line, unit, examine, fitness):
+        for module in (serial_line, unit, examine, prepare):
             monkeypatch.setattr(module, "time", made)
         return made
 

@@ -201,10 +201,12 @@ def test_a_lidar_of_a_package_of_its_own_sees_the_room(installed):
 def test_a_servo_of_a_package_of_its_own_turns(installed):
     installed(SERVOS, "FAMILY")
     assert load_catalogue().get("ACME-1", Servo).maker == "Feetech"
-    with ServoTwin("ACME-1") as twin, open_servo(twin.port) as servo:
-        assert (servo.model, servo.protocol, servo.baud) == ("ACME-1", "ACME", 250_000)
-        servo.spin(1.0)
-        assert servo.read().voltage_V == pytest.approx(12.0)
+    with ServoTwin("ACME-1") as twin:
+        twin.set_up(spins=True)
+        with open_servo(twin.port) as servo:
+            assert (servo.model, servo.protocol, servo.baud) == ("ACME-1", "ACME", 250_000)
+            servo.spin(1.0)
+            assert servo.read().voltage_V == pytest.approx(12.0)
 
 
 @pytest.mark.parametrize("package", [LIDARS, SERVOS], ids=["lidar", "servo"])

@@ -23,7 +23,7 @@ class VirtualBus:
             other.memory[other.table.id.address] = number
             self.servos.append(other)
         self.memory = self.servo.memory
-        self.heard = bytearray()
+        self.heard, self.writes = bytearray(), []
         self._coming = deque()  # when, and which byte
 
     def monotonic(self):
@@ -41,6 +41,7 @@ class VirtualBus:
 
     def write(self, data):
         self.heard += data
+        self.writes.append(bytes(data))
         hearing = [s for s in self.servos if s.listens(self.now_ns) and abs(self.baudrate / s.baud - 1) < 0.03]
         buffer, byte_ns = bytearray(data), round(10e9 / self.baudrate)
         self.now_ns += len(data) * byte_ns

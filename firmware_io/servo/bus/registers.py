@@ -84,6 +84,8 @@ class ControlTable:
         packets: how they are packed.
         number: of the model, that stands in `model_number`.
         ram: first address that is not kept without power; below it torque must be off to write.
+        kept: addresses that outlast the power, of a servo whose addresses are not in that order; None for those below
+            `ram`.
         centre: count of the encoder's centre, angle 0.
         last: highest count of one turn, or of the range that the sensor covers.
         measures_turn: False where the position sensor has a dead sector.
@@ -145,6 +147,15 @@ class ControlTable:
     alarms: tuple[Register, ...] = ()
     driven: Register | None = None
     counters: tuple[Register, ...] = ()
+    kept: range | None = None
+
+    def is_kept(self, register: Register) -> bool:
+        """Whether a register outlasts the power (EEPROM): such a register is written only if a person agrees."""
+        return register.address in (range(self.ram) if self.kept is None else self.kept)
+
+    def mode(self, *, spins: bool) -> tuple[Setting, ...]:
+        """Settings of continuous rotation, or of going to an angle."""
+        return self.wheel if spins else self.joint
 
     @property
     def protocol(self) -> str:

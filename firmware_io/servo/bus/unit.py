@@ -138,7 +138,7 @@ class ServoUnit:
         return renamed
 
     def answer_everything(self) -> None:
-        """Let it answer whatever is asked of it or told to it."""
+        """Set it to answer everything; this outlasts the power if `ControlTable.is_kept` says so."""
         level = self.table.status_return
         if level is None:
             return
@@ -148,5 +148,11 @@ class ServoUnit:
         except DeviceTimeoutError:
             answers = False
         if not answers:
-            self.bus.write_unanswered(self.id, level, with_answer)
-            time.sleep(PING_S)  # whether it answers this very write is unknown: let an answer come and be dropped
+            self.set_answers(level, self.table.answers_all)
+
+    def set_answers(self, level: Register, count: int) -> None:
+        """Set what it answers, torque being off; not read back, as it may not answer that."""
+        self._unlock(True)
+        self.bus.write_unanswered(self.id, level, level.encode(count))
+        time.sleep(PING_S)  # whether it answers this very write is unknown: let an answer come and be dropped
+        self._unlock(False)

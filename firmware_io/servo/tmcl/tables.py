@@ -37,6 +37,7 @@ TABLES = (
         packets=TMCL,
         number=1140,
         ram=0,
+        kept=range(GLOBAL, USER),  # a global parameter is stored as it is set, one of the axis only by a command
         centre=512,
         last=1023,
         measures_turn=True,

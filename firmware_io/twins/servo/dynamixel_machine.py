@@ -213,7 +213,7 @@ class DynamixelMachine:
                 memory.data[self._target(address + offset)] = byte
             self._act(now_ns)
             return 0
-        if error := memory.refuses(address, data, locked=was_on if self._two else bool(memory[47])):
+        if error := memory.refuses(address, data, locked=was_on or (not self._two and bool(memory[47]))):
             return self._error(error)
         goals = (
             self._two and memory[98] == 255 and any(goal in range(address, address + len(data)) for goal in (104, 116))

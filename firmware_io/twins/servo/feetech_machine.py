@@ -64,7 +64,7 @@ class FeetechMachine:
         self.memory = Memory({item.address: item for item in _ITEMS}, table.ram)
         self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
         self._rated_v = load_catalogue().get(table.model, Servo).rated_v
-        self._kept = bytes(self.memory.data[: table.ram])  # what outlasts the power
+        self._unsaved: dict[int, int] = {}  # written while locked: address -> the byte that comes back with the power
         self._supply = 1.0
         self._hot_degC = 30
         self._latched = 0
@@ -138,7 +138,9 @@ class FeetechMachine:
     def restart(self, now_ns: int) -> None:
         """Back to what was kept, and the values at power-up; deaf and mute until that is done."""
         self.memory.reset(self.table.ram)
-        self.memory.data[: self.table.ram] = self._kept
+        for address, byte in self._unsaved.items():
+            self.memory.data[address] = byte
+        self._unsaved.clear()
         self.memory[48] = self.memory[16]
         self._latched, self._registered, self._hot_degC = 0, None, 30
         self._mute_until_ns = now_ns + round(_BOOT_S * 1e9)
@@ -197,9 +199,11 @@ class FeetechMachine:
         if memory.refuses(address, data, locked=False):
             return
         was_on, mode = memory[_TORQUE], memory[_MODE]
+        for place in range(address, min(address + len(data), self.table.ram)):
+            self._unsaved.setdefault(place, memory.data[place])
         memory.data[address : address + len(data)] = data
         if not memory[_LOCK]:
-            self._kept = bytes(memory.data[: self.table.ram])
+            self._unsaved.clear()
         if memory[_TORQUE] == _TO_CENTRE:
             memory[_OFFSET] = _sized(round(self.axis.motion(now_ns).angle_rad / self.table.position.unit), 11)
             memory[_TORQUE] = was_on

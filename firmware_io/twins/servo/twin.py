@@ -25,6 +25,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
+from firmware_io.servo.fitness import set_up_counts
 from firmware_io.twins.servo.machine import ServoMachine, answers
 from firmware_io.twins.servo.models import machine_of
 from firmware_io.twins.servo_plant import Load
@@ -98,6 +99,15 @@ class ServoTwin:
             os.close(self._wake_read)
             os.close(self._wake_write)
             self._folder.cleanup()
+
+    def set_up(self, *, spins: bool | None) -> None:
+        """Give the servo the settings of one that is ready for a scan, before a program opens the port.
+
+        Args:
+            spins: whether it turns continuously (True) or goes to angles (False); None leaves the mode as it is.
+        """
+        for register, count in set_up_counts(self._servo.table, round(self._servo.baud), spins=spins).items():
+            self.memory[register.address] = count
 
     def bit_errors(self, rate: float) -> None:
         """From now on, each byte of an answer has one bit flipped with this probability."""

@@ -37,7 +37,6 @@ from firmware_io.samples import JointLog
 from firmware_io.scan import acquire, axis_thread, doctor, lidar_scans
 from firmware_io.scan.plan import plan_scan
 from firmware_io.scan.setpoints import course
-from firmware_io.servo.address import set_address
 from firmware_io.servo.progress import ServoState
 from firmware_io.servo.servo import open_servo
 from firmware_io.twins.scanner import emulated_scanner, room
@@ -285,9 +284,6 @@ def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
     # A computer that does something else meanwhile blurs the times of some beams, and twins leave scans out; what is
     # systematic shows in all runs, and in the middle of all beams.
     with emulating(out, "--seed", 1):
-        if scanner == INTERLACED:  # at its 9600 baud from the factory it tells nine angles a second
-            port = json.loads((out / "emulated.json").read_text())["servo"]
-            assert [*set_address(port, None, 1_000_000, None, None, tmp_path)][-1].endswith("0 -> 11")
         for attempt in range(5):
             recording = out / f"{attempt}.mcap"
             with program("scan", out, "--turns", turns, "-o", recording) as process:
@@ -442,6 +438,7 @@ def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, twins):
 def test_only_scans_at_rest_are_taken_at_stops(out, twins):
     motion = {"mode": "stop_and_go", "stops": 4, "dwell_s": 0.3, "move_s": 0.5}
     (out / "angles.json").write_text(angle_set(motion=motion).to_json())
+    twins.servo.set_up(spins=False)
     summary = run(out, twins)
     recording = open_recording(recorded(out))
     assert summary.left_out["scans taken on the way"] > 10

@@ -73,7 +73,7 @@ def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, command
     assert code == 1  # there is no lidar
     if model != "AX-12A":
         assert f"{delay} is 200, so that its answers come" in said
-        assert "`scanwright doctor --fix --servo" in said
+        assert f"`scanwright servo-setup {twin.port}` sets it" in said
 
 
 def test_a_servo_that_answers_only_pings_is_not_told_to(command, virtual_bus):
@@ -82,7 +82,8 @@ def test_a_servo_that_answers_only_pings_is_not_told_to(command, virtual_bus):
     _, said, _ = command("doctor", "--servo", twin.port)
     assert twin.memory[16] == 0
     assert set(instructions(twin.heard, "1.0")) | set(instructions(twin.heard, "2.0")) <= {PING, READ}
-    assert "servo 1 answers pings only: its status_return_level (register 16) is 0; `scanwright doctor --fix" in said
+    assert "servo 1: status_return_level (register 16) is 0, so that it answers nothing but pings; 2 is right" in said
+    assert f"`scanwright servo-setup {twin.port}` sets it" in said
 
 
 def test_where_something_speaks_first_nothing_is_said(command):
@@ -117,11 +118,11 @@ def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path, v
     code, said, _ = command("doctor", "--fix", "--servo", twin.port)
     (file,) = tmp_path.glob("servo-*.json")
     assert kept(twin) != before
-    assert f"`scanwright doctor --restore {file.name}`" in said
+    assert f"`scanwright servo-setup {twin.port} --undo {file.name}`" in said
     for setting in json.loads(file.read_text())["settings"]:
         name = rf"{setting['register']} \(register \d+\)"
         assert re.search(rf"servo 1: {name}: {setting['before']} -> {setting['after']}$", said, re.MULTILINE)
-    assert "--fix` sets it" not in said  # the examination after it finds nothing
+    assert "` sets it" not in said  # the examination after it finds nothing
     if protocol == "2.0":
         assert "protocol 2.0 at 1000000 baud" in said
     code, said, _ = command("doctor", "--restore", file)
@@ -166,7 +167,7 @@ def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monke
     twin.memory[24] = 0
     code, said, _ = command("doctor", "--fix")
     assert bytes(twin.memory.data[:24]) == before[:24]
-    assert code == 1 and "--fix writes, so it does not guess: name the servo's port" in said
+    assert code == 1 and "a servo is set up only on a port that was named" in said
     assert not list(tmp_path.glob("servo-*"))
 
 
@@ -227,7 +228,8 @@ def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
     for table in all_tables():
         names = settable(table)
         assert "" not in names
-        assert {register for register, _ in (*table.neutral, table.fast)} < set(names.values())
+        settings = (*table.neutral, *table.wheel, *table.joint, table.fast)
+        assert {register for register, _ in settings} < set(names.values())
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ UNHEARD = "could not be stopped: take its power"
 @pytest.mark.parametrize("cut", [False, True])
 def test_ctrl_c_tells_what_the_servo_answered(cut):
     with ServoTwin("MX-64R") as twin:
+        twin.set_up(spins=True)
         with pytest.raises(KeyboardInterrupt) as caught, open_servo(twin.port, servo_id=1) as servo:
             servo.spin(math.pi)
             if cut:
@@ -40,6 +41,7 @@ def test_ctrl_c_again_while_it_is_stopped_tells_it_too(cut, monkeypatch):
         raise KeyboardInterrupt("again")
 
     with ServoTwin("MX-64R") as twin:
+        twin.set_up(spins=True)
         with pytest.raises(KeyboardInterrupt) as caught, open_servo(twin.port, servo_id=1) as servo:
             servo.spin(math.pi)
             if cut:
@@ -53,6 +55,7 @@ def test_ctrl_c_again_while_it_is_stopped_tells_it_too(cut, monkeypatch):
 
 def test_a_neglected_servo_that_its_guard_cannot_reach_is_not_said_to_be_stopped():
     with ServoTwin("MX-64R") as twin:
+        twin.set_up(spins=True)
         servo = open_servo(twin.port, servo_id=1)
         servo.spin(math.pi)
         twin.cut()

@@ -131,7 +131,7 @@ class TmclMachine:
 
     def restart(self, now_ns: int) -> None:
         """Back to what was kept; the counts of steps and encoder begin at 0. Deaf and mute until that is done."""
-        self.memory.update(self._kept)
+        self.memory.update({at: count for at, count in self._kept.items() if not GLOBAL <= at < USER})
         self._degC, self._alarm, self._holds = _WELL_DEGC, 0, False
         angle_rad = self.axis.motion(now_ns).angle_rad
         self._steps = Steps(now_ns, 0.0, 0.0, 0.0, self._unit_rad, angle_rad)
@@ -259,7 +259,7 @@ class TmclMachine:
             _, least, most = GLOBAL_SETTINGS[number]
             if not least <= value <= most:
                 return _VALUE, value
-            self.memory[GLOBAL + number] = self._kept[GLOBAL + number] = value
+            self.memory[GLOBAL + number] = value  # which outlasts the power without a command to store it
         else:
             return _TYPE, value
         return _DONE, value

@@ -1,0 +1,97 @@
+"""Make a servo ready to be driven: torque off, faults cleared. It never writes unasked what outlasts the power."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from design.errors import DeviceError, DeviceTimeoutError
+from firmware_io.servo.bus.unit import PING_S, ServoUnit
+from firmware_io.servo.fitness import ServoSetupError, SettingChange, improvements, needed_changes, slow_adapter
+from firmware_io.servo.settings import write_changes
+
+_REBOOT_S = 3.0
+
+
+def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) -> tuple[str, ...]:
+    """Turn the torque off, clear faults, check the settings; the warnings for the user.
+
+    Args:
+        unit: the servo.
+        spins: as in `fitness.needed_settings`.
+        undo_folder: as in `set_agreed`.
+
+    Raises:
+        ServoSetupError: settings that outlast the power must change, and may not be written.
+        DeviceError: the servo does not answer, or does not keep a setting.
+    """
+    table, bus = unit.table, unit.bus
+    if table.status_return and not table.is_kept(table.status_return):
+        unit.answer_everything()
+    _torque_off(unit)
+    changes = needed_changes(unit, spins=spins)
+    set_agreed(unit, changes, undo_folder)
+    notes = [f"{change.register} was {change.now}, {change.why}: set to {change.needed}" for change in changes]
+    if reported := unit.told(unit.present()):
+        notes.append(f"it reported {reported} and was reset: find out why before it turns again")
+        _recover(unit)
+    bus.return_delay_ns = unit.value(table.return_delay_ns)
+    bus.lower_latency()
+    if timer := slow_adapter(bus.port):
+        notes.append(timer)
+    return (*notes, *(str(change) for change in improvements(unit)))
+
+
+def set_agreed(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path | None) -> None:
+    """Write settings: those that are gone with the power at once, the others only if there is a folder for their undo.
+
+    Args:
+        unit: the servo, without torque.
+        changes: what differs.
+        undo_folder: gets the file that undoes the changes; None if nothing that outlasts the power may be written.
+
+    Raises:
+        ServoSetupError: a setting outlasts the power and there is no folder; nothing was written.
+        DeviceError: the file cannot be written, or a setting does not stay.
+    """
+    kept = [change for change in changes if unit.table.is_kept(change.register)]
+    if kept and undo_folder is None:
+        raise ServoSetupError(unit.bus.port, unit.table.model, unit.id, kept)
+    if kept and undo_folder is not None:
+        for _ in write_changes(unit, kept, undo_folder):
+            pass
+    for change in changes:
+        if change not in kept:
+            unit.set_kept(change.register, change.needed)
+
+
+def _torque_off(unit: ServoUnit) -> None:
+    """Turn the torque off, also of a servo that is set not to answer that.
+
+    Raises:
+        DeviceError: it stays on.
+    """
+    level, torque = unit.table.status_return, unit.table.torque
+    if level is None or unit.count(level) == unit.table.answers_all:
+        unit.write(torque, 0)
+        return
+    unit.bus.write_unanswered(unit.id, torque, torque.encode(0))
+    time.sleep(PING_S)
+    if unit.count(torque):
+        raise DeviceError(f"{unit}: its torque stays on: cut its power")
+
+
+def _recover(unit: ServoUnit) -> None:
+    """Clear a shutdown: by the torque limit, which it lowers, or by a restart if there is no such register."""
+    table = unit.table
+    if table.alarms:  # reading them has cleared them
+        return
+    if table.torque_limit and table.max_torque:
+        unit.bus.write(unit.id, table.torque_limit, unit.read(table.max_torque).data)
+        return
+    unit.bus.reboot(unit.id)
+    end_s = time.monotonic() + _REBOOT_S
+    while not unit.bus.ping(unit.id, PING_S):
+        if time.monotonic() > end_s:
+            raise DeviceTimeoutError(f"{unit}: no answer {_REBOOT_S:g} s after its restart")

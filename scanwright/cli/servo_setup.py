@@ -1,0 +1,87 @@
+"""Settings of a servo that outlast the power: the person is asked first, and a file is kept that undoes the change."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import typer
+
+from scanwright.cli.console import complain
+
+if TYPE_CHECKING:
+    from firmware_io.servo.fitness import ServoSetupError
+
+T = TypeVar("T")
+
+
+def set_up_command(port: str, out: Path | None = None, servo_id: int | None = None) -> str:
+    """The command that sets up the servo of a port, for the motion of a build folder."""
+    words = [f"scanwright servo-setup {port}"]
+    words += [] if out is None else [f"--scanner {out}"]
+    words += [] if servo_id is None else [f"--from-id {servo_id}"]
+    return " ".join(words)
+
+
+def undo_command(port: str, file: Path) -> str:
+    """The command that undoes the changes of a file."""
+    return f"scanwright servo-setup {port} --undo {file}"
+
+
+def print_steps(port: str, steps: Iterable[str | Path]) -> None:
+    """Print each change as it is made, and first how to undo them all."""
+    for step in steps:
+        if isinstance(step, Path):
+            print(f"the old settings are kept; `{undo_command(port, step)}` restores them", flush=True)
+        else:
+            print(step, flush=True)
+
+
+def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
+    """Do work; if settings of the servo must change for it, ask the person, write them, and do it again.
+
+    Args:
+        work: uses the servo, and has stopped it when it raises.
+        out: build folder of the scanner; gets the undo file.
+        servo_id: number of the servo, if one was given.
+
+    Raises:
+        ServoSetupError: nobody is there to be asked, or a setting does not last; nothing moves.
+        typer.Exit: the person declines, code 2; nothing moves.
+    """
+    from firmware_io.servo.fitness import ServoSetupError
+    from firmware_io.servo.settings import set_up
+
+    written: set[str] = set()
+    while True:
+        try:
+            return work()
+        except ServoSetupError as error:
+            names = {change.register.name for change in error.changes}
+            if names & written:
+                error.add_note("it was written and did not last: the servo has restarted; look at its supply")
+                raise
+            remedy = f"`{set_up_command(error.port, out, servo_id)}` writes that, and keeps a file to undo it"
+            if not (sys.stdin.isatty() and sys.stderr.isatty()):
+                error.add_note(remedy)
+                raise
+            if not _agrees(error):
+                complain(f"nothing was written, nothing was moved; {remedy}")
+                raise typer.Exit(2) from None
+            written |= names
+            print_steps(error.port, set_up(error.port, error.model, error.servo_id, out, agreed=error.changes))
+
+
+def _agrees(error: ServoSetupError) -> bool:
+    """Whether the person at the terminal, who sees the list, agrees to write it."""
+    for line in str(error).splitlines():
+        complain(line)
+    number = len(error.changes)
+    try:
+        return typer.confirm(
+            f"Write {'this register' if number == 1 else f'these {number} registers'} to the servo?", err=True
+        )
+    except typer.Abort:
+        return False

@@ -1,0 +1,330 @@
+"""What outlasts the power of a servo is written only if somebody agrees, as listed, and can be undone byte by byte."""
+
+import json
+import math
+from types import SimpleNamespace
+
+import pytest
+import typer
+
+from design.angles import AngleSet
+from design.errors import DeviceError
+from firmware_io.device_ports import announced
+from firmware_io.ros import drive as ros_drive
+from firmware_io.servo import servo as servo_driver
+from firmware_io.servo.bus.bus import ServoBus
+from firmware_io.servo.fitness import ServoSetupError
+from firmware_io.servo.servo import open_servo
+from firmware_io.servo.settings import set_up
+from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.servo.machine import Request
+from firmware_io.twins.servo.twin import ServoTwin
+from scanwright.cli import servo_setup
+from scanwright.cli.servo_setup import asking_first
+
+MODELS = [
+    ("AX-12A", "1.0"),
+    ("MX-64R", "1.0"),
+    ("MX-106", "1.0"),
+    ("MX-28", "2.0"),
+    ("XM430-W350", "2.0"),
+    ("XL330-M288", "2.0"),
+    ("STS3215", "STS"),
+    ("PD42-3-1140", "TMCL"),
+]
+FAMILIES = [MODELS[1], MODELS[4], MODELS[6], MODELS[7]]
+# Counts that no driver wants, by address: turned and shifted angles, a narrow range, another mode, few answers.
+SPOILT = {
+    "1.0": {6: 10, 8: 900, 16: 1, 5: 200},
+    "2.0": {10: 1, 20: -500, 11: 16, 9: 200, 68: 1},
+    "STS": {31: 500, 30: 2, 33: 2, 9: 100, 8: 0, 7: 200},
+    "TMCL": {1090: 1, 210: 12_800, 140: 4, 154: 7},
+}
+SET_GLOBAL, STORING = 9, (7, 11, 137)  # of TMCL: global parameters are stored as they are set
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    guard = SimpleNamespace(turning=lambda: True, resting=lambda: True, beat=lambda: True, dismiss=lambda **_: True)
+    monkeypatch.setattr(servo_driver, "Guard", lambda *_: guard)
+    monkeypatch.setattr(ServoBus, "fileno", lambda _: -1)
+
+
+@pytest.fixture
+def spoilt(virtual_bus):
+    def make(model, protocol):
+        twin = virtual_bus(model, protocol)
+        for address, count in SPOILT[protocol].items():
+            twin.memory[address] = count
+        twin.memory[twin.servo.table.torque.address] = 1  # it holds something
+        return twin
+
+    return make
+
+
+@pytest.fixture
+def person(monkeypatch):
+    """Somebody at a terminal; what they are asked, and what they answer."""
+    asked = SimpleNamespace(questions=[], agrees=True)
+
+    def confirm(question, **_):
+        asked.questions.append(question)
+        return asked.agrees
+
+    terminal = SimpleNamespace(isatty=lambda: True)
+    monkeypatch.setattr(servo_setup, "sys", SimpleNamespace(stdin=terminal, stderr=terminal))
+    monkeypatch.setattr(typer, "confirm", confirm)
+    return asked
+
+
+def kept(twin):
+    """What the power does not take, by address."""
+    table, memory = twin.servo.table, twin.memory
+    if table.protocol == "TMCL":
+        return {address: memory[address] for address in range(1000, 2000) if address in memory}
+    return dict(enumerate(memory.data[: table.ram]))
+
+
+def kept_writes(twin):
+    """The addresses of the requests that write what outlasts the power, from the bytes on the wire."""
+    found = set()
+    for sent in twin.writes:
+        if request := twin.servo.take(bytearray(sent)):
+            found |= set(_addresses(request, twin.servo.table))
+    return found
+
+
+def _addresses(request: Request, table):
+    what, values = request.instruction, request.parameters
+    if table.protocol == "TMCL":
+        assert what not in STORING
+        return [1000 + values[0]] if what == SET_GLOBAL and values[1] == 0 else []
+    assert what in (1, 2, 3, 8)  # ping, read, write, reboot; nothing that writes in another way
+    if what != 3:
+        return []
+    wide = 2 if table.protocol == "2.0" else 1
+    first = int.from_bytes(values[:wide], "little")
+    return [address for address in range(first, first + len(values) - wide) if address < table.ram]
+
+
+@pytest.mark.parametrize("spins", [True, False])
+@pytest.mark.parametrize(("model", "protocol"), MODELS)
+def test_unasked_nothing_is_written_that_outlasts_the_power(model, protocol, spins, spoilt):
+    twin = spoilt(model, protocol)
+    before = kept(twin)
+    with pytest.raises(ServoSetupError) as caught:
+        open_servo(twin.port, model, spins=spins)
+    assert kept_writes(twin) == set() and kept(twin) == before
+    assert twin.memory[twin.servo.table.torque.address] == 0
+    for change in caught.value.changes:
+        assert f"{change.register.name} (register {change.register.address}) is {change.now}, " in str(caught.value)
+        assert change.now != change.needed and twin.servo.table.is_kept(change.register)
+
+
+@pytest.mark.parametrize("spins", [True, False])
+@pytest.mark.parametrize(("model", "protocol"), MODELS)
+def test_a_scan_with_a_servo_that_is_set_up_writes_nothing_that_outlasts_the_power(model, protocol, spins, virtual_bus):
+    twin = virtual_bus(model, protocol)
+    ServoTwin.set_up(SimpleNamespace(_servo=twin.servo, memory=twin.memory), spins=spins)
+    before = kept(twin)
+    with open_servo(twin.port, model, spins=spins) as servo:
+        servo.hold()
+        servo.release()
+        for turn in (0.5, 1.0):
+            servo.spin(turn) if spins else servo.sweep_to(turn, 0.5)
+            servo.read()
+            servo.hold()
+        assert not servo.warnings()
+    assert kept_writes(twin) == set() and kept(twin) == before
+
+
+@pytest.mark.parametrize(("model", "protocol"), FAMILIES)
+def test_a_driver_that_may_not_write_does_not_change_the_mode(model, protocol, virtual_bus):
+    twin = virtual_bus(model, protocol)
+    with open_servo(twin.port) as servo:
+        servo.sweep_to(0.3, 0.5)
+        if protocol == "TMCL":
+            servo.spin(0.5)  # which is no setting there
+        else:
+            with pytest.raises(ServoSetupError, match="so that it does not turn continuously"):
+                servo.spin(0.5)
+            assert twin.memory[twin.servo.table.torque.address] == 0
+    assert kept_writes(twin) == set()
+
+
+@pytest.mark.parametrize(("model", "protocol"), FAMILIES)
+def test_who_agrees_gets_what_was_listed_and_can_undo_it(model, protocol, spoilt, person, command, tmp_path):
+    twin = spoilt(model, protocol)
+    before = kept(twin)
+    listed = []
+
+    def work():
+        try:
+            return open_servo(twin.port, model, spins=True)
+        except ServoSetupError as error:
+            listed.extend(error.changes)
+            raise
+
+    asking_first(work, tmp_path, None).close()
+    assert len(person.questions) == 1 and f"{len(listed)} register" in person.questions[0].replace("this", "1")
+    listed_bytes = {
+        change.register.address + k
+        for change in listed
+        for k in range(1 if protocol == "TMCL" else change.register.size)
+    }
+    assert kept_writes(twin) == listed_bytes
+    after = kept(twin)
+    assert {address for address in before if before[address] != after[address]} <= listed_bytes
+    (file,) = tmp_path.glob("servo-*.json")
+    assert [tuple(one.values()) for one in json.loads(file.read_text())["settings"]] == [
+        (change.register.name, change.now, change.needed) for change in listed
+    ]
+    twin.brown_out()
+    assert kept(twin) == after
+    code, said, _ = command("servo-setup", twin.port, "--undo", file)
+    assert code == 0, said
+    twin.brown_out()
+    assert kept(twin) == before
+
+
+def test_who_declines_is_told_how_and_nothing_is_written(spoilt, person, tmp_path, capsys):
+    person.agrees = False
+    twin = spoilt("XM430-W350", "2.0")
+    with pytest.raises(typer.Exit) as stop:
+        asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, 1)
+    assert stop.value.exit_code == 2 and person.questions == ["Write these 3 registers to the servo?"]
+    hint = f"nothing was moved; `scanwright servo-setup {twin.port} --scanner {tmp_path} --from-id 1` writes that"
+    assert hint in capsys.readouterr().err
+    assert kept_writes(twin) == set() and not list(tmp_path.glob("servo-*"))
+
+
+def test_a_mute_servo_is_asked_about_before_it_is_made_to_answer(spoilt, person, tmp_path):
+    twin = spoilt("MX-64R", "1.0")
+    twin.memory[16] = 0
+    with pytest.raises(ServoSetupError, match=r"model unknown.*\n.*\(register 16\) is 0, so that it answers nothing"):
+        open_servo(twin.port)
+    assert kept_writes(twin) == set() and (twin.memory[16], twin.memory[24]) == (0, 0)
+    asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, None).close()
+    assert person.questions == ["Write this register to the servo?", "Write these 2 registers to the servo?"]
+    assert len(list(tmp_path.glob("servo-*.json"))) == 2 and twin.memory[16] == 2
+
+
+def test_without_a_place_for_the_undo_file_nothing_is_written(spoilt, tmp_path):
+    twin = spoilt("MX-64R", "1.0")
+    twin.memory[16] = 0
+    before = kept(twin)
+    twin.memory[24] = 0
+    with pytest.raises(DeviceError, match="cannot write, so nothing was changed"):
+        list(set_up(twin.port, None, None, tmp_path / "nowhere"))
+    assert kept(twin) == before
+
+
+def test_what_is_not_as_it_was_agreed_upon_is_not_written(spoilt, tmp_path):
+    twin = spoilt("STS3215", "STS")
+    with pytest.raises(ServoSetupError) as caught:
+        open_servo(twin.port, spins=True)
+    twin.memory[31] = 400  # another servo
+    with pytest.raises(DeviceError, match=r"position_offset \(register 31\) is 400, and was 500 before"):
+        list(set_up(twin.port, None, None, tmp_path, agreed=caught.value.changes))
+    assert kept_writes(twin) == set() and not list(tmp_path.glob("servo-*"))
+
+
+@pytest.mark.parametrize(("model", "protocol"), [MODELS[4], MODELS[6]])
+@pytest.mark.usefixtures("person")
+def test_what_does_not_last_is_said_and_the_horn_stays(model, protocol, spoilt, tmp_path, monkeypatch):
+    """The servo restarts, and has its old mode again, after each setting was read back by itself."""
+    twin = spoilt(model, protocol)
+    mode = 11 if protocol == "2.0" else 33
+    answer, was = twin.servo.answer, twin.memory[mode]
+
+    def forgetting(request, now_ns):
+        told = answer(request, now_ns)
+        if request.instruction == 2 and request.parameters[0] != mode and forgets:
+            twin.memory[mode] = was
+        return told
+
+    forgets = True
+    monkeypatch.setattr(twin.servo, "answer", forgetting)
+    with pytest.raises(
+        DeviceError, match=rf"register {mode}\): 1 was written, and it is {was} again.*nothing was moved"
+    ):
+        asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, None)
+    assert twin.memory[twin.servo.table.torque.address] == 0
+    assert math.isclose(twin.servo.axis.motion(twin.now_ns).angle_rad, 0.0, abs_tol=1e-9)
+    assert list(tmp_path.glob("servo-*.json"))
+
+
+def test_a_setting_that_is_lost_at_once_is_asked_about_once(person, tmp_path, spoilt):
+    twin = spoilt("XM430-W350", "2.0")
+
+    def work():
+        twin.memory[20] = -500
+        return open_servo(twin.port, spins=True)
+
+    with pytest.raises(ServoSetupError) as caught:
+        asking_first(work, tmp_path, None)
+    assert len(person.questions) == 1 and "did not last" in caught.value.__notes__[0]
+
+
+def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):
+    twin = spoilt("MX-64R", "1.0")
+    before = bytes(twin.memory.data)
+    code, said, _ = command("servo-setup", twin.port, "--dry-run")
+    assert code == 0 and "return_delay_time (register 5) is 200" in said
+    assert bytes(twin.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
+
+
+def test_a_twin_takes_no_setting_while_its_torque_is_on(virtual_bus):
+    """So the e-manual has it of both protocols; nothing of the kind is published for the STS3215."""
+    for model, protocol, address, error in (("MX-64R", "1.0", 6, 8), ("XM430-W350", "2.0", 11, 7)):
+        servo = virtual_bus(model, protocol).servo
+        before, torque = servo.memory[address], servo.table.torque.address
+        wide = 2 if protocol == "2.0" else 1
+        request = Request(1, 3, address.to_bytes(wide, "little") + b"\1" + b"\0" * (protocol == "1.0"), b"", True)
+        servo.memory[torque] = 1
+        assert servo.answer(request, 0) == (error, b"")
+        assert servo.memory[address] == before
+        servo.memory[torque] = 0
+        assert servo.answer(request, 0) == (0, b"")
+        assert servo.memory[address] == 1
+
+
+SCANNER = AngleSet.model_validate(
+    {
+        "task": "ahead",
+        "angles_deg": {"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 0, "beta_laser": 50},
+        "sensor": "UTM-30LX",
+        "servo": "MX-64R",
+        "motion": {"mode": "spin", "period_s": 2.0},
+    }
+)
+
+
+def test_scan_stops_where_nobody_can_be_asked(command, tmp_path):
+    (tmp_path / "angles.json").write_text(SCANNER.to_json())
+    with emulated_scanner(SCANNER, room(None), factory_servo=True) as twins, announced(tmp_path, twins.ports):
+        before = bytes(twins.servo.memory.data[:24])
+        code, _, complaints = command("scan", tmp_path)
+        assert code == 2
+        assert "1 register that outlasts the power must change first; nothing was written" in complaints[0]
+        assert (
+            "ccw_angle_limit (register 8) is 4095, so that it does not turn continuously; 0 is right" in complaints[1]
+        )
+        assert f"`scanwright servo-setup {twins.ports.servo} --scanner {tmp_path}`" in complaints[2]
+        assert len(complaints) == 3
+        assert bytes(twins.servo.memory.data[:24]) == before and not list(tmp_path.glob("servo-*"))
+        code, said, _ = command("servo-setup", twins.ports.servo, "--scanner", tmp_path)
+        assert code == 0 and "ccw_angle_limit (register 8): 4095 -> 0" in said
+        assert open_servo(twins.ports.servo, spins=True).warnings() == ()
+
+
+def test_a_node_does_not_try_again_what_somebody_must_agree_to(monkeypatch):
+    def acquire(*_):
+        raise ServoSetupError("here", "MX-64R", 1, [])
+
+    monkeypatch.setattr(ros_drive, "acquire", acquire)
+    monkeypatch.setattr(ros_drive, "replace", lambda plan, **_: plan)
+    steered = SimpleNamespace(running=True, period_s=0.0, begin=lambda: None)
+    with pytest.raises(ServoSetupError):
+        ros_drive.drive(SimpleNamespace(motion=None), steered, print)
