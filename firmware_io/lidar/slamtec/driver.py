@@ -25,7 +25,8 @@ from firmware_io.lidar.turn import TurnQueue, timed_scan
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
 _TRIES = 3
-_PAUSE_NS = 500_000_000
+_SILENCE_NS = 500_000_000
+_PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
 _PWM = 660  # the SDK's default
 _RPM = 600
 
@@ -118,7 +119,8 @@ class SlamtecLidar:
         self._scanning, self._turning = True, False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
-        self._begin_anew()
+        self._turns.begin_anew(self._skip)
+        self._begin_count()
         self._heard = self._splitter.feed(follows)
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
@@ -131,11 +133,16 @@ class SlamtecLidar:
         if not self._scanning:
             raise DeviceError(f"{self._line.name}: not started")
         patience_s = _TURN_S if self._turning else _START_S
-        deadline_s = time.monotonic() + (patience_s if timeout_s is None else timeout_s)
-        while (turn := self._turns.next()) is None:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
-            self._take([*self._heard, *heard], arrival_ns)
-            self._heard = []
+        patience_s = patience_s if timeout_s is None else timeout_s
+        deadline_s = time.monotonic() + patience_s
+        while (turn := self._turns.next(self._count.arrivals)) is None:
+            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, _PAUSE_S)
+            if heard:
+                self._take([*self._heard, *heard], arrival_ns)
+                self._heard = []
+            else:
+                self._resume()
+                deadline_s = time.monotonic() + patience_s
         self._turning = True
         timed = timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
         return replace(timed, warning=self._warning)
@@ -208,20 +215,27 @@ class SlamtecLidar:
         elif self._motor == "rpm":
             self._dialogue.request(protocol.MOTOR_RPM, struct.pack("<H", _RPM if on else 0))
 
-    def _begin_anew(self) -> None:
+    def _resume(self) -> None:
+        """What comes next was just measured, and continues nothing: a new count, a new turn."""
+        self._splitter.cut_in()
+        self._turns.resume()
+        self._begin_count()
+
+    def _begin_count(self) -> None:
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
-        self._turns.begin_anew(self._skip)
         self._heard = []
         self._last_ns = 0
 
     def _take(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
-        if self._last_ns and arrival_ns - self._last_ns > _PAUSE_NS:
-            self._begin_anew()
+        if self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS:
+            self._turns.resume()
+            self._begin_count()
         self._last_ns = arrival_ns
         for points in self._count.placed(heard, arrival_ns):
             self._turns.add(points, arrival_ns)
         if self._count.broken:
-            self._begin_anew()
+            self._line.drop_waiting()
+            self._resume()
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:
