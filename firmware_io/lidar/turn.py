@@ -88,8 +88,12 @@ class TurnQueue:
 
     def resume(self) -> None:
         """What comes next does not continue what came: turns between are missing, and a new line tells the time."""
-        self._cutter = TurnCutter()
         self._waiting: deque[tuple[Points, int]] = deque()
+        self.cut()
+
+    def cut(self) -> None:
+        """Points are missing: the turn that they were of is left out."""
+        self._cutter = TurnCutter()
 
     def add(self, points: Points, arrival_ns: int) -> None:
         """Points that came together."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from fractions import Fraction
 from types import TracebackType
 
 import numpy as np
@@ -32,17 +33,24 @@ _PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which pac
 _FIRST = 3  # packets that must agree on how fast it measures
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _STAMPS = 64  # packets over which the sensor's milliseconds are evened out
-_GRAIN_NS = 1e6 / math.sqrt(12 * _STAMPS)
 
 
 class _PacketClock:
-    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly."""
+    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly.
+
+    Times drift by what the mean over few stamps leaves unknown, so a line through arrivals needs those of many stamps.
+    """
 
     def __init__(self, period_ms: float) -> None:
         self._period_ms = period_ms
         self._begin: deque[float] = deque(maxlen=_STAMPS)
         self._number = 0
         self._last = (0, 0)  # unwrapped stamp [ms], arrival [ns]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether its times are as fine as they get."""
+        return len(self._begin) == _STAMPS
 
     def sensor_ns(self, stamp_ms: int, lost: int, arrival_ns: int) -> float:
         """Time of the last point of a packet; NaN where the sensor's clock began anew.
@@ -221,7 +229,9 @@ class LdrobotLidar:
         """Nothing of what came before is of use: a new line, a new clock, a new turn."""
         baud = _BAUDS[self.model]
         self._arrivals = ArrivalLine(
-            smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9), rate_max=_RATE_MAX, grain_ns=_GRAIN_NS
+            smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9),
+            rate_max=_RATE_MAX,
+            grain_ns=_grain_ns(self._lidar),
         )
         self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)
         self._turns.resume()
@@ -243,6 +253,9 @@ class LdrobotLidar:
             sensor_ns = self._clock.sensor_ns(packet.stamp_ms, 0, arrival_ns)
         self._last_ns = arrival_ns
         self._next_deg = float(packet.angle_deg[-1]) + packet.step_deg
+        if not self._clock.is_known:
+            self._turns.cut()
+            return
         self._arrivals.add(sensor_ns, arrival_ns)
         before_ns = np.arange(1 - protocol.POINTS, 1) * (1e9 / _points_s(self._lidar))
         points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
@@ -251,6 +264,12 @@ class LdrobotLidar:
 
 def _points_s(lidar: Lidar) -> float:
     return lidar.steps_per_turn * lidar.scan_rate_hz
+
+
+def _grain_ns(lidar: Lidar) -> float:
+    """Standard deviation of what the mean of the stamps leaves unknown: packets begin at few phases of a millisecond."""
+    phases = Fraction(round(protocol.POINTS * 1e3), round(_points_s(lidar))).denominator
+    return 1e6 / math.sqrt(12) * math.hypot(1 / phases, 1 / _STAMPS)
 
 
 def open_ldrobot(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LdrobotLidar:
