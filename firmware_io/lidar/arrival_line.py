@@ -15,6 +15,7 @@ from firmware_io.lidar.tick_line import half_hull, middle_slope
 _BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
 _BUCKETS = 300
 _NEAR = 320  # arrivals among which the earliest must touch the line
+_BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a lidar's turn
 
 
 class ArrivalLine:
@@ -69,6 +70,12 @@ class ArrivalLine:
         # two arrivals hold the line, some half of the span apart; few of them tell the rate no better than the bound
         reach_ns = min(self._rate_max * span_ns / 2, 2 * self._late_ns / max(len(self._earliest), 1))
         return round(math.hypot(chance_ns, reach_ns, self._grain_ns))
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether even the earliest of the last arrivals are so late that the sensor's time must have jumped."""
+        last = list(self._earliest)[-2:]
+        return min(map(self._above, last)) - self._offset_ns > _BEHIND_NS if last else False
 
     def _above(self, arrival: tuple[float, float]) -> float:
         return arrival[1] - self._slope * arrival[0]

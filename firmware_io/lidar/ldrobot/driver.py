@@ -243,7 +243,7 @@ class LdrobotLidar:
         if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
             self._bad_before += 1
             return
-        if arrival_ns - self._last_ns > _SILENCE_NS:
+        if arrival_ns - self._last_ns > _SILENCE_NS or self._arrivals.is_behind:
             self._resume()
         gap_deg = (packet.angle_deg[0] - self._next_deg) % 360
         lost = round(gap_deg / span_deg) if span_deg / 2 < gap_deg < 360 - span_deg / 2 else 0
@@ -267,7 +267,7 @@ def _points_s(lidar: Lidar) -> float:
 
 
 def _grain_ns(lidar: Lidar) -> float:
-    """Standard deviation of what the mean of the stamps leaves unknown: packets begin at few phases of a millisecond."""
+    """What the mean of the stamps leaves unknown, standard deviation: packets begin at few phases of a millisecond."""
     phases = Fraction(round(protocol.POINTS * 1e3), round(_points_s(lidar))).denominator
     return 1e6 / math.sqrt(12) * math.hypot(1 / phases, 1 / _STAMPS)
 

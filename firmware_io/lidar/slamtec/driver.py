@@ -27,6 +27,7 @@ _START_S = 3.0  # the first turn: the motor takes its time
 _TRIES = 3
 _SILENCE_NS = 500_000_000
 _PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
+_BUFFER_BYTES = 4095  # of a terminal (Linux, n_tty.c): nothing is lost before it is full
 _PWM = 660  # the SDK's default
 _RPM = 600
 
@@ -53,6 +54,7 @@ class SlamtecLidar:
         self._turns = TurnQueue()
         self._scanning = self._turning = self._intensity = False
         self._skip, self._warning = 0, ""
+        self._pause_s = _PAUSE_S
         self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
         self._dialogue = SlamtecDialogue(address)
         self._line = self._dialogue.line
@@ -116,6 +118,8 @@ class SlamtecLidar:
         told, follows = self._dialogue.reply()
         if not told.stream or told.kind != self._mode.kind:
             raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
+        byte_ns = self._mode.point_ns * protocol.POINTS[told.kind] / protocol.SIZES[told.kind]
+        self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
         self._scanning, self._turning = True, False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
@@ -136,7 +140,7 @@ class SlamtecLidar:
         patience_s = patience_s if timeout_s is None else timeout_s
         deadline_s = time.monotonic() + patience_s
         while (turn := self._turns.next(self._count.arrivals)) is None:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, _PAUSE_S)
+            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
             if heard:
                 self._take([*self._heard, *heard], arrival_ns)
                 self._heard = []

@@ -7,12 +7,14 @@ import pytest
 import virtual_line
 from virtual_line import VirtualLine
 
+from design.errors import DeviceTimeoutError
 from firmware_io.lidar import sensor_line
 from firmware_io.lidar.families import open_lidar
 from firmware_io.lidar.ldrobot import driver as ldrobot
 from firmware_io.lidar.lms2xx import driver as lms2xx
-from firmware_io.lidar.slamtec import dialogue
+from firmware_io.lidar.slamtec import dialogue, protocol
 from firmware_io.lidar.slamtec import driver as slamtec
+from firmware_io.lidar.slamtec.point_count import PointCount
 
 MODELS = ["LD06", "LD19", "STL27L", "LMS 200"]
 MODELS += [f"RPLIDAR {series}" for series in ("A1", "A2", "A3", "S1", "S2", "C1")]
@@ -98,3 +100,49 @@ def test_beams_are_on_time_or_dropped_and_counted(monkeypatch, model, buffer_byt
     assert np.diff(stamps_ns).min() > 0.5 * turn_ns
     for one in timed:
         assert np.nanmax(np.abs(off_ms(one.scan))) < 3e-6 * one.uncertainty_ns + ROUNDED_MS
+
+
+class EndlessPort:
+    """A port that always has something to read."""
+
+    def read(self, _):
+        return b"\x54" * 4095
+
+
+def test_a_port_that_never_runs_empty_is_given_up(monkeypatch):
+    monkeypatch.setattr(sensor_line, "open_stream", lambda _: EndlessPort())
+    with pytest.raises(DeviceTimeoutError, match="it sends faster than this computer reads"):
+        sensor_line.SensorLine("wire", 100).drop_waiting()
+
+
+CAPSULE_NS = 32 * 62_500  # of 32 points, 62.5 us each
+
+
+def capsules(count, start_deg):
+    """Capsules of a motor, each with its number; the angle at which each begins is `start_deg` of its number."""
+    numbers = np.arange(count)
+    nothing = np.zeros(32, np.float32)
+    return [
+        (number, protocol.SlamtecPacket(float(deg) % 360, False, nothing, nothing, np.zeros(32)))
+        for number, deg in zip(numbers.tolist(), start_deg(numbers), strict=True)
+    ]
+
+
+def test_capsules_of_a_motor_that_starts_from_rest_are_placed():
+    """They span more and more; two that span three times as much as the last have lost none between them."""
+    count = PointCount(protocol.CAPSULES, CAPSULE_NS / 32, 256_000)
+    placed = []
+    for number, capsule in capsules(400, lambda n: 0.01 * n**2):
+        placed.append(len(count.placed([(capsule, 0)], (number + 1) * CAPSULE_NS)))
+    assert not count.broken and placed == [0] + [1] * 399
+
+
+def test_a_lost_turn_that_no_angle_tells_breaks_the_count():
+    count = PointCount(protocol.CAPSULES, CAPSULE_NS / 32, 256_000)
+    heard = [one for one in capsules(600, lambda n: 7.2 * n) if not 200 <= one[0] < 250]  # 50 are a turn
+    for number, capsule in heard:
+        count.placed([(capsule, 0)], (number + 1) * CAPSULE_NS)
+        assert number < 250 or (number - 250) * CAPSULE_NS < 0.5e9
+        if count.broken:
+            break
+    assert count.broken and number >= 250
