@@ -30,6 +30,7 @@ _HEARD_S = 0.5  # it talks hundreds of times a second
 _TURN_S = 1.0  # without a turn: five of the slowest
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
 _PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
+_FIRST_PAUSE_S = 0.1  # the same, before there is a line to tell what is late
 _FIRST = 3  # packets that must agree on how fast it measures
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _STAMPS = 64  # packets over which the sensor's milliseconds are evened out
@@ -154,7 +155,11 @@ class LdrobotLidar:
         patience_s = _TURN_S if timeout_s is None else timeout_s
         deadline_s = time.monotonic() + patience_s
         while (turn := self._turns.next(self._arrivals)) is None:
-            packets, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, _PAUSE_S)
+            pause_s = _PAUSE_S if self._clock.is_known else _FIRST_PAUSE_S
+            packets, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, pause_s)
+            if packets and self._arrivals.is_behind:
+                self._line.drop_waiting()
+                packets = []
             if not packets:
                 self._splitter.cut_in()
                 self._resume()
@@ -243,7 +248,7 @@ class LdrobotLidar:
         if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
             self._bad_before += 1
             return
-        if arrival_ns - self._last_ns > _SILENCE_NS or self._arrivals.is_behind:
+        if arrival_ns - self._last_ns > _SILENCE_NS:
             self._resume()
         gap_deg = (packet.angle_deg[0] - self._next_deg) % 360
         lost = round(gap_deg / span_deg) if span_deg / 2 < gap_deg < 360 - span_deg / 2 else 0

@@ -55,7 +55,6 @@ class SlamtecLidar:
         self._scanning = self._turning = self._intensity = False
         self._skip, self._warning = 0, ""
         self._pause_s = _PAUSE_S
-        self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
         self._dialogue = SlamtecDialogue(address)
         self._line = self._dialogue.line
         self._recognise(model)
@@ -115,7 +114,7 @@ class SlamtecLidar:
         mode = struct.pack("<BHH", self._mode.number, 0, 0)
         command = protocol.SCAN if self._mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
         self._dialogue.request(command, mode)
-        told, follows = self._dialogue.reply()
+        told, _ = self._dialogue.reply()
         if not told.stream or told.kind != self._mode.kind:
             raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
         byte_ns = self._mode.point_ns * protocol.POINTS[told.kind] / protocol.SIZES[told.kind]
@@ -124,8 +123,8 @@ class SlamtecLidar:
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
         self._turns.begin_anew(self._skip)
-        self._begin_count()
-        self._heard = self._splitter.feed(follows)
+        self._line.drop_waiting()
+        self._resume()
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
         """The next turn; it is waited for for a second if nothing else is said, three for the first.
@@ -142,8 +141,7 @@ class SlamtecLidar:
         while (turn := self._turns.next(self._count.arrivals)) is None:
             heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
             if heard:
-                self._take([*self._heard, *heard], arrival_ns)
-                self._heard = []
+                self._take(heard, arrival_ns)
             else:
                 self._resume()
                 deadline_s = time.monotonic() + patience_s
@@ -223,21 +221,15 @@ class SlamtecLidar:
         """What comes next was just measured, and continues nothing: a new count, a new turn."""
         self._splitter.cut_in()
         self._turns.resume()
-        self._begin_count()
-
-    def _begin_count(self) -> None:
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
-        self._heard = []
         self._last_ns = 0
 
     def _take(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
-        if self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS:
-            self._turns.resume()
-            self._begin_count()
+        silent = self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS
         self._last_ns = arrival_ns
-        for points in self._count.placed(heard, arrival_ns):
+        for points in [] if silent else self._count.placed(heard, arrival_ns):
             self._turns.add(points, arrival_ns)
-        if self._count.broken:
+        if silent or self._count.broken:
             self._line.drop_waiting()
             self._resume()
 
