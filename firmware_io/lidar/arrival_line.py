@@ -60,7 +60,7 @@ class ArrivalLine:
     def arrives_ns(self, sensor_ns: float) -> int:
         """When what was whole at a sensor time arrives, if nothing holds it up."""
         since_ns = sensor_ns - self._origin[0]
-        return self._origin[1] + round(since_ns * (1 + self._slope) + self._offset_ns)
+        return self._origin[1] + round(since_ns * self.rate + self._offset_ns)
 
     @property
     def uncertainty_ns(self) -> int:
@@ -70,6 +70,11 @@ class ArrivalLine:
         # two arrivals hold the line, some half of the span apart; few of them tell the rate no better than the bound
         reach_ns = min(self._rate_max * span_ns / 2, 2 * self._late_ns / max(len(self._earliest), 1))
         return round(math.hypot(chance_ns, reach_ns, self._grain_ns))
+
+    @property
+    def rate(self) -> float:
+        """Host seconds per sensor's second."""
+        return 1 + self._slope
 
     @property
     def is_behind(self) -> bool:

@@ -120,7 +120,8 @@ class TurnQueue:
 
 def timed_scan(turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, *, intensity: bool) -> TimedScan:
     """A turn on the host's clock; its even grid is the one from its first to its last beam."""
-    offset_ns = np.maximum.accumulate(np.rint(turn.sensor_ns - turn.sensor_ns[0])).astype(np.int64)
+    since_ns = (turn.sensor_ns - turn.sensor_ns[0]) * line.rate
+    offset_ns = np.maximum.accumulate(np.rint(since_ns)).astype(np.int64)
     bearing_rad = -np.radians(turn.angle_deg)
     between = max(turn.angle_deg.size - 1, 1)
     scan = Scan(

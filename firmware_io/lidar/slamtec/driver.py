@@ -189,7 +189,7 @@ class SlamtecLidar:
                     before = self._line.heard
                     with suppress(DeviceTimeoutError):
                         self._dialogue.request(protocol.STOP)
-                        self._dialogue.drain()
+                        self._line.drop_waiting()
                         told = self._dialogue.told(protocol.INFO, 4, protocol.info)
                         self._accept(told, model)
                         self._baud = baud
