@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.firmware_io.stalls import BUFFER_BYTES, MODELS, ROUNDED_MS, off_ms, random_stalls, scans_of
+from benchmarks.firmware_io.devices.stalls import BUFFER_BYTES, MODELS, ROUNDED_MS, off_ms, random_stalls, scans_of
 from design.errors import DeviceTimeoutError
 from firmware_io.lidar import sensor_line
 from firmware_io.lidar.slamtec import protocol

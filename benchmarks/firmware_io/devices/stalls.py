@@ -1,4 +1,4 @@
-"""Stated errors of beam times when the reader is held up: `python -m benchmarks.firmware_io.stalls [STALLS]`.
+"""Stated errors of beam times when the reader is held up: `python -m benchmarks.firmware_io.devices.stalls [STALLS]`.
 
 Each lidar without an exact clock of its own streams to its driver, on one virtual clock, and the driver is held up
 STALLS times (default 25, which are 500 in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits
