@@ -116,7 +116,9 @@ class HeldUpLine:
 
 
 @contextmanager
-def held_up(model: str, stalls: list[tuple[float, float]], buffer_bytes: int) -> Iterator[tuple[LidarDriver, deque]]:
+def held_up(
+    model: str, stalls: list[tuple[float, float]], buffer_bytes: int
+) -> Iterator[tuple[LidarDriver, deque[tuple[int, int]]]]:
     """The lidar, opened on a line whose reader is held up, and the stalls that are still to come."""
     line = HeldUpLine(model, stalls, buffer_bytes)
     clocks = [patch.object(module, "time", line) for module in (sensor_line, dialogue, slamtec, ldrobot, lms2xx)]
