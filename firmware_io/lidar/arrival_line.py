@@ -14,7 +14,9 @@ from firmware_io.lidar.tick_line import half_hull, middle_slope
 
 _BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
 _BUCKETS = 300
+_FEWEST = 3  # buckets that tell a rate
 _NEAR = 320  # arrivals among which the earliest must touch the line
+_BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a lidar's turn
 
 
 class ArrivalLine:
@@ -59,7 +61,7 @@ class ArrivalLine:
     def arrives_ns(self, sensor_ns: float) -> int:
         """When what was whole at a sensor time arrives, if nothing holds it up."""
         since_ns = sensor_ns - self._origin[0]
-        return self._origin[1] + round(since_ns * (1 + self._slope) + self._offset_ns)
+        return self._origin[1] + round(since_ns * self.rate + self._offset_ns)
 
     @property
     def uncertainty_ns(self) -> int:
@@ -67,14 +69,27 @@ class ArrivalLine:
         chance_ns = self._late_ns / min(max(self._count, 1), _NEAR)
         span_ns = max(self._newest_ns - self._earliest[0][0], _BUCKET_NS) if self._earliest else _BUCKET_NS
         # two arrivals hold the line, some half of the span apart; few of them tell the rate no better than the bound
-        reach_ns = min(self._rate_max * span_ns / 2, 2 * self._late_ns / max(len(self._earliest), 1))
+        reach_ns = self._rate_max * span_ns / 2
+        if len(self._earliest) >= _FEWEST:
+            reach_ns = min(reach_ns, 2 * self._late_ns / len(self._earliest))
         return round(math.hypot(chance_ns, reach_ns, self._grain_ns))
+
+    @property
+    def rate(self) -> float:
+        """Host seconds per sensor's second."""
+        return 1 + self._slope
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether even the earliest of the last arrivals are so late that the sensor's time must have jumped."""
+        last = list(self._earliest)[-2:]
+        return min(map(self._above, last)) - self._offset_ns > _BEHIND_NS if last else False
 
     def _above(self, arrival: tuple[float, float]) -> float:
         return arrival[1] - self._slope * arrival[0]
 
     def _fit(self) -> None:
         points = list(self._earliest)
-        slope = middle_slope(half_hull(points, 1)) if len(points) > 2 else 0.0
+        slope = middle_slope(half_hull(points, 1)) if len(points) >= _FEWEST else 0.0
         self._slope = min(max(slope, -self._rate_max), self._rate_max)
         self._offset_ns = min(self._above(point) for point in points)

@@ -1,7 +1,12 @@
-"""The line to one sensor as every driver has it: what comes until something is whole, what is left when it ends."""
+"""The line to one sensor as every driver has it: what comes until something is whole, what is left when it ends.
+
+Arrival times of bytes are right only if the bytes are read when they arrive. A reader that was held up (a stopped
+process, a busy computer) finds bytes that waited in the buffers of kernel and adapter, and others are missing.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +16,9 @@ from design.errors import DeviceError, DeviceTimeoutError
 from firmware_io.lidar.byte_stream import SerialStream, open_stream
 
 _POLL_S = 0.05
+_LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
+_SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
+_LOOKS = 10_000  # without finding the port empty
 
 Heard = TypeVar("Heard")
 
@@ -32,7 +40,7 @@ class SensorLine:
             DeviceError: no such port or host, or it is in use.
         """
         self.address, self.longest, self.heard = address, longest, 0
-        self.stream = open_stream(address)
+        self._open(address)
 
     @property
     def name(self) -> str:
@@ -53,12 +61,17 @@ class SensorLine:
         with self.told_when_gone():
             self.stream.write(data)
 
-    def hear(self, feed: Callable[[bytes], list[Heard]], deadline_s: float) -> tuple[list[Heard], int]:
+    def hear(
+        self, feed: Callable[[bytes], list[Heard]], deadline_s: float, pause_s: float = math.inf
+    ) -> tuple[list[Heard], int]:
         """What comes until something is whole, and when that came [ns, time.monotonic_ns].
 
         Args:
             feed: what the bytes make whole.
             deadline_s: on time.monotonic.
+            pause_s: where arrivals are the sensor's clock: the longest time between two reads after which arrivals and
+                count of packets can still be trusted. After a longer one everything that waited is dropped, and
+                nothing is returned: what comes next is fresh, and continues nothing.
 
         Raises:
             DeviceTimeoutError: nothing was whole in time.
@@ -67,16 +80,31 @@ class SensorLine:
         late_bytes = 0
         while True:
             over = time.monotonic() > deadline_s  # told before the look: what came while we were kept waiting counts
-            with self.told_when_gone():
-                received = self.stream.read(deadline_s - time.monotonic())
-            arrival_ns = time.monotonic_ns()
-            self.heard += len(received)
+            read_ns = self._read_ns
+            received = self._look(min(deadline_s - time.monotonic(), _LOOK_S))
+            arrival_ns = self._read_ns
+            if arrival_ns - read_ns > pause_s * 1e9:
+                self.drop_waiting()
+                return [], self._read_ns
             found = feed(received)
             if found:
                 return found, arrival_ns
             late_bytes += len(received) if over else 0
             if over and (not received or late_bytes > self.longest):
                 raise DeviceTimeoutError(f"{self.name}: nothing came in time; check power and cable")
+
+    def drop_waiting(self) -> None:
+        """Drop all that waits to be read, until the port is empty: what comes afterwards has just arrived.
+
+        Raises:
+            DeviceTimeoutError: it never is: the sensor sends faster than it is read.
+            DeviceError: the connection broke.
+        """
+        settled_s = time.monotonic() + _SETTLE_S
+        for _ in range(_LOOKS):
+            if not self._look(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
+                return
+        raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; is another program busy?")
 
     def close(self) -> None:
         """Let go of the port; what is closed stays so."""
@@ -89,7 +117,7 @@ class SensorLine:
             DeviceError: no such port or host, or it is in use.
         """
         self.close()
-        self.stream = open_stream(address or self.address)
+        self._open(address or self.address)
         self.address = address or self.address
 
     def leave(self, stop: Callable[[], None], error: BaseException | None) -> None:
@@ -110,6 +138,17 @@ class SensorLine:
             error.add_note(f"its laser may still be on: {unsafe}")
         finally:
             self.close()
+
+    def _open(self, address: str) -> None:
+        self.stream = open_stream(address)
+        self._read_ns = time.monotonic_ns()  # when the last read returned
+
+    def _look(self, timeout_s: float) -> bytes:
+        with self.told_when_gone():
+            received = self.stream.read(timeout_s)
+        self._read_ns = time.monotonic_ns()
+        self.heard += len(received)
+        return received
 
     @contextmanager
     def closed_on_error(self) -> Iterator[None]:

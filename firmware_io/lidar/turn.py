@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -82,22 +81,34 @@ class TurnQueue:
         self.begin_anew(0)
 
     def begin_anew(self, skip: int) -> None:
-        """What comes next does not continue what came; of the turns that come `skip` are left out between two."""
-        self._cutter = TurnCutter()
-        self._waiting: deque[tuple[Points, int]] = deque()
-        self._end_ns = math.nan
+        """A new stream, before which nothing is missing; of its turns `skip` are left out between two."""
+        self._end_ns = 0
         self._skip = self._skipped = skip
+        self.resume()
+
+    def resume(self) -> None:
+        """What comes next does not continue what came: turns between are missing, and a new line tells the time."""
+        self._waiting: deque[tuple[Points, int]] = deque()
+        self.cut()
+
+    def cut(self) -> None:
+        """Points are missing: the turn that they were of is left out."""
+        self._cutter = TurnCutter()
 
     def add(self, points: Points, arrival_ns: int) -> None:
         """Points that came together."""
         self._waiting.extend((turn, arrival_ns) for turn in self._cutter.add(points))
 
-    def next(self) -> tuple[Points, int] | None:
-        """The next turn and when its last points came; None where none is whole yet."""
+    def next(self, line: ArrivalLine) -> tuple[Points, int] | None:
+        """The next turn and when its last points came; None if none is whole yet.
+
+        Args:
+            line: the points' times on the host's clock, by which missing turns are counted.
+        """
         while self._waiting:
             turn, arrival_ns = self._waiting.popleft()
-            begin_ns, end_ns = float(turn.sensor_ns[0]), float(turn.sensor_ns[-1])
-            if not math.isnan(self._end_ns) and end_ns > begin_ns:
+            begin_ns, end_ns = (line.host_ns(float(turn.sensor_ns[at])) for at in (0, -1))
+            if self._end_ns and end_ns > begin_ns:
                 self.dropped += max(round((begin_ns - self._end_ns) / (end_ns - begin_ns)), 0)
             self._end_ns = end_ns
             self._skipped += 1
@@ -109,7 +120,8 @@ class TurnQueue:
 
 def timed_scan(turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, *, intensity: bool) -> TimedScan:
     """A turn on the host's clock; its even grid is the one from its first to its last beam."""
-    offset_ns = np.maximum.accumulate(np.rint(turn.sensor_ns - turn.sensor_ns[0])).astype(np.int64)
+    since_ns = (turn.sensor_ns - turn.sensor_ns[0]) * line.rate
+    offset_ns = np.maximum.accumulate(np.rint(since_ns)).astype(np.int64)
     bearing_rad = -np.radians(turn.angle_deg)
     between = max(turn.angle_deg.size - 1, 1)
     scan = Scan(

@@ -206,7 +206,8 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch
                 )
     if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
-    lost = {"scans the sensor dropped": lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
+    dropped_why = "scans that the sensor dropped, or that waited while this computer was held up"
+    lost = {dropped_why: lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
     even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
     return ScanSummary(
         recording=plan.recording,

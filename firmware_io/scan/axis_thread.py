@@ -33,6 +33,7 @@ _WINDOW = 50  # samples: half a second
 _STILL_RAD = math.radians(0.2)  # two steps of the encoder
 _DOUBT_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
 _GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
+_GAP_BOUNDS = 4  # unless its time is as uncertain as the gap is long: one transaction in which this process was stopped
 
 
 class AxisThread:
@@ -99,7 +100,7 @@ class AxisThread:
                 state.time_bound_ns > 2 * sorted(self._bounds_ns)[len(self._bounds_ns) // 10]
                 and abs(state.velocity_rad_s) * state.time_bound_ns > self._doubt_rad * 1e9
                 and self.window
-                and state.time_ns - self.window[-1].time_ns < _GAP_NS
+                and state.time_ns - self.window[-1].time_ns < max(_GAP_NS, _GAP_BOUNDS * state.time_bound_ns)
             ):
                 self.left_out["servo angles of uncertain time"] += 1  # the host was busy during the transaction
             else:

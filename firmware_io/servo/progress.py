@@ -73,16 +73,16 @@ def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | 
         state: as it was read last.
         step_rad: of its encoder.
     """
-    here_rad = state.position_rad
+    here_rad, latest_ns = state.position_rad, state.time_ns + state.time_bound_ns
     if abs(order.goal_rad - here_rad) < _ARRIVED_RAD:
         return None
     if not order.since_ns or math.isnan(order.from_rad) > math.isnan(here_rad):
-        return replace(order, since_ns=state.time_ns, from_rad=here_rad)
-    elapsed_s = (state.time_ns - order.since_ns) / 1e9
+        return replace(order, since_ns=latest_ns, from_rad=here_rad)
+    elapsed_s = (state.time_ns - state.time_bound_ns - order.since_ns) / 1e9  # at least
     due_rad, moved_rad = abs(order.rate_rad_s) * elapsed_s, abs(here_rad - order.from_rad)
     enough_rad = math.pi if math.isnan(here_rad) else _STALL_COUNTS * step_rad
     if elapsed_s < _STALL_S or due_rad < enough_rad:
         return order
     if not moved_rad >= _STALL_SHARE * due_rad:
         return Stall(moved_rad, due_rad)
-    return replace(order, since_ns=state.time_ns, from_rad=here_rad)
+    return replace(order, since_ns=latest_ns, from_rad=here_rad)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from fractions import Fraction
 from types import TracebackType
 
 import numpy as np
@@ -27,21 +28,30 @@ FAMILY = "ldrobot"
 _BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
 _HEARD_S = 0.5  # it talks hundreds of times a second
 _TURN_S = 1.0  # without a turn: five of the slowest
-_PAUSE_NS = 500_000_000  # after such a silence it may be a new life of the sensor
+_SILENCE_NS = 500_000_000  # after which the sensor may have restarted
+_PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
+_FIRST_PAUSE_S = 0.1  # the same, before there is a line to tell what is late
 _FIRST = 3  # packets that must agree on how fast it measures
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _STAMPS = 64  # packets over which the sensor's milliseconds are evened out
-_GRAIN_NS = 1e6 / math.sqrt(12 * _STAMPS)
 
 
 class _PacketClock:
-    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly."""
+    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly.
+
+    Times drift by what the mean over few stamps leaves unknown, so a line through arrivals needs those of many stamps.
+    """
 
     def __init__(self, period_ms: float) -> None:
         self._period_ms = period_ms
         self._begin: deque[float] = deque(maxlen=_STAMPS)
         self._number = 0
         self._last = (0, 0)  # unwrapped stamp [ms], arrival [ns]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether its times are as fine as they get."""
+        return len(self._begin) == _STAMPS
 
     def sensor_ns(self, stamp_ms: int, lost: int, arrival_ns: int) -> float:
         """Time of the last point of a packet; NaN where the sensor's clock began anew.
@@ -142,9 +152,18 @@ class LdrobotLidar:
         """
         if not self._scanning:
             raise DeviceError(f"{self._line.name}: not started")
-        deadline_s = time.monotonic() + (_TURN_S if timeout_s is None else timeout_s)
-        while (turn := self._turns.next()) is None:
-            packets, arrival_ns = self._packets(deadline_s)
+        patience_s = _TURN_S if timeout_s is None else timeout_s
+        deadline_s = time.monotonic() + patience_s
+        while (turn := self._turns.next(self._arrivals)) is None:
+            pause_s = _PAUSE_S if self._clock.is_known else _FIRST_PAUSE_S
+            packets, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, pause_s)
+            if packets and self._arrivals.is_behind:
+                self._line.drop_waiting()
+                packets = []
+            if not packets:
+                self._splitter.cut_in()
+                self._resume()
+                deadline_s = time.monotonic() + patience_s
             for packet in packets:
                 self._take(packet, arrival_ns)
         return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], intensity=self._intensity)
@@ -201,20 +220,26 @@ class LdrobotLidar:
         told: list[float] = []
         while len(told) < _FIRST:
             try:
-                packets, _ = self._packets(deadline_s)
+                packets, _ = self._line.hear(self._splitter.feed, deadline_s)
             except DeviceTimeoutError:
                 return None
             told += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
         return float(np.median(told)) or None
 
     def _begin_anew(self) -> None:
+        self._turns.begin_anew(self._skip)
+        self._resume()
+
+    def _resume(self) -> None:
         """Nothing of what came before is of use: a new line, a new clock, a new turn."""
         baud = _BAUDS[self.model]
         self._arrivals = ArrivalLine(
-            smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9), rate_max=_RATE_MAX, grain_ns=_GRAIN_NS
+            smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9),
+            rate_max=_RATE_MAX,
+            grain_ns=_grain_ns(self._lidar),
         )
         self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)
-        self._turns.begin_anew(self._skip)
+        self._turns.resume()
         self._next_deg = self._last_ns = math.nan
 
     def _take(self, packet: protocol.LdrobotPacket, arrival_ns: int) -> None:
@@ -223,28 +248,33 @@ class LdrobotLidar:
         if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
             self._bad_before += 1
             return
-        if arrival_ns - self._last_ns > _PAUSE_NS:
-            self._begin_anew()
+        if arrival_ns - self._last_ns > _SILENCE_NS:
+            self._resume()
         gap_deg = (packet.angle_deg[0] - self._next_deg) % 360
         lost = round(gap_deg / span_deg) if span_deg / 2 < gap_deg < 360 - span_deg / 2 else 0
         sensor_ns = self._clock.sensor_ns(packet.stamp_ms, lost, arrival_ns)
         if math.isnan(sensor_ns):
-            self._begin_anew()
+            self._resume()
             sensor_ns = self._clock.sensor_ns(packet.stamp_ms, 0, arrival_ns)
         self._last_ns = arrival_ns
         self._next_deg = float(packet.angle_deg[-1]) + packet.step_deg
+        if not self._clock.is_known:
+            self._turns.cut()
+            return
         self._arrivals.add(sensor_ns, arrival_ns)
         before_ns = np.arange(1 - protocol.POINTS, 1) * (1e9 / _points_s(self._lidar))
         points = Points(packet.angle_deg, packet.range_m, packet.intensity, sensor_ns + before_ns)
         self._turns.add(points, arrival_ns)
 
-    def _packets(self, deadline_s: float) -> tuple[list[protocol.LdrobotPacket], int]:
-        """What has come, at least one packet, and when it came."""
-        return self._line.hear(self._splitter.feed, deadline_s)
-
 
 def _points_s(lidar: Lidar) -> float:
     return lidar.steps_per_turn * lidar.scan_rate_hz
+
+
+def _grain_ns(lidar: Lidar) -> float:
+    """What the mean of the stamps leaves unknown, standard deviation: packets begin at few phases of a millisecond."""
+    phases = Fraction(round(protocol.POINTS * 1e3), round(_points_s(lidar))).denominator
+    return 1e6 / math.sqrt(12) * math.hypot(1 / phases, 1 / _STAMPS)
 
 
 def open_ldrobot(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LdrobotLidar:

@@ -104,6 +104,10 @@ class LdrobotSplitter:
         self._rest = b""
         self._passed = 0
 
+    def cut_in(self) -> None:
+        """What comes next may begin in the middle of a packet, which is not counted as bad."""
+        self._rest, self._passed = b"", 1
+
     def feed(self, data: bytes) -> list[LdrobotPacket]:
         """The packets that these bytes complete."""
         self._rest += data

@@ -127,9 +127,15 @@ class LmsLidar:
         """
         if not self._scanning:
             raise DeviceError(f"{self._line.name}: not started")
-        deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
+        assert self._count is not None
+        patience_s = _SCAN_S if timeout_s is None else timeout_s
+        deadline_s = time.monotonic() + patience_s
         while not self._waiting:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
+            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._count.pause_s)
+            if not heard:
+                self._splitter.cut_in()
+                self._count.resume()
+                deadline_s = time.monotonic() + patience_s
             for told in heard:
                 if told.command == protocol.SCAN:
                     self._take(told, arrival_ns)

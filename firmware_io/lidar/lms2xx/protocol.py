@@ -130,6 +130,10 @@ class LmsSplitter:
         self._rest = b""
         self._lost = False
 
+    def cut_in(self) -> None:
+        """What comes next may begin in the middle of a telegram, which is not counted as bad."""
+        self._rest, self._lost = b"", True
+
     def feed(self, data: bytes) -> list[LmsTelegram]:
         """The telegrams that these bytes complete."""
         self._rest += data

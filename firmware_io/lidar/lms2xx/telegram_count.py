@@ -9,6 +9,7 @@ from firmware_io.lidar.lms2xx.protocol import LmsScan
 
 _RATE_MAX = 1e-2  # of its motor [assumed]
 _GRAIN_NS = 3e5  # that its telegrams wander [assumed]
+_PAUSE = 5  # telegrams, for which there is room in the 4095 bytes of a terminal (Linux, n_tty.c): none is lost
 
 
 class TelegramCount:
@@ -17,6 +18,7 @@ class TelegramCount:
     Attributes:
         arrivals: the sensor's time, told by the count, on the host's clock.
         lost: telegrams that are missing between those that came.
+        pause_s: of the reader, after which the count cannot be trusted: it needs `resume`.
     """
 
     def __init__(self, period_ns: float, telegram_ns: int, patience: int) -> None:
@@ -29,9 +31,18 @@ class TelegramCount:
         """
         self.lost = 0
         self._period_ns, self._telegram_ns, self._patience = period_ns, telegram_ns, patience
-        self.arrivals = ArrivalLine(smallest_delay_ns=telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
+        self.pause_s = _PAUSE * max(period_ns, telegram_ns) / 1e9
+        self._begin(0)
+
+    def resume(self) -> None:
+        """What comes next has just arrived, and an unknown number of telegrams before it was lost."""
+        self._begin(self.arrivals.arrives_ns(self._number * self._period_ns) if self._number else self._ended_ns)
+
+    def _begin(self, ended_ns: int) -> None:
+        """A new line; `ended_ns` is the arrival of the last telegram before, 0 if nothing is missing before it."""
+        self.arrivals = ArrivalLine(smallest_delay_ns=self._telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
         self._held: list[tuple[LmsScan, int]] = []
-        self._number = 0
+        self._number, self._ended_ns = 0, ended_ns
 
     def add(self, scan: LmsScan, arrival_ns: int) -> list[tuple[LmsScan, float, int]]:
         """The scans that are known by now, each with the sensor's time of its end [ns] and its arrival."""
@@ -39,6 +50,8 @@ class TelegramCount:
         numbers = self._numbers()
         if numbers[-1] > self._number + len(numbers) and len(numbers) < self._patience:
             return []
+        if not self._number and self._ended_ns:
+            self.lost += max(round((arrival_ns - self._ended_ns) / self._period_ns) - 1, 0)
         known = []
         for number, (held, came_ns) in zip(numbers, self._held, strict=True):
             self.lost += number - self._number - 1

@@ -14,7 +14,6 @@ from firmware_io.lidar.sensor_line import SensorLine
 from firmware_io.lidar.slamtec import protocol
 
 _ANSWER_S = 0.5
-_DRAIN_S, _SILENT_S = 0.2, 0.03
 
 Told = TypeVar("Told")
 
@@ -69,17 +68,6 @@ class SlamtecDialogue:
     def reply(self) -> tuple[protocol.Descriptor, bytes]:
         """The next answer, and what follows it; raises as `SensorLine.hear` does."""
         return self._reply(time.monotonic() + _ANSWER_S)
-
-    def drain(self) -> None:
-        """Pass over what it had sent before it stopped.
-
-        Raises:
-            DeviceError: the connection broke.
-        """
-        end_s = time.monotonic() + _DRAIN_S
-        with self.line.told_when_gone():
-            while time.monotonic() < end_s and (drained := self.line.stream.read(_SILENT_S)):
-                self.line.heard += len(drained)
 
     def _reply(self, deadline_s: float) -> tuple[protocol.Descriptor, bytes]:
         if not self._waiting:

@@ -25,7 +25,9 @@ from firmware_io.lidar.turn import TurnQueue, timed_scan
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
 _TRIES = 3
-_PAUSE_NS = 500_000_000
+_SILENCE_NS = 500_000_000
+_PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
+_BUFFER_BYTES = 4095  # of a terminal (Linux, n_tty.c): nothing is lost before it is full
 _PWM = 660  # the SDK's default
 _RPM = 600
 
@@ -52,7 +54,7 @@ class SlamtecLidar:
         self._turns = TurnQueue()
         self._scanning = self._turning = self._intensity = False
         self._skip, self._warning = 0, ""
-        self._heard: list[tuple[protocol.SlamtecPacket, int]] = []
+        self._pause_s = _PAUSE_S
         self._dialogue = SlamtecDialogue(address)
         self._line = self._dialogue.line
         self._recognise(model)
@@ -112,14 +114,17 @@ class SlamtecLidar:
         mode = struct.pack("<BHH", self._mode.number, 0, 0)
         command = protocol.SCAN if self._mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
         self._dialogue.request(command, mode)
-        told, follows = self._dialogue.reply()
+        told, _ = self._dialogue.reply()
         if not told.stream or told.kind != self._mode.kind:
             raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
+        byte_ns = self._mode.point_ns * protocol.POINTS[told.kind] / protocol.SIZES[told.kind]
+        self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
         self._scanning, self._turning = True, False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
-        self._begin_anew()
-        self._heard = self._splitter.feed(follows)
+        self._turns.begin_anew(self._skip)
+        self._line.drop_waiting()
+        self._resume()
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
         """The next turn; it is waited for for a second if nothing else is said, three for the first.
@@ -131,11 +136,15 @@ class SlamtecLidar:
         if not self._scanning:
             raise DeviceError(f"{self._line.name}: not started")
         patience_s = _TURN_S if self._turning else _START_S
-        deadline_s = time.monotonic() + (patience_s if timeout_s is None else timeout_s)
-        while (turn := self._turns.next()) is None:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s)
-            self._take([*self._heard, *heard], arrival_ns)
-            self._heard = []
+        patience_s = patience_s if timeout_s is None else timeout_s
+        deadline_s = time.monotonic() + patience_s
+        while (turn := self._turns.next(self._count.arrivals)) is None:
+            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
+            if heard:
+                self._take(heard, arrival_ns)
+            else:
+                self._resume()
+                deadline_s = time.monotonic() + patience_s
         self._turning = True
         timed = timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
         return replace(timed, warning=self._warning)
@@ -180,7 +189,7 @@ class SlamtecLidar:
                     before = self._line.heard
                     with suppress(DeviceTimeoutError):
                         self._dialogue.request(protocol.STOP)
-                        self._dialogue.drain()
+                        self._line.drop_waiting()
                         told = self._dialogue.told(protocol.INFO, 4, protocol.info)
                         self._accept(told, model)
                         self._baud = baud
@@ -208,20 +217,21 @@ class SlamtecLidar:
         elif self._motor == "rpm":
             self._dialogue.request(protocol.MOTOR_RPM, struct.pack("<H", _RPM if on else 0))
 
-    def _begin_anew(self) -> None:
+    def _resume(self) -> None:
+        """What comes next was just measured, and continues nothing: a new count, a new turn."""
+        self._splitter.cut_in()
+        self._turns.resume()
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
-        self._turns.begin_anew(self._skip)
-        self._heard = []
         self._last_ns = 0
 
     def _take(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
-        if self._last_ns and arrival_ns - self._last_ns > _PAUSE_NS:
-            self._begin_anew()
+        silent = self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS
         self._last_ns = arrival_ns
-        for points in self._count.placed(heard, arrival_ns):
+        for points in [] if silent else self._count.placed(heard, arrival_ns):
             self._turns.add(points, arrival_ns)
-        if self._count.broken:
-            self._begin_anew()
+        if silent or self._count.broken:
+            self._line.drop_waiting()
+            self._resume()
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:

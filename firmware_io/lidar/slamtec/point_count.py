@@ -46,6 +46,9 @@ class PointCount:
             packets: that came together, at least one, each with how many bytes were passed over before it.
             arrival_ns: when they came.
         """
+        if self.arrivals.is_behind:
+            self.broken = True
+            return []
         if self._kind == protocol.NODES:
             return self._nodes(packets, arrival_ns)
         placed = []
@@ -77,7 +80,8 @@ class PointCount:
     def _capsule(self, packet: protocol.SlamtecPacket, after_garbage: bool, arrival_ns: int) -> Points | None:
         """Its start ends the capsule before it, whose points are placed now; lost ones are told by the angle.
 
-        It tells them but for whole turns. What comes half a turn late behind lost ones has more of them before it.
+        It tells them but for whole turns. What comes half a turn late behind lost ones has more of them before it, and
+        what comes before the lost ones could have been measured has none: the motor is changing its speed.
         """
         many = protocol.POINTS[self._kind]
         before, self._before = self._before, packet
@@ -91,6 +95,8 @@ class PointCount:
                 if self._span_deg and late_ns > 180 / self._span_deg * many * self._point_ns:
                     self.broken = True
                     return None
+                if late_ns < -lost * many * self._point_ns / 2:
+                    lost = 0
             if lost == 0 and not after_garbage:
                 self._span_deg = span_deg
                 number = self._points + np.arange(-many, 0)

@@ -230,6 +230,10 @@ class SlamtecSplitter:
         self._rest = b""
         self._passed = 0
 
+    def cut_in(self) -> None:
+        """What comes next may begin in the middle of a packet, which is not counted as bad."""
+        self._rest, self._passed = b"", 1
+
     def feed(self, data: bytes) -> list[tuple[SlamtecPacket, int]]:
         """The packets that these bytes complete, each with how many bytes were passed over before it."""
         self._rest += data

@@ -6,16 +6,12 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-import virtual_line
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from patience import until
-from quick_tests import samples
-from virtual_line import VirtualLine
 
 from design.catalogue.catalogue import load_catalogue
 from design.errors import DeviceError, ProtocolError
-from firmware_io.lidar import sensor_line
 from firmware_io.lidar.families import open_lidar
 from firmware_io.lidar.slamtec import dialogue, driver, protocol
 from firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
@@ -47,6 +43,7 @@ def patience(monkeypatch):
     monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
+    monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
 
 
 def lidar(model):
@@ -163,7 +160,9 @@ def test_turns_come_as_they_were_seen(model):
             assert ours.model == model and ours.firmware == "1.29" and len(ours.serial_number) == 32
             ours.start(intensity=True)
             timed = [ours.read() for _ in range(5)]
-            assert (ours.bad_packets, ours.dropped) == (0, 0)
+            steps = np.diff([one.scan.stamp_ns for one in timed]) * lidar(model).scan_rate_hz / 1e9
+            missing = np.rint(steps - 1).sum()  # on a busy computer the twin leaves some out
+            assert ours.bad_packets == 0 and abs(ours.dropped - missing) <= 1
         until(lambda: twin.machine.scanning is None)  # `with` puts it out
     usual = IDENTITIES[model].points_s / lidar(model).scan_rate_hz
     for one in timed:
@@ -244,32 +243,3 @@ def test_a_server_that_says_nothing_is_not_asked_at_every_speed():
             driver.open_slamtec(f"127.0.0.1:{server.getsockname()[1]}")
         with server.accept()[0] as heard:
             assert heard.recv(10_000).count(protocol.request(protocol.STOP)) == 3
-
-
-def at_its_time(time_ns, bearing_rad):
-    """A range tells when it was measured, in four seconds."""
-    return 1.0 + 3.5e-9 * (time_ns % 4_000_000_000), np.full(len(bearing_rad), 47)
-
-
-def off_ms(scan):
-    told_ns = (scan.range_m.astype(float) - 1.0) / 3.5e-9
-    return np.abs((scan.time_ns - told_ns + 2e9) % 4e9 - 2e9) / 1e6
-
-
-@pytest.mark.parametrize("model", ["RPLIDAR A1", "RPLIDAR S2", "RPLIDAR C1"])
-@pytest.mark.parametrize("stalled_s", samples([0.12, 0.31], [0.31]))
-@pytest.mark.parametrize("buffer_ns", [10**9, 50_000_000], ids=["late", "lost"])
-def test_times_are_right_after_a_stall_of_the_host(monkeypatch, model, stalled_s, buffer_ns):
-    line = VirtualLine(model, at_its_time)
-    monkeypatch.setattr(virtual_line, "_BUFFER_NS", buffer_ns)
-    for module in (sensor_line, dialogue, driver):
-        monkeypatch.setattr(module, "time", line)
-    monkeypatch.setattr(sensor_line, "open_stream", line.open)
-    with open_lidar("virtual", model) as ours:
-        ours.start()
-        for _ in range(30):
-            before = ours.read().scan
-        assert off_ms(before).max() < 3
-        line.sleep(stalled_s)
-        for _ in range(12):
-            assert off_ms(ours.read().scan).max() < 5

@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from firmware_io.lidar.arrival_line import ArrivalLine
 from firmware_io.lidar.turn import Points, TurnCutter, TurnQueue
 
 
@@ -36,11 +37,12 @@ def test_every_point_is_in_one_turn_and_only_what_is_not_whole_is_left_out(piece
 
 
 def test_turns_that_never_came_are_counted():
-    queue = TurnQueue()
+    queue, line = TurnQueue(), ArrivalLine(smallest_delay_ns=0, rate_max=1e-4, grain_ns=0.0)
     kept = [k for k in range(400) if not 120 <= k < 160]  # two turns of twenty
     for k in kept:
         queue.add(points([18.0 * k + 1], k), k)
+        line.add(k * 1e6, k * 1_000_000)
     begins = []
-    while (turn := queue.next()) is not None:
+    while (turn := queue.next(line)) is not None:
         begins.append(turn[0].range_m[0])
     assert begins[0] == 20 and queue.dropped == 2

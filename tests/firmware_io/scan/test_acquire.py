@@ -145,6 +145,17 @@ def test_roundings_do_not_line_up_where_a_question_comes_with_every_step(monkeyp
     assert abs(np.diff(time_ns).mean() - 10e6) < 1e6
 
 
+@pytest.mark.parametrize("stopped_s", [0.4, 1.0, 3.0])
+def test_an_angle_is_left_out_if_this_process_was_stopped_while_it_was_asked_for(stopped_s):
+    axis = axis_thread.AxisThread(Spin(period_s=6.0), 0.0, 0.0015)
+    for k in range(100):
+        axis.told.put(ServoState(k * 10_000_000, 500_000, 0.01 * k, 1.0, 0.0, 12.0, 30.0))
+    half_ns = round(stopped_s / 2 * 1e9)
+    axis.told.put(ServoState(10**9 + half_ns, half_ns, 1.0, 1.0, 0.0, 12.0, 30.0))  # it was read as the stop began
+    assert len(axis.hear()) == 100
+    assert dict(axis.left_out) == {"servo angles of uncertain time": 1}
+
+
 class ForgetfulServo(RoundingServo):
     """Does not hear the first orders of each kind."""
 

@@ -25,6 +25,7 @@ from firmware_io.servo.bus.registers import RPM, Register
 from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from firmware_io.servo.dynamixel.tables import TABLES
 from firmware_io.servo.find import find_servo
+from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
 from firmware_io.servo.reading import nearest_turn
 from firmware_io.servo.servo import open_servo
 from firmware_io.twins.servo.dynamixel_packets import packet_2, status
@@ -423,3 +424,17 @@ def test_a_silent_program_hears_that_its_guard_has_acted(pair):
     until(lambda: heard == [b"off"])
     until(lambda: not watch.turning())
     watch.dismiss(stands=True)
+
+
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_servo_has_not_stalled_if_this_process_was_stopped_while_it_asked(turns):
+    """The answer came at once, and was read after 1.2 s: its time is uncertain by the half of that."""
+    times_s = [(1.0 + 0.01 * k, 0.0) for k in range(52)] + [(2.11, 0.6)] + [(2.71 + 0.01 * k, 0.0) for k in range(60)]
+    order, stalls = TurnOrder(1.0, float("inf")), 0
+    for time_s, bound_s in times_s:
+        position_rad = time_s - bound_s if turns else 0.0
+        state = ServoState(round(time_s * 1e9), round(bound_s * 1e9), position_rad, 1.0, 0.0, 12.0, 30.0)
+        followed = follow(order, state, 0.0015)
+        stalls += isinstance(followed, Stall)
+        order = followed if isinstance(followed, TurnOrder) else order
+    assert bool(stalls) is not turns
