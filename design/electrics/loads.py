@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from design.catalogue.products import Lidar, Servo
 from design.electrics.network import Branch, Drop
-from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
+from design.electrics.sizing import CONVERTER, RING_OHM, THICKEST_MM2, fuse_for, wire_drop_v, wire_for
 from design.scanner import Scanner
 
 SUPPLY_V = 12.0
@@ -14,31 +15,48 @@ COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed
 COMPUTER_V = 5.0
 UNKNOWN_A = 1.0  # of a device whose current nobody tells
 LEADS_M = 1.0  # of each branch
+SETTING_V = 0.1  # a trimmer is set to a tenth of a volt with a meter; so far a converter stays below the maker's limit
 CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
 
 
 @dataclass(frozen=True, slots=True)
 class ElectricLoad:
-    """A device and what it asks of the supply."""
+    """A device and the current that it draws.
+
+    Attributes:
+        name: of its box.
+        title: in words.
+        volts: nominal voltage that it is fed with.
+        lasting_a: as it runs.
+        busy_a: the most for longer than a moment: its voltage must hold meanwhile.
+        peak_a: the most of all, inrush included: circuits, fuse, converter and supply carry it.
+        bounds_v: lowest and highest voltage that its maker allows.
+        behind_ring: whether its current passes the slip ring.
+    """
 
     name: str
     title: str
-    volts: float  # that it is fed with
+    volts: float
     lasting_a: float
+    busy_a: float
     peak_a: float
     bounds_v: tuple[float, float] | None = None
     behind_ring: bool = False
 
     @property
     def set_v(self) -> float:
-        """What its converter is set to: what is lost on the way comes off, so rather the middle of what it bears."""
+        """Voltage of its converter: the middle of what it accepts, or more if the way to it loses more."""
         if self.volts == SUPPLY_V or self.bounds_v is None:
             return self.volts
-        return max(self.volts, round(sum(self.bounds_v) / 2, 1))
+        least, most = self.bounds_v
+        middle = max(self.volts, round((least + most) / 2, 1))
+        needed = math.ceil((least + self.lost_v(THICKEST_MM2)) / SETTING_V - 1e-9)
+        highest = math.floor(most / SETTING_V + 1e-9) - 1
+        return round(min(max(middle, needed * SETTING_V), highest * SETTING_V), 1)
 
     def lost_v(self, mm2: float) -> float:
         """On its leads, and in the ring."""
-        return wire_drop_v(self.peak_a, mm2, LEADS_M) + (2 * self.peak_a * RING_OHM if self.behind_ring else 0.0)
+        return wire_drop_v(self.busy_a, mm2, LEADS_M) + (2 * self.busy_a * RING_OHM if self.behind_ring else 0.0)
 
     @property
     def from_supply(self) -> float:
@@ -55,9 +73,14 @@ def loads_of(scanner: Scanner) -> list[ElectricLoad]:
 
 
 def _lidar_load(lidar: Lidar, *, behind_ring: bool) -> ElectricLoad:
-    peak = lidar.peak_a or UNKNOWN_A
-    volts = _fed_with(lidar.supply_v)
-    return ElectricLoad("lidar", lidar.name, volts, lidar.current_a or peak, peak, lidar.supply_v, behind_ring)
+    busy, volts = lidar.peak_a or UNKNOWN_A, _fed_with(lidar.supply_v)
+    lasting, peak = lidar.current_a or busy, most_a(lidar)
+    return ElectricLoad("lidar", lidar.name, volts, lasting, busy, peak, lidar.supply_v, behind_ring)
+
+
+def most_a(lidar: Lidar) -> float:
+    """The largest current of a lidar, even for a moment."""
+    return max(lidar.peak_a or UNKNOWN_A, lidar.inrush_a or 0.0)
 
 
 def _servo_load(servo: Servo) -> ElectricLoad:
@@ -65,12 +88,12 @@ def _servo_load(servo: Servo) -> ElectricLoad:
     stall = servo.stall_a or UNKNOWN_A
     volts = _fed_with(servo.supply_v)
     peak = stall * volts / servo.rated_v
-    return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, servo.supply_v)
+    return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, peak, servo.supply_v)
 
 
 def _computer_load() -> ElectricLoad:
     amps = COMPUTER_W / COMPUTER_V
-    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps)
+    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps, amps)
 
 
 def _fed_with(supply_v: tuple[float, float] | None) -> float:
@@ -92,7 +115,7 @@ def branch_of(number: int, load: ElectricLoad) -> Branch:
 def drops_of(loads: list[ElectricLoad], branches: list[Branch]) -> list[Drop]:
     """What reaches each device whose bounds are known."""
     return [
-        Drop(load.title, load.set_v - load.lost_v(branch.mm2), *load.bounds_v)
+        Drop(load.title, load.set_v - load.lost_v(branch.mm2), load.set_v, *load.bounds_v)
         for load, branch in zip(loads, branches, strict=True)
         if load.bounds_v is not None
     ]

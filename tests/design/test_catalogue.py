@@ -72,7 +72,7 @@ def test_all_products_of_the_issue_are_there(shipped):
 def test_every_value_has_a_source_and_says_whether_it_is_verified(path):
     product = load_product(path)
     table = tomllib.loads(path.read_text(encoding="utf-8"))
-    values = set(table) - {"kind", "name", "maker"}
+    values = set(table) - {"kind", "name", "maker", "known_wrong"}
     assert values
     assert set(product.provenance()) == values
     for field, origin in product.provenance().items():
@@ -80,7 +80,8 @@ def test_every_value_has_a_source_and_says_whether_it_is_verified(path):
         if origin.source.startswith("assumed"):
             assert not origin.verified, f"{field} is assumed and cannot be verified"
     in_use = {name for name in type(product).model_fields if getattr(product, name) is not None}
-    assert in_use - values == {"kind", "name", "maker"}, "a value without a source"
+    assert in_use - values == {"kind", "name", "maker", "known_wrong"}, "a value without a source"
+    assert all(len(error.source.strip()) > 5 for error in product.known_wrong)
     assert product.unverified() == [f for f in product.provenance() if not table[f]["verified"]]
 
 
@@ -256,5 +257,6 @@ def test_a_filter_keeps_what_is_known_to_keep_it(shipped):
 def test_every_product_tells_its_values_in_words():
     """Records of a product too: the flange of a capsule, the circuits of a ring, the leads of a lidar."""
     for product in load_catalogue():
-        assert len(product.lines()) == len(product.provenance()) + 2
+        errors = product.known_wrong
+        assert len(product.lines()) == len(product.provenance()) + 2 + len(errors) + bool(errors)
     assert any('"count": 6' in line for line in load_catalogue().named("SRC022A-6").lines())
