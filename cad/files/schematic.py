@@ -18,6 +18,7 @@ from design.electrics.rules import broken_rules
 ROW = 22.0  # from pin to pin
 LINE = 15.0  # from line to line of text in a box
 CHAR = 6.0  # of a letter of the text, with room for the widest
+PAGE = 1100.0  # cautions are no wider: read without scrolling
 BOLD_CHAR = 7.0  # likewise, bold
 LANE = 9.0
 APART = 34.0  # boxes of a column
@@ -119,7 +120,11 @@ def _warnings(network: Network, width: float) -> list[str]:
     """Lines of the cautions, and of broken rules before them, as wide as the sheet."""
     broken = [f"DO NOT BUILD THIS: {fault.where}: {fault.message}." for fault in broken_rules(network)]
     cautions = [f"CAUTION: {caution}" for caution in network.cautions]
-    return [line for text in (*broken, *cautions) for line in textwrap.wrap(text, int((width - 2 * EDGE) / BOLD_CHAR))]
+    return [
+        line
+        for text in (*broken, *cautions)
+        for line in textwrap.wrap(text, int((min(width, PAGE) - 2 * EDGE) / BOLD_CHAR))
+    ]
 
 
 def _right_edge(network: Network, boxes: dict[str, _Placed]) -> float:

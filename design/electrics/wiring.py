@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import textwrap
+
 from design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
-from design.electrics.cautions import cautions_of
+from design.electrics.cautions import MEASURE, RISKS, cautions_of
 from design.electrics.loads import (
     CHANGER,
     SUPPLY_V,
@@ -19,6 +21,7 @@ from design.electrics.sizing import fuse_for, supply_for, wire_for
 from design.scanner import Scanner
 
 USB_A = 0.5  # that a port gives
+LINE_CHARS = 36  # of a line of text in a box
 DATA = {
     "usb": ("VBUS", "D-", "D+", "GND"),
     "usb-powered": ("VBUS", "D-", "D+", "GND"),
@@ -43,24 +46,8 @@ CUT_CABLES = {
     "usb-powered": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
     "ethernet": (ETHERNET, "TIA-568-B: cut cable of the computer"),
 }
-MEASURE = "measure first"
+CUT, WHOLE = "a cut cable", "its cable"
 CROSSED = {"TX": "RX", "RX": "TX"}  # what one side sends the other receives
-RISKS = {
-    "usb": (
-        "USB through a ring: full speed (12 Mbit/s) passes good contacts, high speed (480 Mbit/s) only rings made for "
-        "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on a circuit of its own, the "
-        "way between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
-        "microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring with gold "
-        "contacts ends it."
-    ),
-    "ethernet": (
-        "Ethernet through a ring: 100BASE-TX needs two pairs, each twisted up to the ring on neighbouring circuits, "
-        "and asks for a data-rated ring; a cheap capsule loses frames while it turns. Watch the counters of the port "
-        "during a turn; 10BASE-T by a switch that forces it is the way out."
-    ),
-    "serial": "A serial line passes any ring: at 500 kBaud and more use RS-422 and twist the pairs.",
-}
-RISKS["usb-powered"] = RISKS["usb"].replace("power the lidar by its own lead, not by VBUS", "VBUS feeds the lidar")
 
 
 def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
@@ -73,15 +60,16 @@ def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
     loads = loads_of(scanner)
     branches = [branch_of(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
+    wires = _wires(scanner, switch, loads, branches, circuits)
     return Network(
         boxes=tuple(_boxes(scanner, switch, loads, branches, circuits)),
-        wires=tuple(_wires(scanner, switch, loads, branches, circuits)),
+        wires=tuple(wires),
         circuits=circuits,
         branches=tuple(branches),
         drops=tuple(drops_of(loads, branches)),
         supply_a=supply_for(sum(branch.peak_a for branch in branches)),
         risks=() if ring is None or lidar.link is None else (RISKS[lidar.link],),
-        cautions=tuple(cautions_of(scanner, loads)),
+        cautions=tuple(cautions_of(scanner, loads, wires)),
         unknown=tuple(_unknown(scanner)),
     )
 
@@ -90,6 +78,11 @@ def _data(lidar: Lidar) -> tuple[str, ...]:
     """Nets of its data cable, named from the lidar's side; none if the catalogue has no `link`."""
     nets = () if lidar.link is None else DATA[lidar.link]
     return tuple(net for net in nets if not (lidar.sends_only and net == "RX"))
+
+
+def _shield(lidar: Lidar) -> tuple[str, ...]:
+    """The shield of its data cable; a plug with a single line has none."""
+    return () if lidar.sends_only else ("shield",)
 
 
 def _plug_pin(net: str) -> str:
@@ -103,7 +96,7 @@ def _nets(lidar: Lidar) -> list[tuple[str, float]]:
     power = [] if lidar.link == "usb-powered" else [("+", most), ("-", most)]
     amps = most if lidar.link == "usb-powered" else USB_A
     data = [(net, amps if net in ("VBUS", "GND") else 0.0) for net in _data(lidar)]
-    return [*power, *data, ("shield", 0.0)]
+    return [*power, *data, *((net, 0.0) for net in _shield(lidar))]
 
 
 def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
@@ -169,10 +162,12 @@ def _boxes(
     data = _data(lidar)
     power = () if lidar.link == "usb-powered" else ("+", "-")
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
-    pins = (*power, *data, *(("shield",) if shielded else ()))
+    pins = (*power, *data, *(_shield(lidar) if shielded else ()))
     level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
     ends = (*map(_plug_pin, data), "shield")
-    boxes.append(Box("plug", f"{plug} of the computer", ("a cut cable", *level), (plug,), ends, 5, ("shield",)))
+    boxes.append(
+        Box("plug", f"{plug} of the computer", (_cable(lidar, circuits), *level), (plug,), ends, 5, ("shield",))
+    )
     if circuits:
         ring = scanner.slip_ring
         assert ring is not None
@@ -182,7 +177,8 @@ def _boxes(
     ties = lidar.tied_pins or ()
     words = tuple(f"join {tie.pin} to {tie.to} at its plug" for tie in ties)
     tied = tuple(dict.fromkeys(pin for tie in ties for pin in (tie.pin, tie.to)))
-    boxes.append(Box("lidar", lidar.name, (lidar.connector or "connector unknown", *words), pins, tied, 7))
+    plug_words = textwrap.wrap(lidar.connector or "connector unknown", LINE_CHARS)
+    boxes.append(Box("lidar", lidar.name, (*plug_words, *words), pins, tied, 7))
     return boxes
 
 
@@ -221,8 +217,8 @@ def _wires(
                 wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, **_lead(lidar, sign)))
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
     wires += [
-        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note="its cable"),
-        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note="its cable"),
+        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=WHOLE),
+        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=WHOLE),
     ]
     signals = SIGNALS[servo.bus or "ttl"]
     joined = {**{pin: pin for pin in signals}, "GND": "GND data"}
@@ -232,14 +228,18 @@ def _wires(
             amps = 0.0 if end == "OUT" else switch.current_a
             wires.append(Wire(("computer", pin), (FLAG_SWITCH, end), net, amps, 0.0))
     peaks = dict(_nets(lidar))
-    for net in (*_data(lidar), "shield"):
+    for net in (*_data(lidar), *_shield(lidar)):
         start = ("plug", _plug_pin(net))
         if not circuits:
-            wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=_data_note(net)))
+            note = _data_note(net) if _cable(lidar, circuits) == CUT else WHOLE
+            wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))
         elif net in inside:
             wires.append(Wire(start, ("ring", inside[net]), net, peaks[net], 0.0, **_cut(lidar, net)))
             wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, note=_data_note(net)))
-    wires += [Wire(("lidar", tie.pin), ("lidar", tie.to), "GND", 0.0, 0.0) for tie in lidar.tied_pins or ()]
+    wires += [
+        Wire(("lidar", tie.pin), ("lidar", tie.to), "GND", 0.0, 0.0, note="join these two")
+        for tie in lidar.tied_pins or ()
+    ]
     return wires
 
 
@@ -261,6 +261,11 @@ def _cut(lidar: Lidar, net: str) -> dict[str, str]:
     """Colour and source of a wire in the computer's cut cable."""
     colours, source = CUT_CABLES.get(lidar.link or "", ({}, ""))
     return {"colour": colours[net], "source": source} if net in colours else {"note": _data_note(net)}
+
+
+def _cable(lidar: Lidar, circuits: tuple[Circuit, ...]) -> str:
+    """How the data leave the computer: a plug passes neither a ring nor a bare serial port."""
+    return CUT if circuits or lidar.link in (None, "serial") else WHOLE
 
 
 def _data_note(net: str) -> str:

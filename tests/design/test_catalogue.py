@@ -260,3 +260,45 @@ def test_every_product_tells_its_values_in_words():
         errors = product.known_wrong
         assert len(product.lines()) == len(product.provenance()) + 2 + len(errors) + bool(errors)
     assert any('"count": 6' in line for line in load_catalogue().named("SRC022A-6").lines())
+
+
+SQUARE_THAT_IS_NONE = {
+    *("LD06", "LD19", "STL27L", "RPLIDAR A1", "RPLIDAR A2", "RPLIDAR A3", "LMS111", "LMS151"),
+    *("URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX"),
+    *("XL430-W250", "XM430-W350", "XH430-W350", "XM540-W270", "XL330-M288", "STS3215"),
+}
+"""Their hole pattern does not exist on the device."""
+OTHER_MISFITS = {
+    *("MX-106", "AX-12A", "TiM551", "TiM561", "TiM571", "TiM781"),
+    *("UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"),
+}
+
+
+def test_every_product_that_parts_do_not_fit_says_so_and_no_other(shipped):
+    misfits = {product.name: " ".join(product.misfit()) for product in shipped if product.misfit()}
+    assert set(misfits) == SQUARE_THAT_IS_NONE | OTHER_MISFITS
+    assert {name for name, words in misfits.items() if "hole pattern that does not exist" in words} == (
+        SQUARE_THAT_IS_NONE
+    )
+    assert "88.5 mm long" in misfits["UH1256-02-0610-06S"] and "43.5 mm more" in misfits["UH1256-02-0610-06S"]
+    for right in ("UTM-30LX", "MX-64R"):
+        assert shipped.named(right).known_wrong == ()
+
+
+def test_a_known_error_names_a_value_that_the_record_has(shipped):
+    for product in shipped:
+        for error in product.known_wrong:
+            words = error.words(product)
+            assert error.device in words and error.field in words
+            if error.field != "drag torque":
+                assert f"{error.field} = " in words, (product.name, error.field)
+    catalogue = "\n".join(shipped.named("STL27L").lines())
+    assert "! mount_holes_mm = [[15.0, 15.0]" in catalogue and "three through holes" in catalogue
+
+
+def test_a_product_of_ones_own_replaces_its_known_errors(tmp_path, shipped):
+    text = (SHIPPED / "ld19.toml").read_text(encoding="utf-8")
+    mine = load_catalogue(write(tmp_path, text[: text.index("known_wrong")])).get("LD19", Lidar)
+    assert mine.misfit() == [] and shipped.get("LD19", Lidar).misfit()
+    with pytest.raises(TaskError, match="known_wrong"):
+        load_catalogue(write(tmp_path, text.replace("{ field = ", "{ feild = ")))

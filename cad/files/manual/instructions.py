@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from cad.assembly.assembly import Assembly
 from cad.assembly.print_settings import print_words
+from cad.checks.remarks import products_of
 from cad.checks.retention import material_of
 from cad.files.manual.pictures import StepPictures
 from cad.files.manual.scenes import StepScene, scenes_of
@@ -14,6 +15,7 @@ from cad.geometry.mesh import TriMesh
 from cad.layout.joints import CASE_EAR, DECK_MM, Joint
 from cad.layout.names import FIT_COUPON
 from cad.layout.tightening import hold_of
+from design.electrics.wiring import network_of
 from design.scanner import Scanner
 
 NUTS = (
@@ -69,6 +71,9 @@ def instructions_text(
         "mm; all others follow from the parts.",
         "",
     ]
+    for product in products_of(scanner, assembly.layout.drive):
+        if reasons := product.misfit():
+            lines += [f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), ""]
     lines += [LOCKED, ""]
     if any(joint.inserts for joint in joints):
         lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
@@ -79,10 +84,15 @@ def instructions_text(
         lines += [_words(assembly, scene), ""]
         if scene.step.check:
             lines += [f"Before you go on: {scene.step.check}.", ""]
+    network = network_of(scanner, assembly.layout.drive.switch)
     lines += [
         f"## {len(scenes) + 1}. {LOOK}",
         "",
-        LAST + _joined(assembly),
+        "**Caution, before you join a wire:**",
+        "",
+        *(f"- {caution}" for caution in network.cautions),
+        "",
+        LAST + _joined(assembly) + " `wiring.md` lists every wire.",
         "",
     ]
     return "\n".join(lines)
