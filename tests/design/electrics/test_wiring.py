@@ -41,7 +41,7 @@ def every_network(servo):
 
 @pytest.mark.parametrize("servo", names(Servo))
 def test_every_combination_keeps_the_rules_unless_its_ring_is_too_weak(servo):
-    for lidar, _, made in every_network(servo):
+    for lidar, ring, made in every_network(servo):
         device = CATALOGUE.get(lidar, Lidar)
         most = max(device.peak_a or 0.0, device.inrush_a or 0.0)
         weak = ring is not None and max(group.amps for group in CATALOGUE.get(ring, SlipRing).ways) < most
