@@ -223,7 +223,7 @@ def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuf
 def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(command, tmp_path, monkeypatch):
     built = Build(tmp_path, (), (), None, tuple(load_task("low_cost").misfits()))
     monkeypatch.setattr("scanwright.api.build", lambda *_, **__: built)
-    code, out, complaints = command("-q", "build", "low_cost")
+    code, out, complaints = command("build", "low_cost", "--quiet")
     assert code == 0 and "will not fit" not in out
     heads = [line for line in complaints if line.startswith("warning: ")]
     assert heads == [
