@@ -76,7 +76,9 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
 
 
 def test_the_steps_begin_with_what_does_not_fit_and_warn_before_the_first_wire(steps):
-    assert steps.index("**Caution: UH1256-02-0610-06S: parts printed for it will not fit") < steps.index("## 1. ")
+    assert steps.index("**Caution: UH1256-02-0610-06S: parts printed for it will not fit") < steps.index(
+        "Print `print/"
+    )
     assert "**Caution: UTM-30LX" not in steps and "**Caution: MX-64R" not in steps
     (wiring,) = (step for step in steps.split("\n## ") if "Look, then wire" in step.splitlines()[0])
     assert wiring.index("Caution, before you join a wire") < wiring.index("set a multimeter to continuity")
