@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from design.catalogue.products import Lidar, Servo
 from design.electrics.network import Branch, Drop
-from design.electrics.sizing import CONVERTER, RING_OHM, THICKEST_MM2, fuse_for, wire_drop_v, wire_for
+from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
 from design.scanner import Scanner
 
 SUPPLY_V = 12.0
@@ -15,7 +14,6 @@ COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed
 COMPUTER_V = 5.0
 UNKNOWN_A = 1.0  # of a device whose current nobody tells
 LEADS_M = 1.0  # of each branch
-SETTING_V = 0.1  # a trimmer is set to a tenth of a volt with a meter; so far a converter stays below the maker's limit
 CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
 
 
@@ -45,14 +43,10 @@ class ElectricLoad:
 
     @property
     def set_v(self) -> float:
-        """Voltage of its converter: the middle of what it accepts, or more if the way to it loses more."""
+        """Voltage of its converter: the middle of what it accepts, since some is lost on the way."""
         if self.volts == SUPPLY_V or self.bounds_v is None:
             return self.volts
-        least, most = self.bounds_v
-        middle = max(self.volts, round((least + most) / 2, 1))
-        needed = math.ceil((least + self.lost_v(THICKEST_MM2)) / SETTING_V - 1e-9)
-        highest = math.floor(most / SETTING_V + 1e-9) - 1
-        return round(min(max(middle, needed * SETTING_V), highest * SETTING_V), 1)
+        return max(self.volts, round(sum(self.bounds_v) / 2, 1))
 
     def lost_v(self, mm2: float) -> float:
         """On its leads, and in the ring."""

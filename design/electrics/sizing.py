@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 # cross-sections of IEC 60228, and what a single wire in a loose bundle is trusted with: from memory, cautious
 WIRES_A = ((0.25, 2.0), (0.5, 5.0), (0.75, 7.5), (1.0, 10.0), (1.5, 15.0), (2.5, 20.0))
-THICKEST_MM2 = WIRES_A[-1][0]
 FUSES_A = (1.0, 2.0, 3.0, 4.0, 5.0, 7.5, 10.0, 15.0, 20.0)  # blades, ISO 8820-3
 SUPPLIES_A = (2.1, 3.0, 5.0, 6.0, 8.5, 12.5, 17.0)  # enclosed 12 V supplies of 25 to 200 W
 OVER_PEAK = 1.1  # of a fuse over the largest current of its branch

@@ -302,3 +302,40 @@ def test_a_product_of_ones_own_replaces_its_known_errors(tmp_path, shipped):
     assert mine.misfit() == [] and shipped.get("LD19", Lidar).misfit()
     with pytest.raises(TaskError, match="known_wrong"):
         load_catalogue(write(tmp_path, text.replace("{ field = ", "{ feild = ")))
+
+
+# typed from the makers' sheets: lowest and highest voltage at the device
+@pytest.mark.parametrize(
+    ("name", "volts"),
+    [
+        ("RPLIDAR C1", (4.8, 5.2)),
+        ("RPLIDAR S2", (4.9, 5.2)),
+        ("RPLIDAR S1", (4.8, 5.5)),
+        ("RPLIDAR A2", (4.9, 5.5)),
+        ("RPLIDAR A3", (4.9, 5.5)),
+        ("LD06", (4.5, 5.5)),
+        ("LD19", (4.5, 5.5)),
+        ("STL27L", (4.5, 5.5)),
+        ("UTM-30LX", (10.8, 13.2)),
+        ("UST-10LX", (10.0, 30.0)),
+        ("TiM561", (9.0, 28.0)),
+        ("LMS111", (10.8, 30.0)),
+        ("XL430-W250", (6.5, 12.0)),
+        ("XL330-M288", (3.7, 6.0)),
+        ("AX-12A", (9.0, 12.0)),
+        ("MX-64R", (10.0, 14.8)),
+    ],
+)
+def test_supplies_are_those_that_the_makers_allow(shipped, name, volts):
+    assert shipped.named(name).supply_v == volts
+
+
+def test_start_and_inrush_currents_are_those_of_the_makers(shipped):
+    lidars = {name: shipped.get(name, Lidar) for name in ("RPLIDAR A2", "RPLIDAR A3", "RPLIDAR S2", "STL27L", "LD19")}
+    assert {name: (lidar.current_a, lidar.peak_a, lidar.inrush_a) for name, lidar in lidars.items()} == {
+        "RPLIDAR A2": (0.6, 2.5, None),
+        "RPLIDAR A3": (0.6, 2.5, None),
+        "RPLIDAR S2": (0.6, 1.5, 2.5),
+        "STL27L": (0.29, 0.54, None),
+        "LD19": (0.18, 0.3, None),
+    }
