@@ -209,6 +209,11 @@ INTRODUCTION = """# Gallery
 Eight tasks from eight worlds. Left the scanner that was built, right one full scan of it in a simulated world, the
 noise of the data sheet included; the red ball is the scanner, larger than it is. All of this page is made by
 `python -m benchmarks.scanwright.gallery`: tasks, parts, scans, pictures and figures.
+
+**Do not print these parts yet.** For most lidars, servos and slip rings of this page the catalogue has hole patterns or
+lengths that the real devices do not have, so the parts do not fit: of the 16 screws that hold lidar and servo of
+`low_cost` and of the shelf below, 12 find no thread. `build` prints a warning for each such product,
+`scanwright catalogue NAME` has the reasons. Angles, densities and scans do not depend on it.
 """
 
 

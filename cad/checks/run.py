@@ -5,7 +5,7 @@ They look at the parts without their labels: a groove between two strokes is no 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from cad.assembly.assembly import Assembly
 from cad.assembly.make import make_parts
@@ -21,7 +21,7 @@ from cad.checks.printing import printing_checks
 from cad.checks.remarks import products_of, unverified
 from cad.checks.retention import retention_checks
 from cad.checks.rotor_leads import lead_checks, standing_checks
-from design.catalogue.products import SlotSwitch
+from design.catalogue.products import Product, SlotSwitch
 from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
 from design.scanner import Scanner
@@ -61,13 +61,15 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     shadow = shadow_of(scanner, triangles, assembly.turning())
     progress("checking clearance, loads and walls")
     printed = {name: solid for name, solid in assembly.made.items() if not assembly.parts[name].metal}
+    products = products_of(scanner, layout.drive)
     doubts = [
         Check("unverified", "note", None, None, "", product.name, finding.message)
-        for product in products_of(scanner, layout.drive)
+        for product in products
         for finding in unverified(product, assembly)
     ]
     bodies = link_bodies(scanner, assembly)
     checks = [
+        *known_errors(products),
         *clearance_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(scanner, layout.stack, bodies),
@@ -81,6 +83,24 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *doubts,
     ]
     return checks, shadow
+
+
+def known_errors(products: Iterable[Product]) -> list[Check]:
+    """A warning for each wrong value by which the printed parts do not fit the device, a note for every other one."""
+    fit = {True: "the printed parts still fit", False: "the printed parts will not fit"}
+    return [
+        Check(
+            "known_error",
+            "note" if error.fits else "warning",
+            None,
+            None,
+            "",
+            product.name,
+            f"{product.name}: {error.words(product)}; {fit[error.fits]}",
+        )
+        for product in products
+        for error in product.known_wrong
+    ]
 
 
 def electric_checks(scanner: Scanner, switch: SlotSwitch | None = None) -> list[Check]:

@@ -2,19 +2,24 @@
 
 A wire leaves a box to the right and enters another from the left: between two columns first come the lanes in which
 wires change their height, one for each, then room for the words that stand on each wire before its end. A wire that
-passes columns does so below all boxes. So no words meet, whatever the scanner. Lengths in pixels.
+passes columns does so below all boxes. So no words meet, whatever the scanner. A wire between two pins
+of one box is a bridge on its right. Cautions stand above all boxes. Lengths in pixels.
 """
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 from design.electrics.network import Box, Network, Wire
+from design.electrics.rules import broken_rules
 
 ROW = 22.0  # from pin to pin
 LINE = 15.0  # from line to line of text in a box
 CHAR = 6.0  # of a letter of the text, with room for the widest
+PAGE = 1100.0  # cautions are no wider: read without scrolling
+BOLD_CHAR = 7.0  # likewise, bold
 LANE = 9.0
 APART = 34.0  # boxes of a column
 EDGE = 24.0
@@ -32,6 +37,7 @@ INKS = {
     "white-green": "#66a86a",
 }
 INK = "#555555"
+DANGER = "#c62828"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +73,16 @@ def schematic_svg(network: Network, title: str) -> str:
     columns = sorted({box.column for box in network.boxes})
     place = {column: i for i, column in enumerate(columns)}
     spans = [_span(network, place, wire) for wire in network.wires]
-    boxes = _placed(network, columns, spans)
+    width = _right_edge(network, _placed(network, columns, spans, HEAD))
+    warnings = _warnings(network, width)
+    boxes = _placed(network, columns, spans, HEAD + LINE * len(warnings))
     floor = max(placed.bottom for placed in boxes.values()) + 26.0
     lanes = [0] * len(columns)
     far, drawn = 0, []
     for wire, (first, last) in zip(network.wires, spans, strict=True):
+        if wire.start[0] == wire.end[0]:
+            drawn.append(_bridge(wire, boxes[wire.start[0]]))
+            continue
         start, end = boxes[wire.start[0]].right(wire.start[1]), boxes[wire.end[0]].left(wire.end[1])
         points = [start, *_turn(boxes, columns[first], lanes, first, start[1])]
         if last > first + 1:
@@ -82,15 +93,15 @@ def schematic_svg(network: Network, title: str) -> str:
         else:
             points.append((points[-1][0], end[1]))
         drawn.append(_wire(wire, [*points, end]))
-    width = max(placed.x + placed.width for placed in boxes.values()) + EDGE
     height = floor + 14.0 * far + 34.0
-    note = "Wires cross without a joint. A lead whose colour nobody verified is measured before it is joined."
+    note = "Wires cross without a joint. A wire without a colour may have any: only its pins count."
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_n(width)} {_n(height)}" width="{_n(width)}" '
             f'height="{_n(height)}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="11">',
             '<rect width="100%" height="100%" fill="#ffffff"/>',
             _text(EDGE, 30.0, title, size=16, bold=True),
+            *(_text(EDGE, HEAD + LINE * i, line, bold=True, ink=DANGER) for i, line in enumerate(warnings)),
             *drawn,
             *(line for placed in boxes.values() for line in _box(placed)),
             _text(EDGE, height - 14.0, note),
@@ -105,14 +116,32 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
     return column[wire.start[0]], column[wire.end[0]]
 
 
-def _placed(network: Network, columns: list[int], spans: list[tuple[int, int]]) -> dict[str, _Placed]:
+def _warnings(network: Network, width: float) -> list[str]:
+    """Lines of the cautions, and of broken rules before them, as wide as the sheet."""
+    broken = [f"DO NOT BUILD THIS: {fault.where}: {fault.message}." for fault in broken_rules(network)]
+    cautions = [f"CAUTION: {caution}" for caution in network.cautions]
+    return [
+        line
+        for text in (*broken, *cautions)
+        for line in textwrap.wrap(text, int((min(width, PAGE) - 2 * EDGE) / BOLD_CHAR))
+    ]
+
+
+def _right_edge(network: Network, boxes: dict[str, _Placed]) -> float:
+    """Width of the sheet: boxes, and the bridges with their words right of the last one."""
+    words = [len(wire.words) for wire in network.wires if wire.start[0] == wire.end[0]]
+    bridges = 3 * LANE + CHAR * max(words) if words else 0.0
+    return max(placed.x + placed.width for placed in boxes.values()) + bridges + EDGE
+
+
+def _placed(network: Network, columns: list[int], spans: list[tuple[int, int]], top: float) -> dict[str, _Placed]:
     """Columns as wide as their words, gaps as wide as their lanes and the words on the wires that end there."""
     found: dict[str, _Placed] = {}
     x = EDGE
     for i, column in enumerate(columns):
         boxes = [box for box in network.boxes if box.column == column]
         width = max(_width(box) for box in boxes)
-        y = HEAD
+        y = top
         for box in boxes:
             # pins of neighbouring columns stand half a row apart: no two wires lie on one line
             y += (i % 2 * ROW / 2 - _Placed(box, x, y, width).first) % ROW
@@ -138,12 +167,25 @@ def _turn(boxes: dict[str, _Placed], column: int, lanes: list[int], gap: int, y:
 
 
 def _wire(wire: Wire, points: list[tuple[float, float]]) -> str:
-    ink = INKS.get(wire.colour, INK)
+    x, y = points[-1]
+    return _line(wire, points) + "\n" + _text(x - 8.0, y - 4.0, wire.words, ink=_ink(wire), anchor="end")
+
+
+def _bridge(wire: Wire, placed: _Placed) -> str:
+    """A wire from a pin on the right of a box to another one there."""
+    (x, start), (_, end) = placed.right(wire.start[1]), placed.right(wire.end[1])
+    words = _text(x + 2.5 * LANE, (start + end) / 2 + 4.0, wire.words)
+    return _line(wire, [(x, start), (x + 2 * LANE, start), (x + 2 * LANE, end), (x, end)]) + "\n" + words
+
+
+def _line(wire: Wire, points: list[tuple[float, float]]) -> str:
     thick = 1.2 if wire.mm2 == 0 else 1.6 + 0.6 * wire.mm2
     path = " ".join(f"{_n(x)},{_n(y)}" for x, y in points)
-    line = f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{_n(thick)}"/>'
-    x, y = points[-1]
-    return line + "\n" + _text(x - 8.0, y - 4.0, wire.words, ink=ink, anchor="end")
+    return f'<polyline points="{path}" fill="none" stroke="{_ink(wire)}" stroke-width="{_n(thick)}"/>'
+
+
+def _ink(wire: Wire) -> str:
+    return INKS.get(wire.colour, INK)
 
 
 def _box(placed: _Placed) -> list[str]:

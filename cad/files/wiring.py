@@ -42,14 +42,15 @@ def wiring_files(scanner: Scanner, digest: str, switch: SlotSwitch | None = None
 
 def wiring_text(network: Network, title: str) -> str:
     """The words: paragraphs and lists, no tables, so that the report shows the same."""
-    blocks = [f"# {title}", GROUND]
+    blocks = [f"# {title}"]
     for heading, lines in (
+        ("Do not build this wiring", [f"- {fault.where}: {fault.message}" for fault in broken_rules(network)]),
+        ("Caution", [*(f"- {caution}" for caution in network.cautions), GROUND]),
         ("Power", list(_power(network))),
         ("Slip ring", list(_ring(network))),
         ("Wires", list(_wires(network))),
         ("Data through the ring", list(network.risks)),
         ("Not known", [f"- {fact}: measure or ask its maker" for fact in network.unknown]),
-        ("Broken rules", [f"- {fault.where}: {fault.message}" for fault in broken_rules(network)]),
     ):
         if lines:
             listed = [line for line in lines if line.startswith("- ")]
@@ -71,8 +72,8 @@ def _power(network: Network) -> Iterator[str]:
     )
     for drop in network.drops:
         yield (
-            f"- {drop.device} gets {drop.volts:.2f} V at its largest current, asks for {drop.least:g} to {drop.most:g} "
-            f"({LEADS_M:g} m of leads, and the ring where it is behind it)"
+            f"- {drop.device} gets {drop.idle_v:.2f} V at rest and {drop.volts:.2f} V at its largest current, and "
+            f"accepts {drop.least:g} to {drop.most:g} V ({LEADS_M:g} m of leads, and the ring if it is behind it)"
         )
     yield (
         "Currents are those of the catalogue, where `scanwright catalogue NAME` tells source and doubt; the computer "
@@ -84,18 +85,19 @@ def _power(network: Network) -> Iterator[str]:
 def _ring(network: Network) -> Iterator[str]:
     for circuit in network.circuits:
         if not circuit.net:
-            yield f"- {circuit.number} ({circuit.colour}): spare, {circuit.rated_a:g} A"
+            yield f"- {circuit.number}: spare, {circuit.rated_a:g} A"
             continue
         load = (
             f"{circuit.amps:g} A of {circuit.rated_a:g}, {circuit.rated_a / circuit.amps:.2g} times"
             if circuit.amps
             else "signal"
         )
-        yield f"- {circuit.number} ({circuit.colour}): {circuit.net}, {load}"
+        yield f"- {circuit.number}: {circuit.net}, {load}"
     if network.circuits:
         yield (
-            "Numbers and colours of the ring's leads are in the order of EIA-359, assumed: no drawing of its maker was "
-            "found. Ring them through with a meter, stator to rotor, and write the numbers on both ends."
+            "The numbers are ours: the makers of these rings number no circuit. If the leads differ in thickness, the "
+            "thick ones are the circuits with the higher current. Set a multimeter to continuity, find the two ends of "
+            "each circuit, stator and rotor, and write its number on both."
         )
 
 
@@ -106,3 +108,5 @@ def _wires(network: Network) -> Iterator[str]:
         yield (
             f"- {titles[wire.start[0]]} {wire.start[1]} to {titles[wire.end[0]]} {wire.end[1]}: {wire.words}{carries}"
         )
+    sources = {wire.source: None for wire in network.wires if wire.source}
+    yield f"Where the colours come from: {'; '.join(sources)}. A wire without a colour may have any."

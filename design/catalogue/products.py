@@ -14,6 +14,7 @@ from numpy import ndarray
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import to_jsonable_python
 
+from design.catalogue.known_error import KnownError
 from design.record import Record
 
 Pair = tuple[float, float]
@@ -29,11 +30,12 @@ class Provenance(Record):
 
 
 class Product(Record):
-    """Base of the catalogue records: name, maker, and the provenance of each value."""
+    """Base of the catalogue records: name, maker, the provenance of each value, and the values known to be wrong."""
 
     kind: str
     name: str
     maker: str
+    known_wrong: tuple[KnownError, ...] = Field(default=(), exclude=True, description="shapes no part")
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
 
     def provenance(self) -> dict[str, Provenance]:
@@ -49,6 +51,11 @@ class Product(Record):
         origin = self._provenance.get(field)
         return "" if origin is None or origin.verified else " (nobody has verified it: measure yours)"
 
+    def misfit(self) -> list[str]:
+        """A warning that printed parts will not fit this product, a line for each reason below it; empty if they do."""
+        reasons = [f"  {error.words(self)}" for error in self.known_wrong if not error.fits]
+        return [f"{self.name}: parts printed for it will not fit the real device:", *reasons] if reasons else []
+
     def facts(self) -> dict[str, Any]:
         """Every value, and under `provenance` where it comes from, for a program to read."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
@@ -61,18 +68,27 @@ class Product(Record):
         for field, origin in self._provenance.items():
             value = json.dumps(to_jsonable_python(getattr(self, field)))
             values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
+        wrong = [f"  ! {error.words(self)}   [{error.source}]" for error in self.known_wrong]
         doubt = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
-        return [f"{self.name} ({self.maker})", *values, doubt]
+        known = ["  ! does not agree with the real device"] if wrong else []
+        return [f"{self.name} ({self.maker})", *values, *wrong, doubt, *known]
 
 
 Link = Literal["usb", "usb-powered", "ethernet", "serial"]
 
 
 class Lead(Record):
-    """One wire of a power lead: `net` is + or -."""
+    """One wire of a power lead. A net that has several colours differs from one revision of the cable to the next."""
 
     net: Literal["+", "-"]
     colour: str
+
+
+class TiedPin(Record):
+    """A pin that must be joined to another pin of the same plug if nothing drives it."""
+
+    pin: str
+    to: str
 
 
 class Ways(Record):
@@ -117,8 +133,20 @@ class Lidar(Product):
     supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
     current_a: float | None = Field(default=None, gt=0, exclude=True, description="as it runs; shapes no part")
     peak_a: float | None = Field(default=None, gt=0, exclude=True, description="as it starts; shapes no part")
+    inrush_a: float | None = Field(
+        default=None, gt=0, exclude=True, description="for a moment when power comes on; shapes no part"
+    )
     link: Link | None = Field(default=None, exclude=True, description="how its data leave; shapes no part")
+    signal_v: float | None = Field(
+        default=None, gt=0, exclude=True, description="level of its serial line; shapes no part"
+    )
+    sends_only: bool | None = Field(
+        default=None, exclude=True, description="its serial line has no RX pin; shapes no part"
+    )
     connector: str | None = Field(default=None, exclude=True, description="shapes no part")
+    tied_pins: tuple[TiedPin, ...] | None = Field(
+        default=None, exclude=True, description="pins to join if nothing drives them; shapes no part"
+    )
     leads: tuple[Lead, ...] | None = Field(
         default=None, exclude=True, description="colours of its power lead; shapes no part"
     )
@@ -130,6 +158,13 @@ class Lidar(Product):
         if self.range_min_mm >= self.range_max_mm:
             raise ValueError(f"range_min_mm {self.range_min_mm} is not below range_max_mm {self.range_max_mm}")
         return self
+
+    def lead_colours(self) -> dict[str, tuple[str, ...]]:
+        """Colours that a verified source names for the + and - lead; empty if no source does."""
+        origin = self._provenance.get("leads")
+        if not self.leads or origin is None or not origin.verified:
+            return {}
+        return {net: tuple(lead.colour for lead in self.leads if lead.net == net) for net in ("+", "-")}
 
     @property
     def stated_range_m(self) -> float:

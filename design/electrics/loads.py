@@ -19,26 +19,38 @@ CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
 
 @dataclass(frozen=True, slots=True)
 class ElectricLoad:
-    """A device and what it asks of the supply."""
+    """A device and the current that it draws.
+
+    Attributes:
+        name: of its box.
+        title: in words.
+        volts: nominal voltage that it is fed with.
+        lasting_a: as it runs.
+        busy_a: the most for longer than a moment: its voltage must hold meanwhile.
+        peak_a: the most of all, inrush included: circuits, fuse, converter and supply carry it.
+        bounds_v: lowest and highest voltage that its maker allows.
+        behind_ring: whether its current passes the slip ring.
+    """
 
     name: str
     title: str
-    volts: float  # that it is fed with
+    volts: float
     lasting_a: float
+    busy_a: float
     peak_a: float
     bounds_v: tuple[float, float] | None = None
     behind_ring: bool = False
 
     @property
     def set_v(self) -> float:
-        """What its converter is set to: what is lost on the way comes off, so rather the middle of what it bears."""
+        """Voltage of its converter: the middle of what it accepts, since some is lost on the way."""
         if self.volts == SUPPLY_V or self.bounds_v is None:
             return self.volts
         return max(self.volts, round(sum(self.bounds_v) / 2, 1))
 
     def lost_v(self, mm2: float) -> float:
         """On its leads, and in the ring."""
-        return wire_drop_v(self.peak_a, mm2, LEADS_M) + (2 * self.peak_a * RING_OHM if self.behind_ring else 0.0)
+        return wire_drop_v(self.busy_a, mm2, LEADS_M) + (2 * self.busy_a * RING_OHM if self.behind_ring else 0.0)
 
     @property
     def from_supply(self) -> float:
@@ -55,9 +67,14 @@ def loads_of(scanner: Scanner) -> list[ElectricLoad]:
 
 
 def _lidar_load(lidar: Lidar, *, behind_ring: bool) -> ElectricLoad:
-    peak = lidar.peak_a or UNKNOWN_A
-    volts = _fed_with(lidar.supply_v)
-    return ElectricLoad("lidar", lidar.name, volts, lidar.current_a or peak, peak, lidar.supply_v, behind_ring)
+    busy, volts = lidar.peak_a or UNKNOWN_A, _fed_with(lidar.supply_v)
+    lasting, peak = lidar.current_a or busy, most_a(lidar)
+    return ElectricLoad("lidar", lidar.name, volts, lasting, busy, peak, lidar.supply_v, behind_ring)
+
+
+def most_a(lidar: Lidar) -> float:
+    """The largest current of a lidar, even for a moment."""
+    return max(lidar.peak_a or UNKNOWN_A, lidar.inrush_a or 0.0)
 
 
 def _servo_load(servo: Servo) -> ElectricLoad:
@@ -65,12 +82,12 @@ def _servo_load(servo: Servo) -> ElectricLoad:
     stall = servo.stall_a or UNKNOWN_A
     volts = _fed_with(servo.supply_v)
     peak = stall * volts / servo.rated_v
-    return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, servo.supply_v)
+    return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, peak, servo.supply_v)
 
 
 def _computer_load() -> ElectricLoad:
     amps = COMPUTER_W / COMPUTER_V
-    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps)
+    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps, amps)
 
 
 def _fed_with(supply_v: tuple[float, float] | None) -> float:
@@ -92,7 +109,7 @@ def branch_of(number: int, load: ElectricLoad) -> Branch:
 def drops_of(loads: list[ElectricLoad], branches: list[Branch]) -> list[Drop]:
     """What reaches each device whose bounds are known."""
     return [
-        Drop(load.title, load.set_v - load.lost_v(branch.mm2), *load.bounds_v)
+        Drop(load.title, load.set_v - load.lost_v(branch.mm2), load.set_v, *load.bounds_v)
         for load, branch in zip(loads, branches, strict=True)
         if load.bounds_v is not None
     ]

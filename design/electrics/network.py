@@ -39,8 +39,10 @@ class Wire:
         end: the other one.
         net: what it carries, such as "12 V" or "D+".
         amps: largest current; 0 for signals.
-        mm2: cross-section; 0 where it is in a ready-made cable.
-        colour: of its insulation.
+        mm2: cross-section; 0 if it is part of a ready-made cable.
+        colour: of its insulation; empty if no verified source names one.
+        source: of the colour; empty if there is no colour.
+        note: what stands on the sheet in place of a colour.
     """
 
     start: Pin
@@ -48,12 +50,15 @@ class Wire:
     net: str
     amps: float
     mm2: float
-    colour: str
+    colour: str = ""
+    source: str = ""
+    note: str = ""
 
     @property
     def words(self) -> str:
         """Its label."""
-        return f"{self.net}, {self.colour}" + (f", {self.mm2:g} mm²" if self.mm2 else "")
+        size = f"{self.mm2:g} mm²" if self.mm2 else ""
+        return ", ".join(filter(None, (self.net, self.colour or self.note, size)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +66,13 @@ class Circuit:
     """One circuit of the slip ring.
 
     Attributes:
-        number: from 1.
-        colour: of its lead; assumed by the order of EIA-359 where no maker tells.
+        number: from 1; ours, since no maker of the catalogue numbers them.
         rated_a: what it carries for ever.
         net: what it is used for; empty for a spare one.
         amps: largest current.
     """
 
     number: int
-    colour: str
     rated_a: float
     net: str
     amps: float
@@ -102,20 +105,22 @@ class Drop:
 
     Attributes:
         device: its name.
-        volts: at its largest current.
-        least: that it asks for.
-        most: that it bears.
+        volts: while it draws its largest lasting current.
+        idle_v: while it draws none.
+        least: lowest voltage that its maker allows.
+        most: highest voltage that its maker allows.
     """
 
     device: str
     volts: float
+    idle_v: float
     least: float
     most: float
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """All of it; `unknown` are facts that the catalogue lacks, in words."""
+    """All of it; `cautions` are for a person before wiring, `unknown` facts that the catalogue lacks, in words."""
 
     boxes: tuple[Box, ...]
     wires: tuple[Wire, ...]
@@ -124,4 +129,5 @@ class Network:
     drops: tuple[Drop, ...]
     supply_a: float
     risks: tuple[str, ...]
+    cautions: tuple[str, ...]
     unknown: tuple[str, ...]

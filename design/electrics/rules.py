@@ -19,7 +19,8 @@ class BrokenRule:
 
 def broken_rules(network: Network) -> list[BrokenRule]:
     """Every broken rule; empty where the wiring is right."""
-    return [*_open(network), *_joined(network), *_circuits(network), *_branches(network), *_volts(network)]
+    rules = (_open, _joined, _circuits, _branches, _volts, _colours)
+    return [broken for rule in rules for broken in rule(network)]
 
 
 def _open(network: Network) -> Iterator[BrokenRule]:
@@ -52,7 +53,8 @@ def _circuits(network: Network) -> Iterator[BrokenRule]:
         if circuit.amps > circuit.rated_a:
             yield BrokenRule(
                 "ring",
-                f"circuit {circuit.number} ({circuit.net}) carries {circuit.amps:g} A, rated {circuit.rated_a:g}",
+                f"circuit {circuit.number} ({circuit.net}) carries {circuit.amps:g} A, rated {circuit.rated_a:g}: "
+                "choose a ring with stronger circuits",
             )
 
 
@@ -72,5 +74,14 @@ def _branches(network: Network) -> Iterator[BrokenRule]:
 
 def _volts(network: Network) -> Iterator[BrokenRule]:
     for drop in network.drops:
-        if not drop.least <= drop.volts <= drop.most:
-            yield BrokenRule(drop.device, f"gets {drop.volts:.2f} V, wants {drop.least:g} to {drop.most:g}")
+        for volts in (drop.volts, drop.idle_v):
+            if not drop.least <= volts <= drop.most:
+                yield BrokenRule(drop.device, f"gets {volts:.2f} V, wants {drop.least:g} to {drop.most:g}")
+                break
+
+
+def _colours(network: Network) -> Iterator[BrokenRule]:
+    """No colour without a source: a wrong one makes a person join + to -."""
+    for wire in network.wires:
+        if wire.colour and not wire.source:
+            yield BrokenRule(wire.end[0], f"the colour {wire.colour} of {wire.end[1]} has no source")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import textwrap
+
 from design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
+from design.electrics.cautions import MEASURE, RISKS, cautions_of
 from design.electrics.loads import (
     CHANGER,
     SUPPLY_V,
@@ -11,12 +14,14 @@ from design.electrics.loads import (
     branch_of,
     drops_of,
     loads_of,
+    most_a,
 )
-from design.electrics.network import Box, Branch, Circuit, Network, Wire
+from design.electrics.network import Box, Branch, Circuit, Network, Pin, Wire
 from design.electrics.sizing import fuse_for, supply_for, wire_for
 from design.scanner import Scanner
 
 USB_A = 0.5  # that a port gives
+LINE_CHARS = 36  # of a line of text in a box
 DATA = {
     "usb": ("VBUS", "D-", "D+", "GND"),
     "usb-powered": ("VBUS", "D-", "D+", "GND"),
@@ -27,41 +32,22 @@ PLUG = {"usb": "USB", "usb-powered": "USB", "ethernet": "Ethernet", "serial": "s
 SIGNALS = {"rs485": ("D+", "D-"), "ttl": ("DATA",)}
 HOMING = ("+", "-", "OUT")
 FLAG_SWITCH = "switch of the flag"
-COMPUTER_SIDE = {  # net and colour at pins of the computer; the input pulls up to its own voltage
-    "5 V out": ("5 V", "brown"),
-    "0 V out": ("0 V", "blue"),
-    "input with pull-up": ("home", "black"),
+COMPUTER_SIDE = {  # net at pins of the computer; the input pulls up to its own voltage
+    "5 V out": "5 V",
+    "0 V out": "0 V",
+    "input with pull-up": "home",
 }
-COLOURS = {
-    "VBUS": "red",
-    "D-": "white",
-    "D+": "green",
-    "GND": "black",
-    "shield": "braid",
-    "TX+": "white-orange",
-    "TX-": "orange",
-    "RX+": "white-green",
-    "RX-": "green",
-    "TX": "yellow",
-    "RX": "green",
+OWN = {"+": "red", "-": "black"}  # of the wires that a person cuts between the boxes of the supply
+OWN_SOURCE = "your own wires: red is +, black is -"
+USB = {"VBUS": "red", "D-": "white", "D+": "green", "GND": "black"}
+ETHERNET = {"TX+": "white-orange", "TX-": "orange", "RX+": "white-green", "RX-": "green"}
+CUT_CABLES = {
+    "usb": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
+    "usb-powered": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
+    "ethernet": (ETHERNET, "TIA-568-B: cut cable of the computer"),
 }
-ORDER = ("black", "brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white", "pink", "turquoise")
-RISKS = {
-    "usb": (
-        "USB through a ring: full speed (12 Mbit/s) passes good contacts, high speed (480 Mbit/s) only rings made for "
-        "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on a circuit of its own, the "
-        "way between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
-        "microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring with gold "
-        "contacts ends it."
-    ),
-    "ethernet": (
-        "Ethernet through a ring: 100BASE-TX needs two pairs, each twisted up to the ring on neighbouring circuits, "
-        "and asks for a data-rated ring; a cheap capsule loses frames while it turns. Watch the counters of the port "
-        "during a turn; 10BASE-T by a switch that forces it is the way out."
-    ),
-    "serial": "A serial line passes any ring: at 500 kBaud and more use RS-422 and twist the pairs.",
-}
-RISKS["usb-powered"] = RISKS["usb"].replace("power the lidar by its own lead, not by VBUS", "VBUS feeds the lidar")
+CUT, WHOLE = "a cut cable", "its cable"
+CROSSED = {"TX": "RX", "RX": "TX"}  # what one side sends the other receives
 
 
 def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
@@ -74,46 +60,58 @@ def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
     loads = loads_of(scanner)
     branches = [branch_of(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
+    wires = _wires(scanner, switch, loads, branches, circuits)
     return Network(
         boxes=tuple(_boxes(scanner, switch, loads, branches, circuits)),
-        wires=tuple(_wires(scanner, switch, loads, branches, circuits)),
+        wires=tuple(wires),
         circuits=circuits,
         branches=tuple(branches),
         drops=tuple(drops_of(loads, branches)),
         supply_a=supply_for(sum(branch.peak_a for branch in branches)),
         risks=() if ring is None or lidar.link is None else (RISKS[lidar.link],),
+        cautions=tuple(cautions_of(scanner, loads, wires)),
         unknown=tuple(_unknown(scanner)),
     )
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
-    """Nets of its data cable; none where nobody tells how its data leave."""
-    return () if lidar.link is None else DATA[lidar.link]
+    """Nets of its data cable, named from the lidar's side; none if the catalogue has no `link`."""
+    nets = () if lidar.link is None else DATA[lidar.link]
+    return tuple(net for net in nets if not (lidar.sends_only and net == "RX"))
+
+
+def _shield(lidar: Lidar) -> tuple[str, ...]:
+    """The shield of its data cable; a plug with a single line has none."""
+    return () if lidar.sends_only else ("shield",)
+
+
+def _plug_pin(net: str) -> str:
+    """The computer's pin for a net."""
+    return CROSSED.get(net, net)
 
 
 def _nets(lidar: Lidar) -> list[tuple[str, float]]:
     """What the lidar needs of a ring: its power first, then its data; the shield last, which it can do without."""
-    peak = lidar.peak_a or UNKNOWN_A
-    power = [] if lidar.link == "usb-powered" else [("+", peak), ("-", peak)]
-    amps = peak if lidar.link == "usb-powered" else USB_A
+    most = most_a(lidar)
+    power = [] if lidar.link == "usb-powered" else [("+", most), ("-", most)]
+    amps = most if lidar.link == "usb-powered" else USB_A
     data = [(net, amps if net in ("VBUS", "GND") else 0.0) for net in _data(lidar)]
-    return [*power, *data, ("shield", 0.0)]
+    return [*power, *data, *((net, 0.0) for net in _shield(lidar))]
 
 
 def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
-    """Power on the strongest circuits, signals on those for signals; what is left is spare."""
+    """For each net the first circuit that carries its current, of its own use if there is one; the others are spare."""
     nobody_tells = (Ways(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
     ways = [(group.amps, group.use) for group in ring.ways or nobody_tells for _ in range(group.count)]
     left, taken = list(range(len(ways))), dict[int, tuple[str, float]]()
     for net, amps in _nets(lidar):
-        wanted = "power" if net in ("+", "-") else "signal"
-        fit = [i for i in left if ways[i][1] in (wanted, "any")] or [i for i in left if net != "shield"]
+        uses = ("power" if net in ("+", "-") else "signal", "any")
+        fit = [i for i in left if net != "shield" or ways[i][1] in uses]
         if fit:
-            taken[fit[0]] = net, amps
-            left.remove(fit[0])
-    return tuple(
-        Circuit(i + 1, ORDER[i % len(ORDER)], amps, *taken.get(i, ("", 0.0))) for i, (amps, _) in enumerate(ways)
-    )
+            best = min(fit, key=lambda i: (ways[i][0] < amps, ways[i][1] not in uses, i))
+            taken[best] = net, amps
+            left.remove(best)
+    return tuple(Circuit(i + 1, amps, *taken.get(i, ("", 0.0))) for i, (amps, _) in enumerate(ways))
 
 
 def _feed(load: ElectricLoad) -> str:
@@ -164,15 +162,23 @@ def _boxes(
     data = _data(lidar)
     power = () if lidar.link == "usb-powered" else ("+", "-")
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
-    pins = (*power, *data, *(("shield",) if shielded else ()))
-    boxes.append(Box("plug", f"{plug} of the computer", ("a cut cable",), (plug,), (*data, "shield"), 5, ("shield",)))
+    pins = (*power, *data, *(_shield(lidar) if shielded else ()))
+    level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
+    ends = (*map(_plug_pin, data), "shield")
+    boxes.append(
+        Box("plug", f"{plug} of the computer", (_cable(lidar, circuits), *level), (plug,), ends, 5, ("shield",))
+    )
     if circuits:
         ring = scanner.slip_ring
         assert ring is not None
         still = tuple(f"{circuit.number} {circuit.net or 'spare'}" for circuit in circuits)
         spare = tuple(pin for pin, circuit in zip(still, circuits, strict=True) if not circuit.net)
         boxes.append(Box("ring", ring.name, ("left: stator, right: rotor",), still, still, 6, spare))
-    boxes.append(Box("lidar", lidar.name, (lidar.connector or "connector unknown",), pins, (), 7))
+    ties = lidar.tied_pins or ()
+    words = tuple(f"join {tie.pin} to {tie.to} at its plug" for tie in ties)
+    tied = tuple(dict.fromkeys(pin for tie in ties for pin in (tie.pin, tie.to)))
+    plug_words = textwrap.wrap(lidar.connector or "connector unknown", LINE_CHARS)
+    boxes.append(Box("lidar", lidar.name, (*plug_words, *words), pins, tied, 7))
     return boxes
 
 
@@ -187,53 +193,84 @@ def _wires(
     total = sum(branch.peak_a for branch in branches)
     thick = wire_for(fuse_for(total))
     wires = [
-        Wire(("supply", "+"), ("switch", "+ in"), "12 V", total, thick, "red"),
-        Wire(("switch", "+ out"), ("bus", "+"), "12 V", total, thick, "red"),
-        Wire(("supply", "-"), ("bus", "-"), "0 V", total, thick, "black"),
+        _own(("supply", "+"), ("switch", "+ in"), total, thick),
+        _own(("switch", "+ out"), ("bus", "+"), total, thick),
+        _own(("supply", "-"), ("bus", "-"), total, thick),
     ]
     ends = {"computer": ("5 V", "0 V"), "servo": ("V", "GND"), "lidar": ("+", "-")}
     inside = {circuit.net: f"{circuit.number} {circuit.net}" for circuit in circuits if circuit.net}
-    leads = {lead.net: lead.colour for lead in lidar.leads or ()}
     for load, branch in zip(loads, branches, strict=True):
         target = "ring" if load.name == "lidar" and circuits else load.name
         feeds = [(("bus", f"{branch.name} {sign}")) for sign in "+-"]
         amps = branch.peak_a
         if load.volts != SUPPLY_V:
             box = f"{load.name} converter"
-            for feed, sign, colour in zip(feeds, "+-", ("red", "black"), strict=True):
-                net = "12 V" if sign == "+" else "0 V"
-                wires.append(Wire(feed, (box, f"in {sign}"), net, amps, branch.mm2, colour))
+            wires += [_own(feed, (box, f"in {sign}"), amps, branch.mm2) for feed, sign in zip(feeds, "+-", strict=True)]
             feeds, amps = [(box, "out +"), (box, "out -")], load.peak_a
+        mm2 = max(branch.mm2, wire_for(fuse_for(amps)))
         for feed, sign, end in zip(feeds, "+-", ends[load.name], strict=True):
             net = _feed(load) if sign == "+" else "0 V"
             pin = inside.get(end, end) if target == "ring" else end
-            colour = leads.get("+" if sign == "+" else "-", "") if target == "lidar" else ""
-            mm2 = max(branch.mm2, wire_for(fuse_for(amps)))
-            wires.append(Wire(feed, (target, pin), net, amps, mm2, colour or ("red" if sign == "+" else "black")))
+            lead = _lead(lidar, sign) if target == "lidar" else {}
+            wires.append(Wire(feed, (target, pin), net, amps, mm2, **lead))
             if target == "ring" and pin != end:
-                other = leads.get("+" if sign == "+" else "-", "lead's colour unknown")
-                wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, other))
+                wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, **_lead(lidar, sign)))
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
     wires += [
-        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, "its cable"),
-        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, "its cable"),
+        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=WHOLE),
+        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=WHOLE),
     ]
     signals = SIGNALS[servo.bus or "ttl"]
-    wires += [Wire(("adapter", pin), ("servo", pin), pin, 0.0, 0.0, "servo cable") for pin in signals]
-    wires.append(Wire(("adapter", "GND"), ("servo", "GND data"), "GND", 0.0, 0.0, "servo cable"))
+    joined = {**{pin: pin for pin in signals}, "GND": "GND data"}
+    wires += [Wire(("adapter", pin), ("servo", end), pin, 0.0, 0.0, note="servo cable") for pin, end in joined.items()]
     if switch is not None:
-        for (pin, (net, colour)), end in zip(COMPUTER_SIDE.items(), HOMING, strict=True):
+        for (pin, net), end in zip(COMPUTER_SIDE.items(), HOMING, strict=True):
             amps = 0.0 if end == "OUT" else switch.current_a
-            wires.append(Wire(("computer", pin), (FLAG_SWITCH, end), net, amps, 0.0, colour))
+            wires.append(Wire(("computer", pin), (FLAG_SWITCH, end), net, amps, 0.0))
     peaks = dict(_nets(lidar))
-    for net in (*_data(lidar), "shield"):
-        colour = COLOURS[net]
+    for net in (*_data(lidar), *_shield(lidar)):
+        start = ("plug", _plug_pin(net))
         if not circuits:
-            wires.append(Wire(("plug", net), ("lidar", net), net, peaks[net], 0.0, colour))
+            note = _data_note(net) if _cable(lidar, circuits) == CUT else WHOLE
+            wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))
         elif net in inside:
-            wires.append(Wire(("plug", net), ("ring", inside[net]), net, peaks[net], 0.0, colour))
-            wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, colour))
+            wires.append(Wire(start, ("ring", inside[net]), net, peaks[net], 0.0, **_cut(lidar, net)))
+            wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, note=_data_note(net)))
+    wires += [
+        Wire(("lidar", tie.pin), ("lidar", tie.to), "GND", 0.0, 0.0, note="join these two")
+        for tie in lidar.tied_pins or ()
+    ]
     return wires
+
+
+def _own(start: Pin, end: Pin, amps: float, mm2: float) -> Wire:
+    """A 12 V wire between boxes of the supply; its sign is that of the pin where it ends."""
+    sign = "+" if "+" in end[1] else "-"
+    return Wire(start, end, "12 V" if sign == "+" else "0 V", amps, mm2, OWN[sign], OWN_SOURCE)
+
+
+def _lead(lidar: Lidar, sign: str) -> dict[str, str]:
+    """Colour and source of a power lead of the lidar, if its cables have but one, else the word to measure it."""
+    colours = lidar.lead_colours().get(sign, ())
+    if len(colours) != 1:
+        return {"note": MEASURE}
+    return {"colour": colours[0], "source": lidar.provenance()["leads"].source}
+
+
+def _cut(lidar: Lidar, net: str) -> dict[str, str]:
+    """Colour and source of a wire in the computer's cut cable."""
+    colours, source = CUT_CABLES.get(lidar.link or "", ({}, ""))
+    return {"colour": colours[net], "source": source} if net in colours else {"note": _data_note(net)}
+
+
+def _cable(lidar: Lidar, circuits: tuple[Circuit, ...]) -> str:
+    """How the data leave the computer: a plug passes neither a ring nor a bare serial port."""
+    return CUT if circuits or lidar.link in (None, "serial") else WHOLE
+
+
+def _data_note(net: str) -> str:
+    """What stands on a data wire that has no colour: those that carry power are measured."""
+    return {"shield": "braid", "VBUS": MEASURE, "GND": MEASURE}.get(net, "")
 
 
 def _unknown(scanner: Scanner) -> list[str]:

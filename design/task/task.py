@@ -193,6 +193,11 @@ class LoadedTask:
         """What the task can do, but not as well as its author may think."""
         return [*self.unread_angles(), *self._out_of_range()]
 
+    def misfits(self) -> list[str]:
+        """Its products that printed parts do not fit, and why, in lines."""
+        names = (self.task.sensor, self.task.servo, self.task.slip_ring)
+        return [line for name in names if name for line in self.products.products[name].misfit()]
+
     def _out_of_range(self) -> list[str]:
         """Planes that the lidar does not reach, where no scene tells how far everything is."""
         if self.task.scene is not None:

@@ -50,8 +50,11 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
     require_kernel("the making of parts")
     from cad.assembly.make import make_parts
 
+    loaded = as_task(task)
+    for line in loaded.misfits():
+        say(line)
     say("making the parts")
-    return make_parts(as_task(task).scanner(as_angle_set(angles)))
+    return make_parts(loaded.scanner(as_angle_set(angles)))
 
 
 def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:

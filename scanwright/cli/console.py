@@ -90,6 +90,15 @@ def show(lines: Iterable[str]) -> None:
         print(styled(line, "warning") if line.startswith("warning") else line)
 
 
+def warn(lines: Iterable[str]) -> None:
+    """Warnings, on standard error, in every voice; a line that begins with a space belongs to the one before it."""
+    _end_bar()
+    sys.stdout.flush()
+    for line in lines:
+        text = line if line.startswith(" ") else f"warning: {line}"
+        print(styled(text, "warning", sys.stderr), file=sys.stderr, flush=True)
+
+
 def show_json(value: Any) -> None:
     """One JSON object, on standard output."""
     print(json.dumps(value, indent=2))

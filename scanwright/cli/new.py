@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from design.errors import ScanwrightError, TaskError, suggest
-from scanwright.cli.console import hint, show
+from scanwright.cli.console import hint, show, warn
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
@@ -74,6 +74,11 @@ def new(
     path = out or Path(f"{answers.name}.toml")
     warnings = write_task_file(path, task_text(answers, products, _command(answers, path), path))
     show([*(f"warning: {warning}" for warning in warnings), f"wrote {path}"])
+    warn(
+        f"{name}: parts printed for it will not fit the real device: `scanwright catalogue '{name}'` gives the reasons"
+        for name in (answers.lidar, answers.servo)
+        if products.named(name).misfit()
+    )
     hint(f"next: `scanwright build {path}` makes it; `scanwright optimise {path}` only finds its angles")
 
 

@@ -22,6 +22,7 @@ from scanwright.cli.console import (
     show,
     show_json,
     voice,
+    warn,
 )
 from scanwright.cli.help import Commands
 
@@ -57,6 +58,7 @@ def build(
         complain("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
     show(built.lines(in_full=voice() is Voice.VERBOSE))
+    warn(built.misfits)
     hint(f"next: open {built.folder / 'report.html'}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
 
 
@@ -75,6 +77,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     from scanwright import api
 
     checks = api.check(out, say=Progress())
+    warn(api.load_task(out / "task.toml").misfits())
     failed = [entry for entry in checks if entry.severity == "error"]
     if as_json:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})

@@ -62,12 +62,14 @@ class Build:
         files: its files, relative to the folder.
         warnings: what the task can do, but not as well as its author may think.
         made: what was done; None where the folder was current and there was nothing to do.
+        misfits: products that the printed parts do not fit, and why, in lines.
     """
 
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
     made: Made | None
+    misfits: tuple[str, ...] = ()
 
     def lines(self, in_full: bool = False) -> list[str]:
         """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
@@ -130,7 +132,7 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
-    return Build(target, listed_files(target), tuple(loaded.warnings()), made)
+    return Build(target, listed_files(target), tuple(loaded.warnings()), made, tuple(loaded.misfits()))
 
 
 def difference_when_rebuilt(folder: Path, say: Say) -> str | None:

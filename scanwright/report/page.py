@@ -78,7 +78,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
             lambda path: steps_html(read_text(path), lambda name: read(folder / name, read_picture)),
         ),
         "wiring": read(folder / "wiring.svg", read_picture),
-        "wiring_words": read(folder / "wiring.md", lambda path: steps_html(read_text(path))),
+        "wiring_words": read(folder / "wiring.md", _wiring_words),
         "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},
         "sheets": [f"drawings/{path.name}" for path in sorted((folder / "drawings").glob("*.pdf"))],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
@@ -93,6 +93,12 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         raise BuildError(
             f"{folder}: a file in it is not as a build writes it ({error}): build the folder again"
         ) from error
+
+
+def _wiring_words(path: Path) -> tuple[str, str]:
+    """HTML of the cautions, which stand before the picture, and of all that follows it."""
+    cautions, heading, words = read_text(path).partition("\n## Power")
+    return steps_html(cautions), steps_html(heading + words)
 
 
 def _on_task(folder: Path) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from cad.assembly.assembly import Assembly
 from cad.assembly.print_settings import print_words
+from cad.checks.remarks import products_of
 from cad.checks.retention import material_of
 from cad.files.manual.pictures import StepPictures
 from cad.files.manual.scenes import StepScene, scenes_of
@@ -14,6 +15,8 @@ from cad.geometry.mesh import TriMesh
 from cad.layout.joints import CASE_EAR, DECK_MM, Joint
 from cad.layout.names import FIT_COUPON
 from cad.layout.tightening import hold_of
+from design.catalogue.products import Product
+from design.electrics.wiring import network_of
 from design.scanner import Scanner
 
 NUTS = (
@@ -60,6 +63,7 @@ def instructions_text(
         "stands upright, or the lidar's where it is put in. `exploded.glb` turns under the mouse; `bom.csv` lists what "
         "you need.",
         "",
+        *_misfits(products_of(scanner, assembly.layout.drive)),
         f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
         f"everything {print_words(scanner.printer)}: the files tell PrusaSlicer so, other slicers have to be told.",
@@ -79,10 +83,15 @@ def instructions_text(
         lines += [_words(assembly, scene), ""]
         if scene.step.check:
             lines += [f"Before you go on: {scene.step.check}.", ""]
+    network = network_of(scanner, assembly.layout.drive.switch)
     lines += [
         f"## {len(scenes) + 1}. {LOOK}",
         "",
-        LAST + _joined(assembly),
+        "**Caution, before you join a wire:**",
+        "",
+        *(f"- {caution}" for caution in network.cautions),
+        "",
+        LAST + _joined(assembly) + " `wiring.md` lists every wire.",
         "",
     ]
     return "\n".join(lines)
@@ -94,6 +103,13 @@ def _joined(assembly: Assembly) -> str:
         return IN_A_LOOP
     laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
     return TO_COMPUTER if laid else THROUGH_RING
+
+
+def _misfits(products: Sequence[Product]) -> Iterator[str]:
+    """Lines about products that the parts do not fit."""
+    for product in products:
+        if reasons := product.misfit():
+            yield from (f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), "")
 
 
 def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:

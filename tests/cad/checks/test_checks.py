@@ -51,6 +51,20 @@ def least_room(rotor, stator):
     return turning_check({"rotor": rotor, "stator": stator}, {"rotor"}).value
 
 
+def test_a_product_that_parts_do_not_fit_is_a_warning_for_each_wrong_value_and_no_other_is():
+    catalogue = load_catalogue()
+    checks = room.known_errors([catalogue.named(name) for name in ("STL27L", "UTM-30LX", "MX-64R", "RPLIDAR C1")])
+    assert Counter((check.where, check.severity) for check in checks) == {
+        ("STL27L", "warning"): 4,
+        ("STL27L", "note"): 3,
+        ("RPLIDAR C1", "note"): 2,
+    }
+    assert "is a hole pattern that does not exist on the device" in checks[0].message
+    assert checks[0].message.endswith("the printed parts will not fit")
+    (ring, *_) = room.known_errors([catalogue.named("UH1256-02-0610-06S")])
+    assert "length_mm = 45.0 is wrong: the device has a stator 88.5 mm long" in ring.message
+
+
 def test_the_distance_over_a_turn_of_bodies_known_by_arithmetic():
     arm = mesh_of(box((10, -2, 0), (30, 2, 4)))  # reaches to hypot(30, 2)
     post = mesh_of(box((32, -40, -5), (40, 40, 9)))  # its face is 32 from the axis

@@ -75,6 +75,16 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
     assert all(row["number"] or row["supplier"] for row in rows if row["kind"] in ("bought", "screw", "nut"))
 
 
+def test_the_steps_begin_with_what_does_not_fit_and_warn_before_the_first_wire(steps):
+    assert steps.index("**Caution: UH1256-02-0610-06S: parts printed for it will not fit") < steps.index(
+        "Print `print/"
+    )
+    assert "**Caution: UTM-30LX" not in steps and "**Caution: MX-64R" not in steps
+    (wiring,) = (step for step in steps.split("\n## ") if "Look, then wire" in step.splitlines()[0])
+    assert wiring.index("Caution, before you join a wire") < wiring.index("set a multimeter to continuity")
+    assert wiring.index("set a multimeter to continuity") < wiring.index("Turn the linkage by hand")
+
+
 def test_the_tools_are_those_that_the_steps_ask_for(rows, made):
     steps = (made.folder / "assembly.md").read_text(encoding="utf-8")
     tools = {row["part"] for row in rows if row["kind"] == "tool"}

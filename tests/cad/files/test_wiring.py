@@ -19,6 +19,11 @@ SCANNERS = {
     "a capsule": ("UTM-30LX", "MX-64R", "SRC022A-6"),
     "ethernet": ("UST-10LX", "XM430-W350", "SNU11-P0210"),
     "no ring": ("URG-04LX", "AX-12A", None),
+    "a tied pin": ("LD19", "XL330-M288", "SRC022A-6"),
+    "a tied pin and no ring": ("STL27L", "XL430-W250", None),
+    "a narrow supply": ("RPLIDAR C1", "STS3215", None),
+    "colours that differ": ("RPLIDAR S1", "XM430-W350", "UH1256-02-0610-06S"),
+    "too weak a ring": ("RPLIDAR S2", "MX-64R", "SRC022A-6"),
     "powered by usb": ("URG-04LX-UG01", "XL330-M288", "SRC022A-6"),
 }
 
@@ -77,7 +82,37 @@ def test_the_words_tell_power_circuits_and_wires():
     assert files == wiring_files(scanner_for(*SCANNERS["a through bore"]), "0" * 12)
     text = files["wiring.md"].decode()
     assert "- F2, MX-64R: 0.92 A lasting, 4.1 A at most, fuse 5 A, wires 0.5 mm²" in text
-    assert "- 1 (black): +, 1 A of 10, 10 times" in text and "- 8 (violet): D-, signal" in text
-    assert len(re.findall(r"^- .* to .*: ", text, re.M)) > 20 and "Broken rules" not in text
+    assert "- 1: +, 1 A of 10, 10 times" in text and "- 8: D-, signal" in text
+    assert len(re.findall(r"^- .* to .*: ", text, re.M)) > 20 and "Do not build" not in text
+    assert text.index("## Caution") < text.index("## Power") < text.index("## Wires")
     unsure = wiring_files(scanner_for(*SCANNERS["no ring"]), "0" * 12)["wiring.md"].decode()
     assert "## Not known" in unsure and "Slip ring" not in unsure
+
+
+@pytest.mark.parametrize("name", ["a tied pin", "a tied pin and no ring"])
+def test_a_pin_to_tie_is_a_wire_of_drawing_and_words(name):
+    scanner = scanner_for(*SCANNERS[name])
+    files = {file: data.decode() for file, data in wiring_files(scanner, "0" * 12).items()}
+    lidar = scanner.lidar.name
+    assert f"- {lidar} PWM to {lidar} GND: GND, join these two" in files["wiring.md"]
+    assert "GND, join these two" in files["wiring.svg"] and "Join pin PWM" in files["wiring.svg"]
+    picture = ElementTree.fromstring(files["wiring.svg"])
+    right = float(picture.get("width"))
+    assert max(extent(text)[2] for text in picture.findall(f"{SVG}text")) < right
+
+
+def test_what_must_not_be_built_and_cautions_stand_above_the_boxes():
+    picture = ElementTree.fromstring(schematic_svg(network_of(scanner_for(*SCANNERS["too weak a ring"])), "wiring"))
+    boxes = min(float(box.get("y")) for box in picture.findall(f"{SVG}rect")[1:])
+    texts = {text.text: float(text.get("y")) for text in picture.findall(f"{SVG}text")}
+    (forbidden, *_) = (y for words, y in texts.items() if words.startswith("DO NOT BUILD THIS: ring: circuit 1"))
+    (caution, *_) = (y for words, y in texts.items() if words.startswith("CAUTION: "))
+    assert forbidden < caution < boxes
+
+
+def test_cables_that_differ_by_revision_are_measured_and_the_words_tell_how():
+    files = wiring_files(scanner_for(*SCANNERS["colours that differ"]), "0" * 12)
+    text = files["wiring.md"].decode()
+    assert "- UH1256-02-0610-06S 1 + to RPLIDAR S1 +: 5 V, measure first, 1.5 A" in text
+    assert "its maker has used black, red, brown, purple for + and white, yellow, orange for -" in text
+    assert "set a multimeter to continuity" in text.split("## Power")[0]

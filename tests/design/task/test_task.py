@@ -478,6 +478,20 @@ def test_a_map_has_theta_down_and_phi_to_the_right_and_its_values_in_the_cells(t
                     assert field.weight_at(direction(t, p)) == pytest.approx(expected, rel=1e-6), (t, p)
 
 
+@pytest.mark.parametrize(
+    ("task", "named"),
+    [
+        ("low_cost", ["STL27L", "XL430-W250"]),
+        ("indoor_urg", ["URG-04LX", "AX-12A"]),
+        ("capsule_ring", ["SRC022A-6"]),
+        *((task, ["UH1256-02-0610-06S"]) for task in ("ground_ahead", "ceiling", "pitching", "rolling", "uniform")),
+    ],
+)
+def test_a_task_names_the_products_that_printed_parts_do_not_fit(task, named):
+    heads = [line for line in load_task(task).misfits() if not line.startswith(" ")]
+    assert heads == [f"{name}: parts printed for it will not fit the real device:" for name in named]
+
+
 def test_a_spinning_servo_that_cannot_read_all_around_is_told(tmp_path):
     assert load_text(tmp_path, BASE).warnings() == []
     (warning,) = load_text(tmp_path, BASE.replace('"MX-64R"', '"AX-12A"')).warnings()
