@@ -171,11 +171,6 @@ def complain(line: str) -> None:
     print(f"{styled('scanwright:', 'error', sys.stderr)} {line}", file=sys.stderr)
 
 
-def notes_of(error: BaseException) -> list[str]:
-    """What else went wrong while an error was dealt with, such as a servo that could not be stopped."""
-    return list(getattr(error, "__notes__", ()))
-
-
 def require_pages(work: str) -> None:
     """Refuse work that opens a page where nothing is installed that could serve it.
 

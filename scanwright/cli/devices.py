@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, closing, suppress
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from threading import Event
@@ -10,16 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from design.errors import DeviceError, require
-from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
+from design.errors import DeviceError, ScanwrightError, notes_of, require
+from scanwright.cli.console import BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 
 if TYPE_CHECKING:
-    from firmware_io.scan.live_feed import Watch
+    from firmware_io.scan.live_feed import Viewer
+    from firmware_io.scan.plan import ScanPlan
+    from firmware_io.scan.scan_end import ScanEnd
+    from firmware_io.scan.scan_summary import ScanSummary
 
 app = Commands("Devices")
-
-_UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
 
 
 class StampAt(Enum):
@@ -48,7 +50,7 @@ ServoId = Annotated[
 ]
 
 
-def _viewer(out: Path, *, live: bool = False, foxglove: bool) -> AbstractContextManager[Watch]:
+def _viewer(out: Path, *, live: bool = False, foxglove: bool) -> AbstractContextManager[Viewer]:
     if foxglove:
         require("foxglove", "--foxglove needs the Foxglove SDK", "foxglove")
         from scanwright.live.foxglove_view import foxglove_feed
@@ -120,7 +122,7 @@ def scan(
     if live and foxglove:
         raise DeviceError("--live and --foxglove: one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove)
-    from firmware_io.scan.acquire import acquire
+    from firmware_io.scan import scan_end
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
 
@@ -140,19 +142,40 @@ def scan(
     show(plan.lines())
     if dry_run:
         return
-    with viewer as watch:
+    with viewer as watch, closing(watch):
         try:
-            with on_duty(), closing(watch):
-                recorded = acquire(plan, say, watch)
-        except KeyboardInterrupt as stop:
-            for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
-                complain(line)
-            if plan.recording.exists():
-                complain(f"what was recorded is in {plan.recording}")
-            raise typer.Exit(130) from None
-        say(f"recorded {recorded.duration_s:.1f} s, assembling")
-        show(recorded.lines())
-        show(api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")).lines())
+            recorded = _acquired(plan, say, watch)
+            watch.ended(scan_end.finished(recorded))  # the devices stand, whatever becomes of the cloud
+            say(f"recorded {recorded.duration_s:.1f} s, assembling")
+            show(recorded.lines())
+            cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
+            watch.ended(scan_end.finished(recorded, cloud.lines()))
+            show(cloud.lines())
+        except ScanwrightError as error:
+            _end(watch, scan_end.failed(error), plan.recording)
+            raise typer.Exit(2) from None
+
+
+def _acquired(plan: ScanPlan, say: Progress, watch: Viewer) -> ScanSummary:
+    """Record; Ctrl-C ends the command."""
+    from firmware_io.scan import scan_end
+    from firmware_io.scan.acquire import acquire
+
+    try:
+        with on_duty():
+            return acquire(plan, say, watch)
+    except KeyboardInterrupt as stop:
+        _end(watch, scan_end.stopped(stop), plan.recording)
+        raise typer.Exit(130) from None
+
+
+def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
+    """Say how a scan ended early, in the same words on standard error and to the viewer."""
+    kept = (f"what was recorded is in {recording}",) if recording.exists() else ()
+    end = replace(end, lines=(*end.lines, *kept))
+    for line in end.lines:
+        complain(line)
+    watch.ended(end)
 
 
 @app.command()

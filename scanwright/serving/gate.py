@@ -57,7 +57,7 @@ ICON = (
 )
 """A fan of beams, for the tab of the browser."""
 
-MENDING = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js"
+MENDING = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js", "state_banner.js"
 """A style and scripts that are put into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
