@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from design.errors import DeviceError, ScanwrightError, notes_of, require
-from scanwright.cli.console import BuildFolder, Progress, complain, on_duty, require_pages, show
+from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 
 if TYPE_CHECKING:
@@ -50,12 +50,15 @@ ServoId = Annotated[
 ]
 
 
-def _viewer(out: Path, *, live: bool = False, foxglove: bool) -> AbstractContextManager[Viewer]:
+def _viewer(
+    out: Path, *, live: bool = False, foxglove: bool, allow_origins: list[str] | None
+) -> AbstractContextManager[Viewer]:
     if foxglove:
-        require("foxglove", "--foxglove needs the Foxglove SDK", "foxglove")
+        require("foxglove", "--foxglove needs a websocket server", "websockets")
         from scanwright.live.foxglove_view import foxglove_feed
+        from scanwright.serving.handshake import as_origins
 
-        return foxglove_feed(out)
+        return foxglove_feed(out, as_origins(allow_origins))
     from scanwright.live.scan_page import live_page
 
     return live_page(out, wanted=live)
@@ -115,13 +118,14 @@ def scan(
         bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
     ] = False,
     foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve scans, points and frames to Foxglove.")] = False,
+    allow_origin: AllowOrigin = None,
 ) -> None:
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     if live:
         require_pages("scan --live")
     if live and foxglove:
         raise DeviceError("--live and --foxglove: one of them")
-    viewer = _viewer(out, live=live, foxglove=foxglove)
+    viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from firmware_io.scan import scan_end
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
@@ -204,6 +208,7 @@ def ros2(
     servo_id: ServoId = None,
     intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
     foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve the same to Foxglove, without a bridge.")] = False,
+    allow_origin: AllowOrigin = None,
 ) -> None:
     """Publish scans, angles, frames and de-skewed points as a node of ROS 2, until Ctrl-C."""
     require(
@@ -214,7 +219,7 @@ def ros2(
     )
     if foxglove and recording is not None:
         raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
-    viewer = _viewer(out, foxglove=foxglove)
+    viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
     from firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from firmware_io.scan.plan import plan_scan
 
