@@ -107,7 +107,7 @@ def mcap_log(path: Path) -> Iterator[Log]:
             for topic, (kind, definition) in channels().items()
         }
         yield lambda topic, data, time_ns: writer.add_message(number[topic], time_ns, data, time_ns)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
