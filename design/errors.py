@@ -12,6 +12,7 @@
           +-- ProtocolError    ... because what came is no valid packet
           +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
           +-- ServoSetupError  ... because its settings must change first (`firmware_io.servo.fitness`, with the list)
+          +-- UnsafeError      ... and may still turn or shine: it did not confirm that it stopped
 
 A command prints the message and exits with 2; anything else is a bug and gets its traceback. The message is one line,
 or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as far as they apply.
@@ -69,6 +70,21 @@ class ProtocolError(DeviceError):
 
 class DeviceFaultError(DeviceError):
     """A device reports a fault of its own: overload, heat, voltage, stall. It was told to stop."""
+
+
+class UnsafeError(DeviceError):
+    """A device did not confirm that it stopped: a servo may still turn, a laser may still be on."""
+
+
+class UnsafeNote(str):
+    """A note on an error that came first: a device did not confirm that it stopped."""
+
+    __slots__ = ()
+
+
+def notes_of(error: BaseException) -> list[str]:
+    """Return what else went wrong while an error was handled, such as a servo that could not be stopped."""
+    return list(getattr(error, "__notes__", ()))
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

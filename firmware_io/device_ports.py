@@ -11,6 +11,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
+from design.atomic_file import place_in, whole_file
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Lidar, Servo
 from design.errors import DeviceError
@@ -37,11 +38,9 @@ def announced(out: Path, ports: Ports) -> Iterator[None]:
     running = emulated(out)
     if running is not None:
         raise DeviceError(f"{out}: process {running.pid} emulates this scanner already: stop it first")
-    file = out / _FILE
-    try:
-        file.write_text(json.dumps(asdict(ports), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise DeviceError(f"{file}: cannot write: {error.strerror}") from error
+    file = place_in(out, _FILE, DeviceError)
+    with whole_file(file, DeviceError) as part:
+        part.write_text(json.dumps(asdict(ports), indent=2) + "\n", encoding="utf-8")
     try:
         yield
     finally:

@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 
 from design.accuracy.front import dominators
 from design.accuracy.machine import this_machine
+from design.atomic_file import whole_file
+from design.errors import BuildError
 from design.evaluation.picture_files import save_picture
 
 T = TypeVar("T")
@@ -89,8 +91,8 @@ def write_trials(path: Path, trials: Sequence[Trial]) -> None:
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A CSV file."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    """Write a CSV file."""
+    with whole_file(path, BuildError) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)

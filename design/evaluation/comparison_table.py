@@ -6,7 +6,9 @@ import csv
 from dataclasses import asdict, fields
 from pathlib import Path
 
+from design.atomic_file import whole_file
 from design.catalogue.products import Multibeam, Product
+from design.errors import BuildError
 from design.evaluation.comparison import SCANNERS, ComparisonRow, bought
 from design.objective.holes import percent
 from design.objective.stated_error import error_words
@@ -62,7 +64,7 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
 
 def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
     """The rows under the names of their fields; what is not known is empty."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path, BuildError) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)

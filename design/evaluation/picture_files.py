@@ -8,14 +8,23 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from design.atomic_file import whole_file
+from design.errors import BuildError
+
 DPI = 110  # of the PNG, and of what the SVG holds as pixels: maps and dense meshes
 NO_DATE = {"Date": None, "Creator": None}
 
 
 def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
-    """Write a figure to a PNG, and to an SVG of the same name beside it."""
-    figure.savefig(path, dpi=dpi, metadata={"Software": None})
-    path.with_suffix(".svg").write_bytes(svg_bytes(figure, dpi))
+    """Write a figure to a PNG, and to an SVG of the same name beside it.
+
+    Raises:
+        BuildError: a file cannot be written.
+    """
+    with whole_file(path, BuildError) as part:
+        figure.savefig(part, format="png", dpi=dpi, metadata={"Software": None})
+    with whole_file(path.with_suffix(".svg"), BuildError) as part:
+        part.write_bytes(svg_bytes(figure, dpi))
 
 
 def svg_bytes(figure: Figure, dpi: float = DPI) -> bytes:

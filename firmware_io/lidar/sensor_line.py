@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from design.errors import DeviceError, DeviceTimeoutError
+from design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from firmware_io.lidar.byte_stream import SerialStream, open_stream
 
 _POLL_S = 0.05
@@ -128,14 +128,14 @@ class SensorLine:
             error: what ended the body, None where nothing did.
 
         Raises:
-            DeviceError: it could not be stopped.
+            UnsafeError: it could not be stopped, and its laser may still be on.
         """
         try:
             stop()
         except DeviceError as unsafe:
             if error is None:
-                raise
-            error.add_note(f"its laser may still be on: {unsafe}")
+                raise UnsafeError(f"{unsafe}: its laser may still be on") from unsafe
+            error.add_note(UnsafeNote(f"its laser may still be on: {unsafe}"))
         finally:
             self.close()
 

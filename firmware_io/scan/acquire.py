@@ -30,7 +30,7 @@ from firmware_io.scan.lidar_scans import LidarScans, Say, settle_clock
 from firmware_io.scan.live_feed import NOBODY, Watch
 from firmware_io.scan.plan import ScanPlan
 from firmware_io.scan.recorder import recorder_of
-from firmware_io.scan.scan_summary import ScanSummary
+from firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
 from firmware_io.servo.progress import ServoState
 from firmware_io.servo.servo import open_servo
 
@@ -183,7 +183,7 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch
             while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
                 ready = waiting.popleft()
                 if isinstance(plan.motion, StopAndGo) and axis.moved(ready):
-                    axis.left_out["scans taken on the way"] += 1
+                    axis.left_out[ON_THE_WAY] += 1
                     continue
                 recorder.scan(ready)
                 watch.scan(ready)

@@ -23,6 +23,7 @@ from firmware_io.assembly.beam_outcome import Verdict
 from firmware_io.assembly.own_body import OwnBody
 from firmware_io.assembly.streaming import Assembler
 from firmware_io.samples import JointSample, Scan
+from firmware_io.scan.scan_end import ScanEnd
 
 MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
 MOST_ANGLES = 2000
@@ -45,8 +46,15 @@ class Watch(Protocol):
         """The recording has ended."""
 
 
+class Viewer(Watch, Protocol):
+    """A `Watch` that also shows how the scan ended."""
+
+    def ended(self, end: ScanEnd) -> None:
+        """How the scan ended; the last call before `close`."""
+
+
 class Nobody:
-    """The `Watch` of a recording that nobody watches."""
+    """The `Viewer` of a recording that nobody watches."""
 
     def joint(self, time_ns: int, position_rad: float) -> None:
         """Nothing."""
@@ -55,6 +63,9 @@ class Nobody:
         """Nothing."""
 
     def told(self, line: str) -> None:
+        """Nothing."""
+
+    def ended(self, end: ScanEnd) -> None:
         """Nothing."""
 
     def close(self) -> None:
@@ -101,13 +112,15 @@ class Batch:
     scans: tuple[Scan, ...]
     lines: tuple[str, ...]
     lost: int
+    end: ScanEnd | None = None
 
 
 class Feed:
-    """The `Watch` that sends batches through a pipe."""
+    """The `Viewer` that sends batches through a pipe."""
 
     def __init__(self, sending: Connection) -> None:
         self.lost = 0
+        self.end: ScanEnd | None = None
         self._sending = sending
         self._joints: deque[tuple[int, float]] = deque(maxlen=MOST_ANGLES)
         self._scans: deque[Scan] = deque(maxlen=MOST_SCANS)
@@ -132,6 +145,11 @@ class Feed:
         with self._lock:
             self._lines.append(line)
 
+    def ended(self, end: ScanEnd) -> None:
+        """See `Viewer`."""
+        with self._lock:
+            self.end = end
+
     def close(self) -> None:
         """Send what is left, and end; a viewer that does not take it is not waited for."""
         self._done.set()
@@ -145,7 +163,7 @@ class Feed:
             self._scans.clear()
             self._lines.clear()
         times = np.array([time_ns for time_ns, _ in joints], np.int64)
-        return Batch(times, np.array([angle for _, angle in joints], float), scans, lines, self.lost)
+        return Batch(times, np.array([angle for _, angle in joints], float), scans, lines, self.lost, self.end)
 
     def _send(self) -> None:
         last = False
@@ -167,6 +185,7 @@ class CloudGrowth:
         time_s: of the scan that each belongs to, since the first one, shape (n,).
         lines: what the scan said meanwhile.
         lost: scans that the view left out so far.
+        end: how the scan ended; None while it runs.
     """
 
     points_m: Float32[ndarray, "n 3"]
@@ -174,6 +193,7 @@ class CloudGrowth:
     time_s: Float32[ndarray, " n"]
     lines: tuple[str, ...]
     lost: int
+    end: ScanEnd | None = None
 
 
 class Placing:
@@ -200,7 +220,12 @@ class Placing:
             after_s = np.float32((line.scan.stamp_ns - self._first_ns) / 1e9)
             seconds.append(np.full(len(points[-1]), after_s))
         return CloudGrowth(
-            np.concatenate(points), np.concatenate(intensity), np.concatenate(seconds), batch.lines, batch.lost
+            np.concatenate(points),
+            np.concatenate(intensity),
+            np.concatenate(seconds),
+            batch.lines,
+            batch.lost,
+            batch.end,
         )
 
 
@@ -209,7 +234,7 @@ def batches(receiving: Connection) -> Iterator[Batch]:
     while True:
         try:
             batch = receiving.recv()
-        except EOFError:
+        except (EOFError, OSError):  # OSError: the sender was killed within a message
             return
         yield batch
 

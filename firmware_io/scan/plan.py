@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from design.angles import CALIBRATED, AngleSet, angles_in_use
-from design.atomic_file import check_place
+from design.atomic_file import check_place, place_in
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
 from design.errors import DeviceError, RecordingError
@@ -134,7 +134,7 @@ def plan_scan(
         stamp_at=stamp_at,
         ports=find_ports(out, lidar, servo),
         servo_id=servo_id,
-        recording=recording or out / "recordings" / f"{datetime.now():%Y%m%d-%H%M%S}.mcap",
+        recording=recording or place_in(out, f"recordings/{datetime.now():%Y%m%d-%H%M%S}.mcap", RecordingError),
         attached={path.name: path.read_text(encoding="utf-8") for path in kept},
         endless=endless,
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+ON_THE_WAY = "scans taken on the way"  # between two stops: left out by design
+
 
 @dataclass(frozen=True, slots=True)
 class ScanSummary:
@@ -31,6 +33,11 @@ class ScanSummary:
     clock_ns: int
     reconnects: int
     left_out: dict[str, int]
+
+    @property
+    def lost_data(self) -> bool:
+        """Whether data are missing that the motion does not leave out by design."""
+        return bool(self.reconnects or set(self.left_out) - {ON_THE_WAY})
 
     def lines(self) -> list[str]:
         """The same in words."""

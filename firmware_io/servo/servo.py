@@ -20,7 +20,7 @@ from typing import NoReturn, Self
 
 from design.catalogue.catalogue import load_catalogue
 from design.catalogue.products import Servo
-from design.errors import DeviceError, DeviceFaultError
+from design.errors import DeviceError, DeviceFaultError, UnsafeError, UnsafeNote
 from firmware_io.servo.bus.bus import ServoAnswer
 from firmware_io.servo.bus.registers import RPM
 from firmware_io.servo.bus.unit import ServoUnit
@@ -78,7 +78,7 @@ class ServoDriver:
         except DeviceError as unsafe:
             if error is None:
                 raise
-            error.add_note(str(unsafe))  # the first error tells more
+            error.add_note(UnsafeNote(unsafe))  # the first error tells more
         else:
             if error is not None:
                 error.add_note(f"{self} {_IS_OFF}")
@@ -87,7 +87,7 @@ class ServoDriver:
         """Take the torque, close the port. May be called again.
 
         Raises:
-            DeviceError: the servo does not answer, and may still turn.
+            UnsafeError: the servo does not answer, and may still turn.
         """
         if not self._bus.is_open:
             return
@@ -99,7 +99,7 @@ class ServoDriver:
         self._bus.close()
         heard = self._guard.dismiss(stands=trouble is None)  # which tries longer
         if trouble and not heard:
-            raise DeviceError(f"{self}: could not be stopped: take its power ({trouble})") from trouble
+            raise UnsafeError(f"{self}: could not be stopped: take its power ({trouble})") from trouble
         if trouble and not isinstance(trouble, DeviceError):
             trouble.add_note(f"{self} {_IS_OFF}")
             raise trouble
@@ -216,7 +216,7 @@ class ServoDriver:
         try:
             self._stop()
         except DeviceError as unsafe:
-            error.add_note(f"{self} has not answered that its torque is off ({unsafe})")
+            error.add_note(UnsafeNote(f"{self} has not answered that its torque is off ({unsafe})"))
         raise error
 
     def _neglected(self) -> NoReturn:

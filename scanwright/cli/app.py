@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 import typer
 
-from design.errors import ScanwrightError
+from design.errors import ScanwrightError, notes_of
 from scanwright.cli import clouds, design, devices, new, pages, parts
-from scanwright.cli.console import complain, notes_of, own_voice
+from scanwright.cli.console import complain, own_voice
 from scanwright.cli.help import Commands, GroupedHelp
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]

@@ -24,6 +24,10 @@ from design.errors import require
 
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
 BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
+AllowOrigin = Annotated[
+    list[str] | None,
+    typer.Option(metavar="ORIGIN", help="Web page that may look beside Foxglove's own; can be given several times."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
 
 
@@ -178,11 +182,6 @@ def complain(line: str) -> None:
     """What went wrong, on standard error."""
     _end_bar()
     print(f"{styled('scanwright:', 'error', sys.stderr)} {line}", file=sys.stderr)
-
-
-def notes_of(error: BaseException) -> list[str]:
-    """What else went wrong while an error was dealt with, such as a servo that could not be stopped."""
-    return list(getattr(error, "__notes__", ()))
 
 
 def require_pages(work: str) -> None:

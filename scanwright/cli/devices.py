@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, closing, suppress
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from threading import Event
@@ -10,17 +11,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from design.errors import DeviceError, require
-from scanwright.cli.console import BuildFolder, Progress, complain, notes_of, on_duty, require_pages, show
+from design.errors import DeviceError, ScanwrightError, notes_of, require
+from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
 
 if TYPE_CHECKING:
-    from firmware_io.scan.live_feed import Watch
+    from firmware_io.scan.live_feed import Viewer
+    from firmware_io.scan.plan import ScanPlan
+    from firmware_io.scan.scan_end import ScanEnd
+    from firmware_io.scan.scan_summary import ScanSummary
 
 app = Commands("Devices")
-
-_UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
 
 
 class StampAt(Enum):
@@ -49,12 +51,15 @@ ServoId = Annotated[
 ]
 
 
-def _viewer(out: Path, *, live: bool = False, foxglove: bool) -> AbstractContextManager[Watch]:
+def _viewer(
+    out: Path, *, live: bool = False, foxglove: bool, allow_origins: list[str] | None
+) -> AbstractContextManager[Viewer]:
     if foxglove:
-        require("foxglove", "--foxglove needs the Foxglove SDK", "foxglove")
+        require("foxglove", "--foxglove needs a websocket server", "websockets")
         from scanwright.live.foxglove_view import foxglove_feed
+        from scanwright.serving.handshake import as_origins
 
-        return foxglove_feed(out)
+        return foxglove_feed(out, as_origins(allow_origins))
     from scanwright.live.scan_page import live_page
 
     return live_page(out, wanted=live)
@@ -119,14 +124,15 @@ def scan(
         bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
     ] = False,
     foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve scans, points and frames to Foxglove.")] = False,
+    allow_origin: AllowOrigin = None,
 ) -> None:
     """Turn the scanner, record, and assemble the cloud beside the recording."""
     if live:
         require_pages("scan --live")
     if live and foxglove:
         raise DeviceError("--live and --foxglove: one of them")
-    viewer = _viewer(out, live=live, foxglove=foxglove)
-    from firmware_io.scan.acquire import acquire
+    viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
+    from firmware_io.scan import scan_end
     from firmware_io.scan.plan import plan_scan
     from scanwright import api
 
@@ -146,19 +152,40 @@ def scan(
     show(plan.lines())
     if dry_run:
         return
-    with viewer as watch:
+    with viewer as watch, closing(watch):
         try:
-            with on_duty(), closing(watch):
-                recorded = asking_first(lambda: acquire(plan, say, watch), out, servo_id)
-        except KeyboardInterrupt as stop:
-            for line in ("stopped", *(notes_of(stop) or [_UNHEARD])):
-                complain(line)
-            if plan.recording.exists():
-                complain(f"what was recorded is in {plan.recording}")
-            raise typer.Exit(130) from None
-        say(f"recorded {recorded.duration_s:.1f} s, assembling")
-        show(recorded.lines())
-        show(api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")).lines())
+            recorded = _acquired(plan, say, watch, out, servo_id)
+            watch.ended(scan_end.finished(recorded))  # the devices stand, whatever becomes of the cloud
+            say(f"recorded {recorded.duration_s:.1f} s, assembling")
+            show(recorded.lines())
+            cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
+            watch.ended(scan_end.finished(recorded, cloud.lines()))
+            show(cloud.lines())
+        except ScanwrightError as error:
+            _end(watch, scan_end.failed(error), plan.recording)
+            raise typer.Exit(2) from None
+
+
+def _acquired(plan: ScanPlan, say: Progress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
+    """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
+    from firmware_io.scan import scan_end
+    from firmware_io.scan.acquire import acquire
+
+    try:
+        with on_duty():
+            return asking_first(lambda: acquire(plan, say, watch), out, servo_id)
+    except KeyboardInterrupt as stop:
+        _end(watch, scan_end.stopped(stop), plan.recording)
+        raise typer.Exit(130) from None
+
+
+def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
+    """Say how a scan ended early, in the same words on standard error and to the viewer."""
+    kept = (f"what was recorded is in {recording}",) if recording.exists() else ()
+    end = replace(end, lines=(*end.lines, *kept))
+    for line in end.lines:
+        complain(line)
+    watch.ended(end)
 
 
 @app.command()
@@ -187,6 +214,7 @@ def ros2(
     servo_id: ServoId = None,
     intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
     foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve the same to Foxglove, without a bridge.")] = False,
+    allow_origin: AllowOrigin = None,
 ) -> None:
     """Publish scans, angles, frames and de-skewed points as a node of ROS 2, until Ctrl-C."""
     require(
@@ -197,7 +225,7 @@ def ros2(
     )
     if foxglove and recording is not None:
         raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
-    viewer = _viewer(out, foxglove=foxglove)
+    viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
     from firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from firmware_io.scan.plan import plan_scan
 

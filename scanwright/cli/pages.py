@@ -9,7 +9,7 @@ import typer
 
 from cad.kernel import require_kernel
 from design.errors import require
-from scanwright.cli.console import Progress, require_pages
+from scanwright.cli.console import AllowOrigin, Progress, require_pages
 from scanwright.cli.help import Commands
 
 app = Commands("Pages")
@@ -45,15 +45,17 @@ def view(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE.mcap", help="Write what would be shown into a file, and stop."),
     ] = None,
+    allow_origin: AllowOrigin = None,
 ) -> None:
     """Show a recording in Foxglove: its scans, and the points, frames and scanner that they make."""
-    require("foxglove", "view needs the Foxglove SDK", "foxglove")
+    require("foxglove", "view needs a websocket server", "websockets")
     from scanwright.live.foxglove_view import view_recording, write_for_foxglove
+    from scanwright.serving.handshake import as_origins
 
     if out is not None:
         print(f"wrote {write_for_foxglove(recording, angles, out):,} scans with their points to {out}")
         return
     try:
-        view_recording(recording, angles, Progress(), port=port, rate=rate)
+        view_recording(recording, angles, Progress(), port=port, rate=rate, allow_origins=as_origins(allow_origin))
     except KeyboardInterrupt:
         raise typer.Exit(0) from None

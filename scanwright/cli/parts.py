@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from design.errors import require
+from design.errors import notes_of, require
 from scanwright.cli.console import (
     AsJson,
     BuildFolder,
@@ -18,7 +18,6 @@ from scanwright.cli.console import (
     Voice,
     complain,
     hint,
-    notes_of,
     show,
     show_json,
     voice,

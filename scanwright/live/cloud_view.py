@@ -17,8 +17,9 @@ from design.arrays import Float32s, Vector
 from firmware_io.clouds.cloud import Cloud
 from firmware_io.clouds.formats import write_clouds
 from firmware_io.scan.live_feed import CloudGrowth
+from firmware_io.scan.scan_end import LOST, ScanEnd
 from scanwright.live.ruler import Ruler
-from scanwright.serving.style import Colours, note_html, ramp
+from scanwright.serving.style import Colours, banner_html, note_html, ramp
 
 ColourBy = Literal["height", "range", "intensity", "time"]
 COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
@@ -50,6 +51,8 @@ class CloudView:
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         server.scene.configure_environment_map(None)  # the browser shows a pale picture until it has one
         server.scene.add_frame("/scanner", axes_length=0.3, axes_radius=0.01)
+        self.end: ScanEnd | None = None
+        self.banner = server.gui.add_html(banner_html("running", (), lost=LOST.lines))
         self.facts = server.gui.add_html("")
         self._line = server.gui.add_html(note_html("waiting for the first scan"))
         self.by = server.gui.add_dropdown("colour by", COLOUR_BY, initial_value="height")
@@ -81,6 +84,13 @@ class CloudView:
         self.facts.content = note_html(f"{self.points:,} points{left}")
         for line in growth.lines:
             self.tell(line)
+        if growth.end is not None and growth.end != self.end:
+            self.show_end(growth.end)
+
+    def show_end(self, end: ScanEnd) -> None:
+        """Show how the scan ended in a banner that stays, also for pages that are opened later."""
+        self.end = end
+        self.banner.content = banner_html(end.outcome, (end.heading, *end.lines))
 
     def tell(self, line: str) -> None:
         """Speed, rates, dropped and bad packets, as the scan says them."""

@@ -5,16 +5,15 @@
     /tf                    world servo rot laser, at every angle of the servo
     /robot_description     std_msgs/String, the URDF, if the build has one; once a second, for those who come late
 
-All are ROS 2 messages in CDR with their definitions, so that Foxglove needs nothing else. They go to whoever listens to
-the context of the foxglove-sdk that they are made in: a server, or a file.
+All are ROS 2 messages in CDR with their definitions, so that Foxglove needs nothing else.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import foxglove
 import numpy as np
 
 from design import frames
@@ -29,6 +28,9 @@ from firmware_io.samples import JointSample, Scan
 
 _DESCRIBED_NS = 1_000_000_000
 _ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew
+Log = Callable[[str, bytes, int], None]
+"""Takes a topic, a message, and its time in ns."""
+
 _TYPES = {
     SCAN_TOPIC: ros_messages.LASER_SCAN,
     JOINT_TOPIC: ros_messages.JOINT_STATE,
@@ -38,51 +40,43 @@ _TYPES = {
 }
 
 
+def channels() -> dict[str, tuple[str, str]]:
+    """Return the channels: topic -> name and definition of its ROS 2 message."""
+    return {topic: (kind, ros_messages.definition(kind)) for topic, kind in _TYPES.items()}
+
+
 class FoxgloveChannels:
-    """A `Watch` that logs to the channels of a context."""
+    """A `Watch` that logs to the channels."""
 
     def __init__(
         self,
         angles: AngleSet,
         own_body: OwnBody | None,
         urdf: str | None,
-        context: foxglove.Context,
+        log: Log,
         *,
         smooth: bool = True,
         wall_minus_ns: int = 0,
     ) -> None:
-        """Open the channels.
+        """Begin without a scan.
 
         Args:
             angles: angle set in use.
             own_body: beams that end on the scanner; None where that is not known.
             urdf: description with the frames of `angles`; None for none.
-            context: whose sinks hear of it.
+            log: gets each message.
             smooth: smooth the steps of the encoder in the points.
             wall_minus_ns: added to every time; what it takes from the clock of the devices to time since 1970.
         """
         self._place = partial(Assembler, angles, own_body=own_body, smooth=smooth)
         self._fixed = [(one.parent, one.child, one.T_parent_child) for one in fixed_frames(angles)]
         self._urdf, self._wall_minus_ns = urdf, wall_minus_ns
+        self._log = log
         self.begin()
-        self._channels = {
-            topic: foxglove.Channel(
-                topic,
-                schema=foxglove.Schema(name=kind, encoding="ros2msg", data=ros_messages.definition(kind).encode()),
-                message_encoding="cdr",
-                context=context,
-            )
-            for topic, kind in _TYPES.items()
-        }
 
     def begin(self) -> None:
         """Begin anew: nothing of what came before is assembled with what comes."""
         self._assembler, self._described_ns, self._joint_ns = self._place(), -(2**62), -(2**62)
-
-    @property
-    def heard(self) -> bool:
-        """Whether somebody listens to any of the channels."""
-        return any(channel.has_sinks() for channel in self._channels.values())
 
     def joint(self, time_ns: int, position_rad: float) -> None:
         """See `Watch`."""
@@ -119,6 +113,3 @@ class FoxgloveChannels:
         for line in lines:
             at_ns = line.scan.stamp_ns + self._wall_minus_ns
             self._log("/points", ros_messages.encode_points(point_rows(line), "world", at_ns), at_ns)
-
-    def _log(self, topic: str, data: bytes, time_ns: int) -> None:
-        self._channels[topic].log(data, log_time=time_ns)

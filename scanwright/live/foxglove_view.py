@@ -1,24 +1,24 @@
 """`scanwright view` and `scan --foxglove`: a recording or a scan, served to Foxglove or written for it.
 
-The server listens on this computer only. It takes nothing from who connects: no parameters, no services, no messages,
-so that a page of somebody else's in the same browser could look at the points, and do nothing.
+The server listens on this computer only, for Foxglove's own pages, for programs, and for pages that the user allows. It
+takes nothing from who connects but what to send: no parameters, no services, no messages.
 """
 
 from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-import foxglove
+from mcap.writer import Writer
 
 from design.angles import angles_in_use, load_angles
 from design.atomic_file import check_place, whole_file
-from design.errors import DeviceError, RecordingError
+from design.errors import RecordingError, TaskError
 from firmware_io.assembly.own_body import own_body_beside
 from firmware_io.recording.mcap_chunks import read_note
 from firmware_io.recording.metadata import NOTE, held_by
@@ -26,36 +26,24 @@ from firmware_io.recording.recording import open_recording
 from firmware_io.ros.replay import replay
 from firmware_io.ros.robot_frames import description
 from firmware_io.samples import JointSample, Scan
-from firmware_io.scan.live_feed import Batch, Feed, Watch, batches
-from scanwright.live.foxglove_channels import FoxgloveChannels
+from firmware_io.scan.live_feed import Batch, Feed, Viewer, Watch, batches
+from scanwright.live.foxglove_channels import FoxgloveChannels, Log, channels
+from scanwright.live.foxglove_server import foxglove_server
 
 PORT = 8765  # where Foxglove looks first
-_BACKLOG = 4096  # messages that a slow viewer may be behind; the oldest are dropped beyond
 _SETTLED_S = 0.5  # who subscribes does so topic by topic, and is served from a moment later on
 Say = Callable[[str], None]
 
 
-@contextmanager
-def _server(context: foxglove.Context, name: str, port: int, say: Say) -> Iterator[None]:
-    """Serve the channels of a context, which must be there: who connects while they are made may subscribe to none."""
-    try:
-        server = foxglove.start_server(
-            name=name,
-            host="127.0.0.1",
-            port=port,
-            context=context,
-            message_backlog_size=_BACKLOG,
-        )
-    except (RuntimeError, OSError) as error:
-        raise DeviceError(f"--port {port}: cannot serve there: {error}") from error
-    say(f"open ws://127.0.0.1:{server.port} in Foxglove, or {server.app_url()}")
-    try:
-        yield
-    finally:
-        server.stop()
-
-
-def view_recording(recording: Path, angles: Path, say: Say, *, port: int = PORT, rate: float = 1.0) -> None:
+def view_recording(
+    recording: Path,
+    angles: Path,
+    say: Say,
+    *,
+    port: int = PORT,
+    rate: float = 1.0,
+    allow_origins: Collection[str] = (),
+) -> None:
     """Serve a recording at its own pace to each who begins to listen, until Ctrl-C.
 
     Args:
@@ -64,28 +52,27 @@ def view_recording(recording: Path, angles: Path, say: Say, *, port: int = PORT,
         say: is told the address, at once.
         port: on this computer; 0 for any that is free.
         rate: how many times as fast as it was recorded.
+        allow_origins: pages that may look, beside Foxglove's own, such as "https://viewer.example.org".
 
     Raises:
         RecordingError: the recording is unreadable.
-        DeviceError: the port is taken.
+        TaskError: the port is taken.
     """
     open_recording(recording)  # what cannot be read is refused before an address is told
-    context = foxglove.Context()
-    channels = _channels(recording, angles, context)
-    with _server(context, recording.name, port, say):
+    with foxglove_server(recording.name, channels(), port, say, allow_origins) as server:
+        shown = _shown(recording, angles, server.log)
         while True:
-            _until(lambda: channels.heard)
+            _until(lambda: server.heard)
             time.sleep(_SETTLED_S)
-            channels.begin()
-            scans, _ = replay(recording, channels, rate=rate)
-            channels.close()
+            shown.begin()
+            scans, _ = replay(recording, shown, rate=rate)
+            shown.close()
             say(f"showed {scans:,} scans; Ctrl-C to end")
-            _until(lambda: not channels.heard)
+            _until(lambda: not server.heard)
             say("nobody listens any more: all again for the next one who does")
 
 
 def _until(condition: Callable[[], bool]) -> None:
-    # asked and not told: a listener of the SDK is called back by its threads, which `stop` waits for
     while not condition():
         time.sleep(0.1)
 
@@ -102,28 +89,40 @@ def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: Foxglove reads MCAP; name it {out.with_suffix('.mcap').name}")
-    with whole_file(out, RecordingError) as part:
-        context = foxglove.Context()
-        with foxglove.open_mcap(part, allow_overwrite=True, context=context):
-            channels = _channels(recording, angles, context)
-            scans, _ = replay(recording, channels, wait_until=lambda _: None)
-            channels.close()
+    with whole_file(out, RecordingError) as part, mcap_log(part) as log:
+        shown = _shown(recording, angles, log)
+        scans, _ = replay(recording, shown, wait_until=lambda _: None)
+        shown.close()
     return scans
 
 
-def _channels(recording: Path, angles: Path, context: foxglove.Context) -> FoxgloveChannels:
+@contextmanager
+def mcap_log(path: Path) -> Iterator[Log]:
+    """Write the channels to an MCAP file, which is complete when the body ends."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="scanwright")
+        number = {
+            topic: writer.register_channel(topic, "cdr", writer.register_schema(kind, "ros2msg", definition.encode()))
+            for topic, (kind, definition) in channels().items()
+        }
+        yield lambda topic, data, time_ns: writer.add_message(number[topic], time_ns, data, time_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
     found = load_angles(angles)
     smooth = not held_by(read_note(recording, NOTE))
     urdf = description(angles.parent, found)
-    return FoxgloveChannels(found, own_body_beside(angles), urdf, context, smooth=smooth)
+    return FoxgloveChannels(found, own_body_beside(angles), urdf, log, smooth=smooth)
 
 
 @contextmanager
-def foxglove_feed(folder: Path) -> Iterator[Watch]:
-    """What `acquire` tells of a scan, to a server in a process of its own: the scan never waits for a viewer."""
+def foxglove_feed(folder: Path, allow_origins: Collection[str] = ()) -> Iterator[Viewer]:
+    """Serve a scan from a process of its own, so that the scan never waits for a viewer."""
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)
-    serving = spawn.Process(target=_serve, args=(receiving, folder), daemon=True)
+    serving = spawn.Process(target=_serve, args=(receiving, folder, tuple(allow_origins)), daemon=True)
     serving.start()
     receiving.close()
     yield Feed(sending)
@@ -131,17 +130,23 @@ def foxglove_feed(folder: Path) -> Iterator[Watch]:
         serving.join()
 
 
-def _serve(receiving: Connection, folder: Path) -> None:
+def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
-    context = foxglove.Context()
     own_body = own_body_beside(in_use.path)
-    channels = FoxgloveChannels(in_use.angles, own_body, urdf, context, wall_minus_ns=wall_minus_ns)
-    with _server(context, f"scan of {folder.name}", PORT, lambda line: print(line, flush=True)):
-        for batch in batches(receiving):
-            tell(batch, channels)
-        channels.close()
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+
+    try:
+        with foxglove_server(f"scan of {folder.name}", channels(), PORT, say, allow_origins) as server:
+            shown = FoxgloveChannels(in_use.angles, own_body, urdf, server.log, wall_minus_ns=wall_minus_ns)
+            for batch in batches(receiving):
+                tell(batch, shown)
+            shown.close()
+    except TaskError as error:  # the port is taken: the scan goes on
+        say(f"warning: --foxglove: {error}")
 
 
 def tell(batch: Batch, watch: Watch) -> None:

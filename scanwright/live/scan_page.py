@@ -20,18 +20,20 @@ from threading import Thread
 from design.angles import angles_in_use
 from design.errors import DeviceError
 from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Watch, growing
+from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
+from firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
+_GONE_S = 1.0  # for the page to end if nobody looks at it
 OPENED_S = 15.0  # at most until the browser has it
 
 
 @contextmanager
-def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | None = None) -> Iterator[Watch]:
-    """What `acquire` tells of a scan: the page of a build folder's scanner, or nobody where it is not wanted.
+def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | None = None) -> Iterator[Viewer]:
+    """Serve the page of a build folder's scanner while the body runs; nothing if it is not wanted.
 
-    When the body has ended well, this waits until nobody looks any more.
+    When the end of the scan was given to the viewer, this waits until no page is open, or for Ctrl-C.
 
     Args:
         folder: of the build.
@@ -63,9 +65,16 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         browse = webbrowser.open
     if browse is not None and browse(address):
         hearing.poll(OPENED_S)
-    yield Feed(sending)
-    with suppress(KeyboardInterrupt):
-        page.join()
+    feed = Feed(sending)
+    try:
+        yield feed
+    finally:
+        if feed.end is not None:
+            with suppress(KeyboardInterrupt):
+                page.join(_GONE_S)
+                if page.is_alive():
+                    print("the page shows how the scan ended: close it, or press Ctrl-C", file=sys.stderr, flush=True)
+                page.join()
 
 
 def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
@@ -88,6 +97,8 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
         Thread(target=tell_of_visitor, name="visitor", daemon=True).start()
         for growth in growing(receiving, placing):
             view.add(growth)
-        view.tell("the scan is done; this page ends when you close it")
+        if view.end is None:  # the scan program went away
+            view.show_end(LOST)
+        view.tell("this page ends when you close it")
         if gate.visitors:
             wait_until_alone(gate, ALONE_S)

@@ -2,7 +2,8 @@
 
 A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
 stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
-and none of those before it, stay behind unlisted.
+and none of those before it, stay behind unlisted. Names of files come from manifests that anybody may have written, and
+the folder may hold links: `_refuse_what_is_in_the_way` checks each name before anything moves.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from design.atomic_file import place_in
 from design.concurrency.processes import ctrl_c_held_back
 from design.errors import BuildError
 from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
@@ -25,11 +27,13 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     """A folder beside `target` that takes the place of its build when the block ends, and vanishes if it fails.
 
     Files of the previous build that the new one does not have are removed; anything else in `target`, such as a
-    recording, stays.
+    recording, stays. `target` may be a link to a folder.
 
     Raises:
         BuildError: the folder cannot be written, or another build of it is at work.
     """
+    if target.is_symlink():
+        target = target.resolve()
     created = [folder for folder in (target.parent, *target.parent.parents) if not folder.exists()]
     work, moving = (target.with_name(f".{target.name}.{what}") for what in ("building", "moving"))
     try:
@@ -42,8 +46,10 @@ def fresh_folder(target: Path) -> Iterator[Path]:
                     work.mkdir()
                 yield work
                 with _told_of(target), ctrl_c_held_back():  # a folder is as it was, or finished
-                    _refuse_what_is_in_the_way(work, target)
-                    _move(work, target, moving)
+                    made = _files_in(work)
+                    known = {*listed_files(target), *_told(moving), *made}
+                    _refuse_what_is_in_the_way(target, made, known)
+                    _move(work, target, moving, made, known)
             finally:
                 shutil.rmtree(work, ignore_errors=True)
     finally:
@@ -104,15 +110,22 @@ def _alone(target: Path) -> Iterator[None]:
             path.unlink(missing_ok=True)
 
 
-def _refuse_what_is_in_the_way(work: Path, target: Path) -> None:
-    """Before anything moves: a file where a folder must be, or a folder where a file must be, stops the build.
+def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
+    """Stop the build before anything moves if a name of `target` cannot be written or removed.
+
+    Args:
+        target: the build folder.
+        made: files that move into it.
+        known: those and the files of earlier builds, which are removed.
 
     Raises:
-        BuildError: there is one.
+        BuildError: a file is where a folder must be, a folder where a file must be, or a link is on the way.
     """
     if target.exists() and not target.is_dir():
         raise BuildError(f"{target}: cannot write the build folder: a file of that name is in the way")
-    for name in _files_in(work):
+    for name in sorted({MANIFEST, *known}):
+        place_in(target, name, BuildError)
+    for name in made:
         for parent in (target / name).parents:
             if parent == target:
                 break
@@ -122,10 +135,8 @@ def _refuse_what_is_in_the_way(work: Path, target: Path) -> None:
             raise BuildError(f"{target / name}: a folder is where the build needs a file: move it away")
 
 
-def _move(work: Path, target: Path, moving: Path) -> None:
+def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[str]) -> None:
     """Put every file of `work` into `target`, the manifest last, and remove what only earlier builds had."""
-    made = _files_in(work)
-    known = {*listed_files(target), *_told(moving), *made}
     write_json(moving, sorted(known))
     target.mkdir(exist_ok=True)
     (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build

@@ -15,6 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from design.atomic_file import place_in
 from design.errors import BuildError
 from design.task.task import LoadedTask
 
@@ -171,12 +172,13 @@ def enter(folder: Path, name: str) -> None:
     if manifest:
         files = manifest["files"] | {name: _facts(folder / name)}
         manifest["files"] = dict(sorted(files.items(), key=lambda entry: Path(entry[0])))
-        write_json(folder / MANIFEST, manifest)
+        write_json(place_in(folder, MANIFEST, BuildError), manifest)
 
 
 def write_json(path: Path, value: Any) -> None:
     """One JSON file as all of them are written: whole, two spaces, keys in their order, a line feed at the end."""
     part = path.with_name(f"{path.name}.part")
+    part.unlink(missing_ok=True)  # a link of that name would be followed
     part.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     part.replace(path)
 

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from design.atomic_file import place_in, whole_file
 from design.concurrency.processes import Begin, in_turn
+from design.errors import BuildError
 from design.left_out import LeftOut
 from design.search.search import SearchResult
 from design.task.shapes import MapRegion, MeshRegion
@@ -65,7 +67,8 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
     from scanwright.report.page import REPORT, report_html
 
     require_as_built(folder, but=REPORT)
-    (folder / REPORT).write_text(report_html(folder, begin), encoding="utf-8")
+    with whole_file(place_in(folder, REPORT, BuildError), BuildError) as part:
+        part.write_text(report_html(folder, begin), encoding="utf-8")
     enter(folder, REPORT)
     return folder / REPORT
 

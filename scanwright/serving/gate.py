@@ -18,7 +18,6 @@ import dataclasses
 import math
 import re
 import secrets
-import socket
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
@@ -34,10 +33,9 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from design.errors import TaskError
+from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
 
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
-MOST_VISITORS = 8
 MOST_TEXT = 200
 SAID = (
     "ViewerCameraMessage",
@@ -57,7 +55,7 @@ ICON = (
 )
 """A fan of beams, for the tab of the browser."""
 
-MENDING = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js"
+MENDING = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js", "state_banner.js"
 """A style and scripts that are put into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
@@ -79,10 +77,10 @@ class Gate:
         self.refused: Counter[str] = Counter()
         self.visitors = 0
         self.opened = False
-        self.socket = _bound(port)
+        self.socket = bound(port)
         self.port: int = self.socket.getsockname()[1]
         self._cookie = f"scanwright-{self.port}"
-        self._hosts = {f"127.0.0.1:{self.port}", f"localhost:{self.port}"}
+        self._hosts = local_hosts(self.port)
 
     @property
     def address(self) -> str:
@@ -92,15 +90,13 @@ class Gate:
     def objection(self, request: Request) -> str:
         """Why a request is refused; empty if it is not."""
         headers, parts = request.headers, urlsplit(request.path)
-        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        origins = headers.get_all("Origin")
         talks = "websocket" in headers.get("Upgrade", "").lower() if len(headers.get_all("Upgrade")) < 2 else True
         query = parse_qsl(parts.query, keep_blank_values=True)
         given = [value for key, value in query if key == "token"]
         kept = [value for key, value in _cookies(headers) if key == self._cookie]
-        if len(hosts) != 1 or hosts[0] not in self._hosts:
-            return "foreign host"
-        if any(origin not in {f"http://{host}" for host in self._hosts} for origin in origins):
-            return "foreign origin"
+        if why := foreign(headers, self._hosts, {f"http://{host}" for host in self._hosts}):
+            return why
         if talks and len(origins) != 1:
             return "websocket without an origin"
         if any(site not in ("none", "same-origin") for site in headers.get_all("Sec-Fetch-Site")):
@@ -121,9 +117,7 @@ class Gate:
                 self.refused[why] += 1
                 missing = why == "no such page"
                 status = HTTPStatus.NOT_FOUND if missing else HTTPStatus.FORBIDDEN
-                text = f"refused: {why}; open the address that scanwright printed\n".encode()
-                headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
-                return Response(status.value, status.phrase, headers, text)
+                return refusal(why, "open the address that scanwright printed", status)
             if "Accept-Encoding" in request.headers:
                 del request.headers["Accept-Encoding"]  # the page comes whole then, and its title can be put in
             response = answer(connection, request)
@@ -178,18 +172,6 @@ def _mending() -> bytes:
     folder = files("scanwright.serving")
     style, *scripts = (folder.joinpath(name).read_bytes() for name in MENDING)
     return b"<style>" + style + b"</style>" + b"".join(b"<script>" + script + b"</script>" for script in scripts)
-
-
-def _bound(port: int) -> socket.socket:
-    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind(("127.0.0.1", port))
-    except (OSError, OverflowError) as error:
-        listening.close()
-        why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "no such port"
-        raise TaskError(f"--port {port}: {why}; leave it out for any that is free") from error
-    return listening
 
 
 def _cookies(headers: Headers) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 
 import numpy as np
@@ -27,6 +28,18 @@ def ramp(level: Array) -> Colours:
     at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
     columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
     return np.stack(columns, axis=1).astype(np.uint8)
+
+
+def banner_html(kind: str, lines: Iterable[str], *, lost: Iterable[str] = ()) -> str:
+    """Return the hidden element that `state_banner.js` shows as a banner over the page; no lines, no banner.
+
+    Args:
+        kind: of the state, for its colour: `running`, or an outcome of a scan.
+        lines: what the banner says; the first one is its heading.
+        lost: what it says instead if the connection to the program breaks.
+    """
+    words, without = (escape("\n".join(some)) for some in (lines, lost))
+    return f'<div class="sw-state" hidden data-kind="{kind}" data-lost="{without}">{words}</div>'
 
 
 def note_html(text: str, *, bad: bool = False) -> str:

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from design.atomic_file import whole_file
+from design.atomic_file import place_in, whole_file
 from design.errors import BuildError
 from scanwright.pipeline.manifest import code_digest, versions
 
@@ -45,7 +45,7 @@ class Results:
 
     def put(self, address: str, result: Result) -> None:
         """Keep a result: whole or not at all, whatever ends the program."""
-        path = self._path(address)
+        path = place_in(self.folder, f"{address[:2]}/{address}.json", BuildError)
         path.parent.mkdir(exist_ok=True)
         with whole_file(path, BuildError) as part:
             part.write_text(json.dumps(result), encoding="utf-8")
@@ -67,7 +67,7 @@ def open_results(folder: Path) -> Results:
     Raises:
         BuildError: it cannot be written.
     """
-    path = folder.resolve() / MARK
+    path = place_in(folder.resolve(), MARK, BuildError)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not path.exists():

@@ -16,6 +16,8 @@ import numpy as np
 
 from cad.kernel import require_kernel
 from design.arrays import Array
+from design.atomic_file import place_in
+from design.errors import BuildError
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task
@@ -58,13 +60,13 @@ def run_study(
     require_kernel("study")
     crossing = Crossing(load_study(study))
     folder = out or Path("out") / crossing.loaded.study.name
-    run = StudyRun(crossing, open_results(results or folder / "results"))
+    run = StudyRun(crossing, open_results(results or place_in(folder, "results", BuildError)))
     with crew_of(scheduler, processes) as crew:
         run.work(crew, say)
     yield from write_answer(crossing.loaded.study, run.rows(), folder)
     yield run.tally.line()
     for combination, loaded in run.winners():
-        target = folder / combination.name
+        target = place_in(folder, combination.name, BuildError)
         made = build_task(loaded, target, say).made
         yield f"built {target}" if made else f"{target}: nothing has changed, no work to do"
     if (folder / "study.parquet").exists():

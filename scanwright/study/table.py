@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from design.atomic_file import whole_file
+from design.atomic_file import place_in, whole_file
 from design.errors import BuildError
 from design.task.angle_ranges import NAMES
 from scanwright.study.crossing import AXES
@@ -58,7 +58,7 @@ def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
     statuses = write_tables(folder, noted())
     candidates = f"{statuses.total():,} candidates"
     title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
-    left = front_picture(folder / "front.png", folder / "study.csv", title, study.front)
+    left = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
     shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
     told = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
     told += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]

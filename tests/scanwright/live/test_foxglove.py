@@ -1,12 +1,13 @@
 """A recording and a scan in Foxglove: a client of its protocol, and a reader of its files, find the same cloud."""
 
+import http.client
 import json
 import signal
 import struct
 import subprocess
 import sys
 import threading
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import foxglove
@@ -20,13 +21,15 @@ from websockets.sync.client import connect
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
 from design.angles import Angles, AngleSet
-from design.errors import DeviceError, RecordingError
+from design.errors import DeviceError, RecordingError, TaskError
 from firmware_io.assembly.deskew import deskew
 from firmware_io.recording.recording import RecordingWriter, open_recording
 from firmware_io.samples import straight
 from firmware_io.scan.live_feed import Batch
 from scanwright.live.foxglove_channels import FoxgloveChannels
-from scanwright.live.foxglove_view import tell, view_recording, write_for_foxglove
+from scanwright.live.foxglove_server import BACKLOG, foxglove_server
+from scanwright.live.foxglove_view import mcap_log, tell, view_recording, write_for_foxglove
+from scanwright.serving.handshake import as_origins
 
 ANGLES = AngleSet(
     task="foxglove",
@@ -150,17 +153,16 @@ def test_a_client_of_the_protocol_reads_the_recording_back(folder):
 
 def test_devices_that_began_anew_are_assembled_as_if_nothing_had_been_before(folder, tmp_path):
     source = open_recording(folder / "r.mcap")
-    scans, log, later_ns = list(source.scans()), source.joint_log, 10_000_000_000
-    first = Batch(log.time_ns, log.position_rad, tuple(scans), (), 0)
+    scans, joints, later_ns = list(source.scans()), source.joint_log, 10_000_000_000
+    first = Batch(joints.time_ns, joints.position_rad, tuple(scans), (), 0)
     again = [replace(scan, stamp_ns=scan.stamp_ns + later_ns) for scan in scans]
-    second = Batch(log.time_ns + later_ns, log.position_rad + 2.0, tuple(again), (), 0)
-    context = foxglove.Context()
-    with foxglove.open_mcap(tmp_path / "live.mcap", context=context):
-        channels = FoxgloveChannels(ANGLES, None, None, context)
+    second = Batch(joints.time_ns + later_ns, joints.position_rad + 2.0, tuple(again), (), 0)
+    with mcap_log(tmp_path / "live.mcap") as log:
+        channels = FoxgloveChannels(ANGLES, None, None, log)
         tell(first, channels)
         tell(second, channels)
         channels.close()
-        alone = FoxgloveChannels(ANGLES, None, None, context, wall_minus_ns=1)
+        alone = FoxgloveChannels(ANGLES, None, None, log, wall_minus_ns=1)
         tell(second, alone)
         alone.close()
     with (tmp_path / "live.mcap").open("rb") as stream:
@@ -173,13 +175,12 @@ def test_devices_that_began_anew_are_assembled_as_if_nothing_had_been_before(fol
 
 def test_a_scan_comes_batch_by_batch_on_the_clock_of_the_world(folder, tmp_path):
     source = open_recording(folder / "r.mcap")
-    scans, log = list(source.scans()), source.joint_log
+    scans, joints = list(source.scans()), source.joint_log
     halves = [(slice(0, 130), scans[:20]), (slice(130, None), scans[20:])]
-    context = foxglove.Context()
-    with foxglove.open_mcap(tmp_path / "live.mcap", context=context):
-        channels = FoxgloveChannels(ANGLES, None, None, context, smooth=False, wall_minus_ns=5)
+    with mcap_log(tmp_path / "live.mcap") as log:
+        channels = FoxgloveChannels(ANGLES, None, None, log, smooth=False, wall_minus_ns=5)
         for some, few in halves:
-            tell(Batch(log.time_ns[some], log.position_rad[some], tuple(few), ("a line",), 0), channels)
+            tell(Batch(joints.time_ns[some], joints.position_rad[some], tuple(few), ("a line",), 0), channels)
         channels.close()
     with (tmp_path / "live.mcap").open("rb") as stream:
         decoded = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
@@ -193,10 +194,211 @@ def test_a_scan_comes_batch_by_batch_on_the_clock_of_the_world(folder, tmp_path)
 
 
 def test_a_port_that_is_taken_is_said_in_one_line(folder):
+    with (
+        serving() as (server, _),
+        pytest.raises(TaskError, match=f"--port {server.port}: address already in use"),
+    ):
+        view_recording(folder / "r.mcap", folder / "angles.json", print, port=server.port)
+
+
+TOPICS = {"/a": ("std_msgs/msg/String", "string data"), "/b": ("std_msgs/msg/Header", "uint32 sec")}
+
+
+@contextmanager
+def serving(*allow_origins):
+    """A server, and what it says."""
+    said = []
+    with foxglove_server("a scan", TOPICS, 0, said.append, allow_origins) as server:
+        yield server, said
+
+
+def handshake(port, **headers):
+    """Status and body of a handshake with headers of our own; None is a header that is left out."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=BOUND_S)
+    connection.putrequest("GET", "/", skip_host=True)
+    usual = {
+        "Host": f"127.0.0.1:{port}",
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Protocol": SUBPROTOCOL,
+    }
+    for name, value in (usual | headers).items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    body = b"" if answer.status == 101 else answer.read()
+    connection.close()
+    return answer.status, body
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Origin": "https://app.foxglove.dev"},
+        {"Origin": "https://studio.foxglove.dev"},
+        {"Origin": "file://"},
+        {"Origin": "https://viewer.example.org"},
+        {"Host": "localhost:PORT"},
+    ],
+    ids=str,
+)
+def test_programs_and_pages_of_foxglove_and_of_the_user_may_look(headers):
+    with serving("https://viewer.example.org") as (server, said):
+        known = {name: value.replace("PORT", str(server.port)) for name, value in headers.items()}
+        assert handshake(server.port, **known)[0] == 101
+        assert len(said) == 1 and server.address in said[0]
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "https://app.foxglove.dev.evil.example"},
+        {"Origin": "http://app.foxglove.dev"},
+        {"Origin": "http://127.0.0.1:PORT"},
+        {"Origin": "null"},
+        {"Origin": ""},
+        {"Host": "evil.example:PORT"},
+        {"Host": "evil.example:PORT", "Origin": "https://app.foxglove.dev"},
+        {"Host": "127.0.0.1:1"},
+    ],
+    ids=str,
+)
+def test_a_page_of_another_origin_and_a_bent_name_are_refused(headers):
+    with serving() as (server, said):
+        known = {name: value.replace("PORT", str(server.port)) for name, value in headers.items()}
+        for _ in range(3):
+            status, body = handshake(server.port, **known)
+            assert status == 403 and body.startswith(b"refused: foreign ") and b"--allow-origin" in body
+        assert len(said) == 2 and said[1].startswith("warning: refused a viewer: foreign ")  # once, not each time
+
+
+@pytest.mark.parametrize("text", ["null", "*", "https://", "https://a.example/page", "https://*.example", "a b"])
+def test_an_origin_that_any_page_could_claim_is_none(text):
+    with pytest.raises(DeviceError, match=r"--allow-origin .*: not an origin"):
+        as_origins([text])
+
+
+def test_an_origin_is_allowed_as_browsers_write_it():
+    assert as_origins(None) == ()
+    assert as_origins(["HTTPS://Viewer.example.org/", "http://localhost:3000", "http://[::1]:80"]) == (
+        "https://viewer.example.org",
+        "http://localhost:3000",
+        "http://[::1]:80",
+    )
+
+
+def dialogue(port, log):
+    """What a client hears that subscribes to /a, and /b, and leaves /a again; sessions and libraries differ."""
+    heard = []
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=[SUBPROTOCOL], compression=None) as client:
+        about, advertised = json.loads(client.recv(BOUND_S)), json.loads(client.recv(BOUND_S))
+        heard.append({key: value for key, value in about.items() if key not in ("sessionId", "metadata")})
+        of = {channel["topic"]: channel.pop("id") for channel in advertised["channels"]}
+        heard.append(sorted(advertised["channels"], key=lambda channel: channel["topic"]))
+        for number, topic in ((7, "/a"), (8, "/b")):
+            client.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": number, "channelId": of[topic]}]}))
+        heard += until_heard(client, lambda: log("/b", b"first", 5))
+        log("/a", b"second", 2**40)
+        heard.append(next(data for data in iter(lambda: client.recv(BOUND_S), None) if data[1:5] == b"\7\0\0\0"))
+        client.send(json.dumps({"op": "unsubscribe", "subscriptionIds": [7]}))
+    return heard
+
+
+def until_heard(client, log):
+    """The first message that comes of one that is sent again and again: who subscribes is served a moment later."""
+    data = []
+    while not data:
+        log()
+        with suppress(TimeoutError):
+            data.append(client.recv(0.05))
+    return data
+
+
+def test_a_client_hears_from_the_server_what_it_hears_from_the_one_of_foxglove():
     context = foxglove.Context()
-    server = foxglove.start_server(port=0, context=context)
+    channels = {
+        topic: foxglove.Channel(
+            topic,
+            schema=foxglove.Schema(name=kind, encoding="ros2msg", data=text.encode()),
+            message_encoding="cdr",
+            context=context,
+        )
+        for topic, (kind, text) in TOPICS.items()
+    }
+    theirs = foxglove.start_server(name="a scan", port=0, context=context)
     try:
-        with pytest.raises(DeviceError, match=f"--port {server.port}: cannot serve there"):
-            view_recording(folder / "r.mcap", folder / "angles.json", print, port=server.port)
+        url, port = theirs.app_url(), str(theirs.port)
+        expected = dialogue(theirs.port, lambda topic, data, at_ns: channels[topic].log(data, log_time=at_ns))
     finally:
-        server.stop()
+        theirs.stop()
+    with serving() as (server, said):
+        assert dialogue(server.port, server.log) == expected
+        assert url.replace(port, str(server.port)) in said[0]
+        until(lambda: not server.heard)  # the client has gone
+
+
+def test_malformed_messages_of_a_client_do_no_harm():
+    evil = [
+        "x",
+        "[]",
+        "[" * 5000,
+        "{}",
+        '{"op": 3}',
+        '{"op": "subscribe"}',
+        '{"op": "subscribe", "subscriptions": [{"id": 1.5, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 0}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": [], "channelId": null}]}',
+        '{"op": "unsubscribe", "subscriptionIds": [[], {}, 5]}',
+        b"\1\2",
+    ]
+    many = [{"id": number, "channelId": 1} for number in range(200)]
+    with (
+        serving() as (server, _),
+        connect(server.address, subprotocols=[SUBPROTOCOL], compression=None) as client,
+    ):
+        for message in evil:
+            client.send(message)
+        client.ping().wait(BOUND_S)
+        assert not server.heard
+        client.send(json.dumps({"op": "subscribe", "subscriptions": many}))
+        until(lambda: server.heard)
+        client.ping().wait(BOUND_S)
+        (known,) = server._clients
+        assert len(known.topics) == 64
+
+
+def test_a_client_that_does_not_read_loses_the_oldest_and_holds_up_nobody():
+    with (
+        serving() as (server, _),
+        connect(server.address, subprotocols=[SUBPROTOCOL], compression=None, max_queue=1, max_size=None) as client,
+    ):
+        client.send('{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1}]}')
+        until(lambda: server.heard)
+        for number in range(2 * BACKLOG):
+            server.log("/a", struct.pack("<I", number) + bytes(10_000), number)
+        (known,) = server._clients
+        until(lambda: known.waiting and known.waiting[-1][13:17] == struct.pack("<I", 2 * BACKLOG - 1))
+        assert len(known.waiting) == BACKLOG
+        client.close_socket()
+
+
+def test_in_a_browser_a_page_of_another_origin_reads_nothing(browser):
+    with serving() as (server, _):
+        page = browser.open(f"http://127.0.0.1:{server.port}/")  # refused, but a page of another origin than Foxglove's
+        assert "Missing" not in page.title()
+        outcome = page.evaluate(
+            """([address, protocol]) => new Promise((done) => {
+              const socket = new WebSocket(address, [protocol]);
+              socket.onmessage = () => done("read");
+              socket.onerror = () => done("refused");
+            })""",
+            [server.address, SUBPROTOCOL],
+        )
+        assert outcome == "refused"
+    browser.complaints.clear()

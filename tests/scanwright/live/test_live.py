@@ -1,23 +1,31 @@
 """The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
 
+import os
 import re
 import threading
-from contextlib import suppress
+from contextlib import nullcontext, suppress
+from html import escape
 from multiprocessing import Pipe
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
 from patience import until
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
 from design.angles import Angles, AngleSet
-from design.errors import DeviceError
+from design.errors import DeviceError, UnsafeError, UnsafeNote
 from firmware_io.assembly.deskew import deskew
 from firmware_io.clouds.formats import read_clouds
 from firmware_io.samples import JointLog, Scan
+from firmware_io.scan import scan_end
 from firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from scanwright.live import cloud_view
+from firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
+from scanwright.cli import devices
+from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
 from scanwright.live.scan_page import live_page
@@ -130,6 +138,136 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         np.testing.assert_allclose(ranges, np.linalg.norm(kept.points_m, axis=1), rtol=1e-6)
 
 
+def summary(**more):
+    values = {"recording": "r.mcap", "scans": 3, "joint_samples": 9, "duration_s": 1.0, "speed_deg_s": 20.0}
+    return ScanSummary(**values | {"ripple_deg": 0.1, "clock_ns": 1000, "reconnects": 0, "left_out": {}} | more)
+
+
+def noted(error, *notes):
+    for note in notes:
+        error.add_note(note)
+    return error
+
+
+OFF = "servo 1 (MX-64R) has answered that its torque is off"
+TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: take its power (no answer)")
+SHINES = UnsafeNote("its laser may still be on: no answer")
+ENDS = {
+    "done": (scan_end.finished(summary(left_out={ON_THE_WAY: 8}), ["wrote 90 points"]), "wrote 90 points"),
+    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "left out 12: bad packets"),
+    "reconnected": (scan_end.finished(summary(reconnects=2)), "the lidar was away 2 times"),
+    "failed": (
+        scan_end.failed(noted(DeviceError("<b>nothing</b> came"), OFF)),
+        "<b>nothing</b> came",
+    ),
+    "servo not stopped": (scan_end.failed(noted(DeviceError("the bus was cut"), TURNS)), TURNS),
+    "servo not stopped at the end": (scan_end.failed(UnsafeError(TURNS)), TURNS),
+    "laser may be on": (scan_end.failed(noted(DeviceError("the line was cut"), OFF, SHINES)), SHINES),
+    "stopped": (scan_end.stopped(noted(KeyboardInterrupt(), OFF)), OFF),
+    "stopped, servo turns": (scan_end.stopped(noted(KeyboardInterrupt(), TURNS)), TURNS),
+    "stopped, unheard": (scan_end.stopped(KeyboardInterrupt()), "what the servo does was not heard"),
+}
+OUTCOMES = {
+    "reconnected": "lossy",
+    "servo not stopped": "unsafe",
+    "servo not stopped at the end": "unsafe",
+    "laser may be on": "unsafe",
+    "stopped, servo turns": "unsafe",
+    "stopped, unheard": "unsafe",
+}
+
+
+@pytest.fixture(scope="module")
+def shown():
+    with guarded_server("a page") as (server, gate):
+        yield CloudView(server, "scan", np.zeros(3)), gate
+
+
+@pytest.mark.parametrize("case", ENDS)
+def test_each_end_of_a_scan_reaches_the_page_in_the_words_of_the_terminal(case, shown):
+    end, words = ENDS[case]
+    receiving, sending = Pipe(duplex=False)
+    feed = Feed(sending)
+    feed.ended(end)
+    feed.close()
+    view, _ = shown
+    for growth in growing(receiving, Placing(ANGLES, None)):
+        view.add(growth)
+    assert view.end.outcome == OUTCOMES.get(case, case)
+    assert f'data-kind="{view.end.outcome}"' in view.banner.content
+    assert escape("\n".join((end.heading, *end.lines))) in view.banner.content and words in "\n".join(end.lines)
+    assert 'data-lost=""' in view.banner.content  # how it ended is known: no word of an unknown state
+
+
+class Seen:
+    """A `Viewer` that keeps the ends that it is given."""
+
+    def __init__(self):
+        self.ends = []
+
+    def ended(self, end):
+        self.ends.append(end)
+
+    def close(self):
+        self.ends.append("closed")
+
+
+@pytest.mark.parametrize(
+    ("error", "case", "code"),
+    [
+        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 2),
+        (noted(KeyboardInterrupt(), TURNS), "stopped, servo turns", 130),
+    ],
+    ids=["error", "Ctrl-C"],
+)
+def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(error, case, code, monkeypatch, capsys):
+    def acquire(*_):
+        raise error
+
+    seen = Seen()
+    plan = SimpleNamespace(lines=list, recording=Path(__file__))
+    monkeypatch.setattr("firmware_io.scan.plan.plan_scan", lambda *_, **__: plan)
+    monkeypatch.setattr("firmware_io.scan.acquire.acquire", acquire)
+    monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
+    with pytest.raises(typer.Exit) as ended:
+        devices.scan(Path("out"))
+    said = [line.removeprefix("scanwright: ") for line in capsys.readouterr().err.splitlines()]
+    assert ended.value.exit_code == code
+    assert said == [*ENDS[case][0].lines, f"what was recorded is in {__file__}"]
+    (end, closed) = seen.ends
+    assert (list(end.lines), end.outcome, closed) == (said, "unsafe", "closed")
+
+
+def test_in_a_browser_the_end_is_an_alert_that_stays_and_a_lost_program_is_one_too(browser):
+    red, amber = "rgb(165, 17, 17)", "rgb(255, 197, 61)"
+    with guarded_server("a page") as (server, gate):
+        view = CloudView(server, "hall", np.zeros(3))
+        page = browser.open(gate.address, width=900, height=600, device_scale_factor=0.5)
+        page.get_by_text("waiting for the first scan").wait_for()
+        banner = page.locator(".sw-banner[role=alert]")
+        assert banner.text_content() == "" and not banner.is_visible()
+        for case, colour in (("laser may be on", red), ("lossy", amber), ("failed", red)):
+            end, words = ENDS[case]
+            view.show_end(end)
+            banner.filter(has_text=words).wait_for()
+            assert banner.text_content().splitlines() == [end.heading, *end.lines]
+            assert banner.evaluate("e => getComputedStyle(e).backgroundColor") == colour
+            box = banner.bounding_box()
+            at = (box["x"] + 20, box["y"] + 20)
+            assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", at) == "sw-banner"
+        assert browser.barriers(page) == []
+        later = browser.open(gate.address, width=900, height=600, device_scale_factor=0.5)
+        later.locator(".sw-banner").filter(has_text=ENDS["failed"][1]).wait_for()
+        later.close()
+        view.banner.content = CloudView(server, "next", np.zeros(3)).banner.content  # a new scan begins
+        banner.wait_for(state="hidden")
+        server.stop()
+        banner.filter(has_text="the state of the devices is unknown").wait_for()
+        assert banner.get_attribute("data-kind") == "lost"
+    browser.complaints[:] = [said for said in browser.complaints if "ERR_CONNECTION_REFUSED" not in said]
+    browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
+
+
 def test_the_first_points_of_a_chunk_are_all_of_them_thinned():
     height = np.linspace(-1, 1, 5000, dtype=np.float32)
     points, nothing = np.stack([0 * height, 0 * height, height], axis=1), np.zeros(5000, np.float32)
@@ -163,8 +301,22 @@ def test_the_address_is_said_and_the_page_seen_before_the_scan_begins(tmp_path, 
     with live_page(tmp_path, wanted=True, browse=browse) as watch:
         assert capsys.readouterr().out == f"open {opened[0]}\n" and looking
         watch.scan(scan_at(0))
+        watch.ended(ENDS["done"][0])
         watch.close()
         looking[0].close()
+
+
+def test_a_scan_program_that_goes_away_leaves_an_unknown_state_on_the_page(monkeypatch, tmp_path):
+    (tmp_path / "angles.json").write_text(ANGLES.to_json())
+    shown = []
+    monkeypatch.setattr(CloudView, "show_end", lambda _, end: shown.append(end))
+    monkeypatch.setattr(scan_page.signal, "signal", lambda *_: None)
+    receiving, sending = Pipe(duplex=False)
+    hearing, telling = Pipe(duplex=False)
+    os.write(sending.fileno(), b"\0\0")  # the program is killed within a message
+    sending.close()
+    scan_page._show(receiving, telling, tmp_path)
+    assert shown == [scan_end.LOST] and hearing.recv().startswith("http://127.0.0.1:")
 
 
 def test_a_page_that_cannot_be_served_is_one_line(tmp_path):

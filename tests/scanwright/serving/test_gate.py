@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from design.errors import TaskError
-from scanwright.serving.gate import MOST_VISITORS
+from scanwright.serving.handshake import MOST_VISITORS
 from scanwright.serving.page_server import guarded_server
 
 CAMERA = {

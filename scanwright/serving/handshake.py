@@ -1,0 +1,74 @@
+"""What every server for a browser checks of a request before it answers, and the socket that it listens on.
+
+A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, tell who asks: Host,
+which is another name if a name was bent to 127.0.0.1 (DNS rebinding), and Origin, the page that the script comes from.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Container, Iterable
+from http import HTTPStatus
+
+from websockets.datastructures import Headers
+from websockets.http11 import Response
+
+from design.errors import DeviceError, TaskError
+
+MOST_VISITORS = 8
+
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9.:\[\]-]+")
+
+
+def local_hosts(port: int) -> set[str]:
+    """Return the Host headers that name a port of this computer."""
+    return {f"127.0.0.1:{port}", f"localhost:{port}"}
+
+
+def foreign(headers: Headers, hosts: Container[str], origins: Container[str]) -> str:
+    """Return "foreign host" or "foreign origin" if that is what a request comes by; else an empty string.
+
+    A request without an Origin passes: no browser sends one.
+    """
+    named = headers.get_all("Host")
+    if len(named) != 1 or named[0] not in hosts:
+        return "foreign host"
+    return "" if all(origin in origins for origin in headers.get_all("Origin")) else "foreign origin"
+
+
+def refusal(why: str, hint: str, status: HTTPStatus = HTTPStatus.FORBIDDEN) -> Response:
+    """Return the answer to a request that is refused."""
+    text = f"refused: {why}; {hint}\n".encode()
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
+    return Response(status.value, status.phrase, headers, text)
+
+
+def bound(port: int) -> socket.socket:
+    """Return a socket on a port of 127.0.0.1; 0 is any free one.
+
+    Raises:
+        TaskError: the port is taken.
+    """
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind(("127.0.0.1", port))
+    except (OSError, OverflowError) as error:
+        listening.close()
+        why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "no such port"
+        raise TaskError(f"--port {port}: {why}; leave it out for any that is free") from error
+    return listening
+
+
+def as_origins(texts: Iterable[str] | None) -> tuple[str, ...]:
+    """Return the origins that a person allows, as browsers send them.
+
+    Raises:
+        DeviceError: one is no origin of a single page; `null` is what any page can send.
+    """
+    origins = tuple(text.lower().removesuffix("/") for text in texts or ())
+    for origin in origins:
+        if not _ORIGIN.fullmatch(origin):
+            raise DeviceError(f"--allow-origin {origin}: not an origin (allowed SCHEME://HOST[:PORT])")
+    return origins

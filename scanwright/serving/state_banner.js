@@ -1,0 +1,39 @@
+// The state that a page must not miss, such as a scan that failed: words of the hidden element `.sw-state`, over the view.
+// They stay if the panel that holds the element is folded, and give way to `data-lost` if the connection breaks.
+(() => {
+  const banner = document.createElement("div");
+  banner.className = "sw-banner";
+  banner.setAttribute("role", "alert");
+  banner.tabIndex = 0; // long words scroll
+  document.addEventListener("DOMContentLoaded", () => document.body.append(banner));
+
+  const show = (kind, words) => {
+    if (banner.dataset.kind === kind && banner.textContent === words) return;
+    banner.dataset.kind = kind;
+    banner.textContent = words;
+  };
+
+  let connected = true;
+  let lost = "";
+  const look = () => {
+    const state = document.querySelector(".sw-state");
+    if (!state || !connected) return;
+    lost = state.dataset.lost;
+    show(state.dataset.kind, state.textContent);
+  };
+  const watched = { childList: true, subtree: true, characterData: true, attributeFilter: ["data-kind", "data-lost"] };
+  new MutationObserver(look).observe(document, watched);
+
+  // viser's websocket lives in a worker, which reports when it opens and closes
+  window.Worker = class extends window.Worker {
+    constructor(...words) {
+      super(...words);
+      this.addEventListener("message", ({ data }) => {
+        if (data?.type === "connected") connected = true;
+        if (data?.type !== "closed") return;
+        connected = false;
+        if (lost) show("lost", lost);
+      });
+    }
+  };
+})();
