@@ -5,7 +5,7 @@
 
 Errors: random tasks at random settings (bands, cones, rectangles on planes, fine maps, masks of meshes, scenes; regions
 down to a thousandth of a degree, balls of 0.3 to 15 degrees; all motions and objectives), against
-`design.accuracy.drawn_reference`, which shares no code with the program.
+`design.objective.counted`, which shares no code with the program.
 Optima: settings drawn at random from the ranges of each shipped task, and scipy's `differential_evolution`. All are
 looked at roughly, the best of them with all nodes.
 Evolution: as many random tasks as asked for, the optimum of each against 500 evaluations of `differential_evolution`.
@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import ValidationError
 from scipy.optimize import differential_evolution
 
-from design.accuracy.drawn_reference import Counted, counted_J
+from design.objective.counted import Counted, counted_J
 from design.arrays import Array
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError

@@ -4,7 +4,7 @@ Where the axis turns all around in a whole number of lines, the polar angle is c
 or leaves the ball, and the smooth pieces between are integrated by Gauss-Legendre; the counts come from the law of
 cosines and an ordered list of the start phases at which a line enters or leaves, and the difference of two orders is
 the error. Only where the region's weight lies on a circle is asked of the program, and that is held to the other
-reference in the tests. Everything else (sweeps, turns with a seam, lowest counts) is drawn: `drawn_reference`.
+reference in the tests. Everything else (sweeps, turns with a seam, lowest counts) is drawn: `counted`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 from scipy.special import roots_legendre
 
-from design.accuracy.drawn_reference import counted_J
+from design.objective.counted import counted_J
 from design.arrays import Array, Setting
 from design.objective.problem import Problem
 from design.sphere.polar_rule import breaks_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from design.accuracy.drawn_reference import counted_J
+from design.objective.counted import counted_J
 from design.accuracy.methods import METHODS
 from design.accuracy.reference import is_smooth, reference, smooth_reference
 from design.objective.problem import problem_of

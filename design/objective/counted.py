@@ -14,7 +14,7 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from design.accuracy.drawn_regions import Layer, drawn_in, layers_of
+from design.objective.drawn_regions import Layer, drawn_in, layers_of
 from design.arrays import Array, Ints, Setting
 from design.motion import Spin, StopAndGo, Sweep
 from design.task.task import LoadedTask

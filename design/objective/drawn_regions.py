@@ -1,4 +1,4 @@
-"""The regions of a task painted one by one, and directions drawn in each; `drawn_reference` counts there."""
+"""The regions of a task painted one by one, and directions drawn in each; `counted` counts there."""
 
 from __future__ import annotations
 
