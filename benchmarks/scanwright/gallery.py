@@ -220,7 +220,8 @@ def made(entry: Entry) -> None:
         task.unlink(missing_ok=True)
         words = ["new", entry.name, *shlex.split(entry.words), "-o", str(task)]
         subprocess.run([sys.executable, "-m", "scanwright", *words], check=True, capture_output=True)
-    sw.build(task, OUT, say=print)
+    if failed := sw.build(task, OUT, say=print).failed:
+        sys.exit(f"{entry.name}: {failed[0].message}")
 
 
 def picture(entry: Entry, folder: Path) -> Image.Image:

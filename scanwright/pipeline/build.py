@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cad.checks.check import Check, failed_of, read_checks
 from cad.kernel import require_kernel
 from design.angles import standard_settings
 from design.concurrency.processes import Packed, processes_beside
@@ -61,13 +62,20 @@ class Build:
         folder: where it is.
         files: its files, relative to the folder.
         warnings: what the task can do, but not as well as its author may think.
-        made: what was done; None where the folder was current and there was nothing to do.
+        checks: of its parts, as in `checks.json`.
+        made: what was done; None if the folder was current and there was nothing to do.
     """
 
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
+    checks: tuple[Check, ...]
     made: Made | None
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """The checks that failed; the parts are safe to make only if there are none."""
+        return failed_of(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
         """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
@@ -111,7 +119,7 @@ def _gathered(findings: Sequence[PartFinding]) -> list[str]:
 
 
 def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
-    """Make the build folder of a task, unless it is current.
+    """Make the build folder of a task, unless it is current. Failed checks do not raise: see `Build.failed`.
 
     Args:
         loaded: the task.
@@ -130,7 +138,7 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
-    return Build(target, listed_files(target), tuple(loaded.warnings()), made)
+    return Build(target, listed_files(target), tuple(loaded.warnings()), read_checks(target / "checks.json"), made)
 
 
 def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
