@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
     from cad.files.part_files import PartReport, PartsResult
     from cad.findings import PartFinding
+    from design.evaluation.as_built import AsBuilt
     from design.evaluation.metres import PlaneFigures
     from design.left_out import LeftOut
     from design.scanner import Scanner
@@ -44,12 +45,14 @@ class Made:
     Attributes:
         optimum: the search.
         chosen: the setting that is best with its parts: the one that was built.
+        as_built: what it sees, without the beams that its parts block.
         findings: what a person should know before the parts are made.
         planes: what one full scan leaves on ground, ceiling and walls of the task.
     """
 
     optimum: Optimum
     chosen: Chosen
+    as_built: AsBuilt
     findings: tuple[PartFinding, ...]
     planes: tuple[PlaneFigures, ...]
 
@@ -84,7 +87,8 @@ class Build:
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
-            *(f"one full scan, {plane.words()}" for plane in self.made.planes),
+            *self.made.as_built.lines(),
+            *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
             *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
             f"wrote {len(self.files)} files to {self.folder}",
@@ -244,6 +248,7 @@ def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import write_files
+    from design.evaluation.as_built import as_built
     from design.evaluation.metres import on_planes
     from design.search.optimum import find_optimum
 
@@ -265,9 +270,11 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         _at(say, "pictures")("drawing the density")
         standard = standard_settings()
-        settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
-        settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
-        density_picture(work / "density.png", problem, settings, optimum.title)
+        settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
+        settings |= {
+            f"{name}, without parts: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()
+        }
+        density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
         parts = written()
         exported, drawn = (
             begin(_exported, scanner, parts.result, work, say),
@@ -281,5 +288,6 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
         records.write_report(work, begin)
-    planes = on_planes(loaded, problem, best.angles_rad)
-    return Made(optimum, chosen, (*parts.findings, *findings), planes)
+    planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
+    seen = as_built(problem, best.angles_rad, chosen.shadow, best.score, optimum.standard)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes)

@@ -408,7 +408,7 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     found = [PartFinding("turn_from_metal", "note", "shaft", "shaft: have it turned")]
     found += [PartFinding("unverified", "warning", "UTM", f"UTM: {v} is not verified", v) for v in ("a = 1", "b = 2")]
     told = SimpleNamespace(table=list, lines=list)
-    made = Made(told, told, tuple(found), ())
+    made = Made(told, told, told, tuple(found), ())
     gathered = Build(tmp_path, ("one",), ("slow",), (), made).lines()
     assert gathered[0] == "warning: slow"
     assert gathered[1] == "note: shaft: have it turned"
