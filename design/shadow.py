@@ -34,6 +34,27 @@ class Shadow:
             return self.beams.astype(float)
         return np.where(self.beams, 1.0, self.stator.mean(axis=1))
 
+    def share(self) -> float:
+        """Return the share of all beams of a turn of the axis that is blocked."""
+        return float(self.hidden().mean())
+
+    def of(self, some: Bool[ndarray, " beams"]) -> Shadow:
+        """Return the same for some of the beams."""
+        return Shadow(self.beams[some], None if self.stator is None else self.stator[some])
+
+    def free(self, joint_rad: Float[ndarray, " k"]) -> Bool[ndarray, "k beams"]:
+        """Return whether each beam leaves the scanner at joint angles [rad], shape (k, B)."""
+        if self.stator is None:
+            return np.tile(~self.beams, (len(joint_rad), 1))
+        steps = self.stator.shape[1]
+        return ~(self.beams[:, None] | self.stator[:, np.rint(joint_rad / (2 * np.pi / steps)).astype(int) % steps]).T
+
+    def partly(self) -> Bool[ndarray, " beams"]:
+        """Return which beams are blocked at some axis angles by what stands still, shape (B,)."""
+        if self.stator is None:
+            return np.zeros(len(self.beams), bool)
+        return ~self.beams & self.stator.any(axis=1)
+
 
 def own_body_bytes(shadow: Shadow, bearings_rad: Float[ndarray, " beams"]) -> bytes:
     """`own_body.npz`: arrays `beams`, `stator` (none hidden where it was not asked for) and `bearing_rad`."""

@@ -262,7 +262,7 @@ shape = "all"
 def made(once):
     """The build of one tilted scanner, which has a bearing and a counterweight.
 
-    Its folder, what was made and exported, and the scanner: for reading only.
+    Its folder, what was made and exported, the scanner, and what the command prints: for reading only.
     """
     from cad.files import part_files, workshop_files
     from design.concurrency import processes
@@ -286,6 +286,8 @@ def made(once):
             patch.setattr(workshop_files, "export_scanner", keeping(workshop_files.export_scanner))
             built = build(folder / "tilted.toml", folder / "out")
         result, exports = given["build_parts"], given["export_scanner"]
-        return SimpleNamespace(folder=built.folder, result=result, exports=exports, scanner=given["scanner"])
+        return SimpleNamespace(
+            folder=built.folder, result=result, exports=exports, scanner=given["scanner"], lines=built.lines()
+        )
 
     return once("the tilted scanner", all_of_it)

@@ -24,10 +24,10 @@ import numpy as np
 from pydantic import ValidationError
 from scipy.optimize import differential_evolution
 
-from design.objective.counted import Counted, counted_J
 from design.arrays import Array
 from design.catalogue.catalogue import load_catalogue
 from design.errors import TaskError
+from design.objective.counted import Counted, counted_J
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.objective.stated_error import error_words

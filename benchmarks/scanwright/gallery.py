@@ -34,7 +34,7 @@ from design.scene.ray_caster import build_scene
 from design.shadow import load_own_body
 from design.task.task import load_task
 from firmware_io.twins.simulated import simulated_recording
-from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.sentences import sentences
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -225,7 +225,8 @@ def made(entry: Entry) -> None:
         task.unlink(missing_ok=True)
         words = ["new", entry.name, *shlex.split(entry.words), "-o", str(task)]
         subprocess.run([sys.executable, "-m", "scanwright", *words], check=True, capture_output=True)
-    sw.build(task, OUT, say=print)
+    if failed := sw.build(task, OUT, say=print).failed:
+        sys.exit(f"{entry.name}: {failed[0].message}")
 
 
 def picture(entry: Entry, folder: Path) -> Image.Image:
@@ -273,10 +274,9 @@ def section(entry: Entry, folder: Path) -> str:
     """Its part of the page."""
     loaded, angles = load_task(folder / "task.toml"), sw.load_angles(folder / "angles.json")
     problem = problem_as_built(loaded, angles)
-    planes = on_planes(loaded, problem, mounting_rad(angles))
-    said = sentences(angles, answer(problem, angles), 2 * float(np.tan(problem.ball_rad)), planes)
-    hidden = hidden_by(load_own_body(folder / "own_body.npz")[0])
-    parts = f"{hidden.share:.1%}" if hidden.share >= 0.0005 else "less than 0.1 %" if hidden.share else "none"
+    shadow = load_own_body(folder / "own_body.npz")[0]
+    planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
+    said = sentences(angles, answer(problem, angles, shadow), 2 * float(np.tan(problem.ball_rad)), planes)
     found = angles.angles_deg
     four = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
     words = (
@@ -285,7 +285,6 @@ def section(entry: Entry, folder: Path) -> str:
         else f"build {entry.name}"
     )
     told = f"Axis {four[0]:g}, {four[1]:g} deg; scan plane {four[2]:g}, {four[3]:g} deg. {' '.join(said)}"
-    hides = f"Its parts hide {parts} of its beams over one turn."
     return f"""## {entry.title}
 
 ```console
@@ -294,7 +293,7 @@ $ scanwright {words}
 
 ![The scanner of {entry.name}, and one full scan of its world](pictures/gallery/{entry.name}.png)
 
-{fill(f"{told} {hides}", 119)}
+{fill(told, 119)}
 
 {fill(entry.learnt, 119)}
 """

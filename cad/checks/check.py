@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
 
 from cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from cad.layout.names import SERVO
 from design.arrays import Array
+from design.errors import BuildError
 from design.scanner import Scanner
 
 Severity = Literal["pass", "note", "warning", "error"]
@@ -97,6 +99,32 @@ def checks_text(checks: Iterable[Check]) -> str:
     """`checks.json`."""
     content = {"schema": "scanwright/checks/1", "checks": [asdict(check) for check in checks]}
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def read_checks(path: Path) -> tuple[Check, ...]:
+    """Return the checks of a `checks.json`.
+
+    Raises:
+        BuildError: the file is missing, or is not as a build writes it.
+    """
+    try:
+        return tuple(Check(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))["checks"])
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise BuildError(f"{path}: not as a build writes it ({error}): build the folder again") from error
+
+
+def failed_of(checks: Iterable[Check]) -> tuple[Check, ...]:
+    """Return the checks that failed: those of severity `error`."""
+    return tuple(check for check in checks if check.severity == "error")
+
+
+def failure_lines(checks: Sequence[Check]) -> list[str]:
+    """Return one line for each failed check and a summary; none if no check failed."""
+    failed = failed_of(checks)
+    if not failed:
+        return []
+    count = f"{len(failed)} of {len(checks)} checks failed"
+    return [*(f"check failed: {check.message}" for check in failed), f"{count}: do not make these parts"]
 
 
 def tidy(value: float) -> float:

@@ -18,12 +18,13 @@ from cad.checks.deflection import deflection_checks
 from cad.checks.mechanics import mechanics_checks
 from cad.checks.mount import mount_checks
 from cad.checks.printing import printing_checks
-from cad.checks.remarks import products_of, unverified
+from cad.checks.remarks import left_out_of, products_of, unverified
 from cad.checks.retention import retention_checks
 from cad.checks.rotor_leads import lead_checks, standing_checks
 from design.catalogue.products import Product, SlotSwitch
 from design.electrics.rules import broken_rules
 from design.electrics.wiring import network_of
+from design.left_out import LeftOut
 from design.scanner import Scanner
 from design.shadow import Shadow, own_body_bytes
 
@@ -80,6 +81,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *deflection_checks(scanner, assembly, bodies, meshes),
         *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
+        *module_checks(scanner, left_out_of(assembly)),
         *doubts,
     ]
     return checks, shadow
@@ -100,6 +102,26 @@ def known_errors(products: Iterable[Product]) -> list[Check]:
         )
         for product in products
         for error in product.known_wrong
+    ]
+
+
+def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Check]:
+    """Return an error for each module that the task requires and that has no place in this scanner.
+
+    A module and the part that it adds have the same name.
+    """
+    return [
+        Check(
+            "module",
+            "error",
+            None,
+            None,
+            "",
+            part.what,
+            f"{part.what}: the task requires it (modules.{part.what} = true), but it has no place: {part.why}",
+        )
+        for part in left_out
+        if getattr(scanner.modules, part.what, False)
     ]
 
 

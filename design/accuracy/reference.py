@@ -18,8 +18,8 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 from scipy.special import roots_legendre
 
-from design.objective.counted import counted_J
 from design.arrays import Array, Setting
+from design.objective.counted import counted_J
 from design.objective.problem import Problem
 from design.sphere.polar_rule import breaks_of
 from design.task.task import LoadedTask

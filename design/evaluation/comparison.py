@@ -37,8 +37,8 @@ from design.arrays import Array, Counts, Setting
 from design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
 from design.density.ball_count import ball_count
 from design.density.beams import ScanLines
+from design.evaluation.as_built import seen_of
 from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps
 from design.objective.ball_search import SETS
 from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import NODES, Problem, with_scanner
@@ -46,6 +46,8 @@ from design.objective.score import Score, blind_share, score, score_on
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.search import search
+from design.search.with_parts import score_with
+from design.shadow import Shadow
 from design.sphere.directions import sample_set, spiral
 from design.task.angle_ranges import AngleRanges
 from design.task.task import LoadedTask, load_task
@@ -56,6 +58,7 @@ SEARCHED = {
     "Bonn, 45 deg": AngleRanges(alpha_rot_deg=180, beta_rot_deg=45, alpha_laser_deg=90, beta_laser_deg=(-90, -45)),
     "pitch only": AngleRanges(alpha_rot_deg=0, beta_rot_deg=0, alpha_laser_deg=0, beta_laser_deg=(-90, 90)),
 }
+AS_BUILT = "as built, with parts"
 SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks: their products, motion and allowed angles
 PHASES = 4  # start phases, and directions, for a scanner that sees part of a turn only: it is no longer zonal
 DIRECTIONS = 10_000
@@ -105,7 +108,11 @@ class ComparisonRow:
 
 
 def compare(
-    loaded: LoadedTask, problem: Problem, best: Family, progress: Progress = lambda _: None
+    loaded: LoadedTask,
+    problem: Problem,
+    best: Family,
+    progress: Progress = lambda _: None,
+    built: tuple[Setting, Shadow] | None = None,
 ) -> list[ComparisonRow]:
     """Rows of the optimum, the alignments known from others, other scanners, and every multibeam of the catalogue.
 
@@ -114,11 +121,17 @@ def compare(
         problem: its numbers.
         best: its optimum, the first family of `search`.
         progress: told of each step.
+        built: setting [rad] of a build of the task, and the beams that its parts block: the first row.
 
     Raises:
+        BuildError: the shadow is of another number of beams.
         TaskError: no direction has a weight.
     """
     rows = [_rotating("optimum", loaded, problem, best.angles_rad, best.score)]
+    if built is not None:
+        setting, shadow = built
+        found = score_with(problem, setting, shadow)
+        rows.insert(0, _rotating(AS_BUILT, loaded, problem, setting, found, shadow))
     for name, angles_deg in STANDARD_DEG.items():
         setting = np.radians(angles_deg)
         rows.append(_rotating(name, loaded, problem, setting, score(problem, setting)))
@@ -221,7 +234,10 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     )
 
 
-def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score) -> ComparisonRow:
+def _rotating(
+    name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score, shadow: Shadow | None = None
+) -> ComparisonRow:
+    seen = seen_of(problem, angles_rad, judged, shadow)
     prices = [product.price_usd for product in bought(loaded)]
     known = [price for price in prices if price is not None]
     return ComparisonRow(
@@ -231,9 +247,9 @@ def _rotating(name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setti
         turns=1,
         J=judged.J,
         J_error=judged.J_error,
-        blind_fraction=coverage(problem, angles_rad).blind_fraction,
-        blind_weight=judged.blind_weight,
-        gap_deg=gaps(problem, angles_rad).line_gap_deg,
+        blind_fraction=seen.blind_fraction,
+        blind_weight=seen.blind_weight,
+        gap_deg=seen.line_gap_deg,
         layers=len(problem.bearings_rad),
         points_per_s=loaded.lidar.scan_rate_hz * len(problem.bearings_rad),
         range_stated_m=loaded.lidar.stated_range_m,

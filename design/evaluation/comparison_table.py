@@ -9,7 +9,7 @@ from pathlib import Path
 from design.atomic_file import whole_file
 from design.catalogue.products import Multibeam, Product
 from design.errors import BuildError
-from design.evaluation.comparison import SCANNERS, ComparisonRow, bought
+from design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
 from design.objective.holes import percent
 from design.objective.stated_error import error_words
 from design.task.task import LoadedTask, load_task
@@ -46,7 +46,9 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
     products = dict.fromkeys(product for task in (loaded, *others) for product in bought(task))
     doubts = [(product.name, _doubted(product)) for product in products]
     doubts += [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam)]
+    without = f"all rows but {AS_BUILT!r} are" if AS_BUILT in names else "every row is"
     return [
+        f"parts: {without} without parts in the way",
         "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
         f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
         "blind: of the sphere outside the masks; of weight: what of the task's weight is blind",

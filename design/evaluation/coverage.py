@@ -12,13 +12,16 @@ from design.arrays import Setting, Vector
 from design.density.beams import blind_zones, polar_and_azimuth
 from design.density.spin import mean_count
 from design.density.sweep import mean_count_swept
+from design.density.visible import free_lines, mean_count_free
 from design.frames import R_world_rot
 from design.objective.problem import Problem
 from design.scene.surface import Surface
+from design.shadow import Shadow
 from design.sphere.directions import spiral
 
 CIRCLES = 10_000
 TABLE = 3601  # polar angles
+UNSEEN = 1e-9  # mean beams in a ball: rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +37,16 @@ class Coverage:
     masked_fraction: float
 
 
-def coverage(problem: Problem, angles_rad: Setting) -> Coverage:
-    """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+def coverage(problem: Problem, angles_rad: Setting, shadow: Shadow | None = None) -> Coverage:
+    """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], behind its parts.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+    """
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    if problem.sweep is not None:
-        return _swept(problem, angles_rad)
+    if problem.sweep is not None or (shadow is not None and shadow.partly().any()):
+        return _on_directions(problem, angles_rad, shadow)
+    problem = problem if shadow is None else problem.behind(shadow)
     polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     up = np.array([0.0, 0.0, 1.0])
     open_share = _unmasked(problem, up, 0.0, np.pi)
@@ -49,19 +57,27 @@ def coverage(problem: Problem, angles_rad: Setting) -> Coverage:
     )
 
 
-def _swept(problem: Problem, angles_rad: Setting) -> Coverage:
-    """For a sweep, whose blind region is no zone: over directions of equal solid angle."""
-    assert problem.sweep is not None
+def _on_directions(problem: Problem, angles_rad: Setting, shadow: Shadow | None) -> Coverage:
+    """Coverage over directions of equal solid angle, for a blind region that is no zone about the axis."""
     directions = spiral(CIRCLES)
     masked = problem.field.masked_at(directions)
-    in_rot = directions[~masked] @ R_world_rot(angles_rad[0], angles_rad[1])
-    beams = problem.beams_rot(angles_rad[2:])
-    seen = mean_count_swept(in_rot, beams, problem.sweep, problem.ball_rad) > 0
+    seen = mean_density_at(problem, angles_rad, directions[~masked], shadow) > UNSEEN
     return Coverage(float((~seen).mean()) if len(seen) else 0.0, float(masked.mean()))
 
 
-def mean_density_at(problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
-    """Mean beams per ball at unit vectors (n, 3), from a table over the polar angle where the axis turns all around."""
+def mean_density_at(
+    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: Shadow | None = None
+) -> Float[ndarray, " n"]:
+    """Return the mean number of beams per ball at unit vectors (n, 3), without the beams that `shadow` blocks.
+
+    It is read from a table over the polar angle if the axis turns all around and nothing that stands still blocks a
+    beam.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+    """
+    if shadow is not None:
+        return _density_behind(problem, angles_rad, directions, shadow)
     R = R_world_rot(angles_rad[0], angles_rad[1])
     beams = problem.beams_rot(angles_rad[2:])
     if problem.sweep is not None:
@@ -69,6 +85,21 @@ def mean_density_at(problem: Problem, angles_rad: Setting, directions: Float[nda
     table = np.linspace(0, np.pi, TABLE)
     counts = mean_count(table, polar_and_azimuth(beams)[0], problem.lines, problem.ball_rad)
     return np.interp(np.arccos(np.clip(directions @ R[:, 2], -1, 1)), table, counts)
+
+
+def _density_behind(
+    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: Shadow
+) -> Float[ndarray, " n"]:
+    """Mean beams per ball behind parts: beams that are free at every axis angle, and those that are free at some."""
+    seen, partly = problem.behind(shadow), shadow.partly()
+    if shadow.stator is None or not partly.any():
+        return mean_density_at(seen, angles_rad, directions)
+    always = problem.with_beams(problem.bearings_rad[~(shadow.beams | partly)], problem.lines, problem.sweep)
+    R = R_world_rot(angles_rad[0], angles_rad[1])
+    free = free_lines(shadow.stator[partly], problem.lines, problem.sweep)
+    beams = problem.beams_rot(angles_rad[2:])[partly]
+    at_times = mean_count_free(directions @ R, beams, free, problem.ball_rad)
+    return mean_density_at(always, angles_rad, directions) + at_times
 
 
 def points_per_m2(problem: Problem, angles_rad: Setting, surface: Surface) -> Float[ndarray, "rows columns"]:

@@ -16,6 +16,7 @@ from design.arrays import Array, Setting
 from design.evaluation.coverage import mean_density_at
 from design.evaluation.picture_files import save_picture
 from design.objective.problem import Problem
+from design.shadow import Shadow
 
 STEP_DEG = 0.5
 INK = "#111111"
@@ -25,12 +26,16 @@ LEAST_FACTOR, MOST_FACTOR = 2.0, 10.0  # at the ends of the colours of a ratio
 ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
-def density_picture(path: Path, problem: Problem, settings: Mapping[str, Setting], title: str) -> None:
+def density_picture(
+    path: Path, problem: Problem, settings: Mapping[str, Setting], title: str, shadow: Shadow | None = None
+) -> None:
     """Write `density_figure` to a PNG, and to an SVG beside it."""
-    save_picture(density_figure(problem, settings, title), path)
+    save_picture(density_figure(problem, settings, title, shadow), path)
 
 
-def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str) -> Figure:
+def density_figure(
+    problem: Problem, settings: Mapping[str, Setting], title: str, shadow: Shadow | None = None
+) -> Figure:
     """Density maps one above the other on one colour scale; of two or more, the first one over the second below them.
 
     Densities span decades, so that a gain of a half is a shade that nobody sees: the ratio shows where it is.
@@ -39,6 +44,10 @@ def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str
         problem: the task as numbers.
         settings: title of each map and its (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top.
         title: line above all.
+        shadow: beams that the parts of the first setting block; none if they are not known.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
     """
     theta = np.arange(STEP_DEG / 2, 180, STEP_DEG)
     phi = np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG)
@@ -46,7 +55,10 @@ def density_figure(problem: Problem, settings: Mapping[str, Setting], title: str
     directions = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3)
     weight = problem.field.weight_at(directions).reshape(t.shape)
     masked = problem.field.masked_at(directions).reshape(t.shape)
-    maps = {name: mean_density_at(problem, angles, directions).reshape(t.shape) for name, angles in settings.items()}
+    maps = {
+        name: mean_density_at(problem, angles, directions, shadow if place == 0 else None).reshape(t.shape)
+        for place, (name, angles) in enumerate(settings.items())
+    }
     highest = max(float(m.max()) for m in maps.values())
     norm = LogNorm(vmin=max(1.0, highest / 300), vmax=highest, clip=True)
 

@@ -13,6 +13,7 @@ from numpy import ndarray
 from design.arrays import Setting
 from design.density.beams import scan_at
 from design.errors import TaskError
+from design.evaluation.as_built import AsBuilt, as_built
 from design.evaluation.coverage import Coverage, coverage, on_surfaces
 from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
 from design.evaluation.metres import PlaneFigures, on_planes
@@ -23,6 +24,7 @@ from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
 from design.objective.stated_error import error_words, rounded_to_error
 from design.objective.tolerance import rise_words, sensitivity
+from design.shadow import Shadow
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
 
@@ -63,6 +65,7 @@ class Evaluation:
         hit: the chance to hit a pole, where one was asked for.
         surfaces: points per square metre, where the task has a scene.
         planes: what a full scan leaves on ground, ceiling and walls of the task.
+        as_built: the same setting with the parts of its build, if there is one; all else is without parts.
     """
 
     problem: Problem
@@ -79,6 +82,7 @@ class Evaluation:
     hit: PoleChances | None
     surfaces: dict[str, float] | None
     planes: tuple[PlaneFigures, ...]
+    as_built: AsBuilt | None
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
         """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
@@ -102,6 +106,7 @@ class Evaluation:
         """Names with units and values, for JSON."""
         return {
             **({} if self.lever is None else {"lever": asdict(self.lever)}),
+            "with_parts": False,  # but `as_built`
             "J": self.score.J,
             "J_error": self.score.J_error,
             "J_lower": self.score.J_lower,
@@ -120,6 +125,7 @@ class Evaluation:
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
             **(self.surfaces or {}),
             **({"planes": [plane.facts() for plane in self.planes]} if self.planes else {}),
+            **({} if self.as_built is None else {"as_built": self.as_built.facts()}),
         }
 
     def lines(self) -> list[str]:
@@ -128,6 +134,8 @@ class Evaluation:
         ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
             *self._doubts(),
+            *([] if self.as_built is None else self.as_built.lines()),
+            "without parts, as if nothing of the scanner were in the way:",
             *([] if self.lever is None else [f"lever          {self.lever.words()}"]),
             *(
                 [f"hole           {hole.words()}" for hole in self.holes]
@@ -170,9 +178,14 @@ class Evaluation:
 
 
 def evaluate(
-    loaded: LoadedTask, angles_rad: Setting, pole: str | None, lever: str | None, progress: Callable[[str], None]
+    loaded: LoadedTask,
+    angles_rad: Setting,
+    pole: str | None,
+    lever: str | None,
+    progress: Callable[[str], None],
+    shadow: Shadow | None = None,
 ) -> Evaluation:
-    """Requirements the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Args:
         loaded: the task.
@@ -180,8 +193,10 @@ def evaluate(
         pole: as `parse_pole` reads it, None for no pole.
         lever: `X_MM,Y_MM,RANGE_M`, None for an optical centre on the axis.
         progress: is told what is being computed.
+        shadow: beams that the parts of this very setting block, if it was built.
 
     Raises:
+        BuildError: the shadow is of another number of beams.
         TaskError: no direction has a weight, or the pole or the lever makes no sense.
     """
     asked = None if pole is None else parse_pole(pole, loaded.lidar)
@@ -210,6 +225,7 @@ def evaluate(
         hit=None if asked is None else pole_chances(problem, angles_rad, asked),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
+        as_built=None if shadow is None else as_built(problem, angles_rad, shadow),
     )
 
 

@@ -18,6 +18,7 @@ from design.arrays import Array, Ints, Setting, Vector
 from design.density.beams import polar_and_azimuth, scan_at
 from design.frames import R_world_rot
 from design.objective.problem import Problem
+from design.shadow import Shadow
 from design.sphere.rectangle import edge_normals
 from design.sphere.regions import Field
 from design.task.shapes import LITTLE, PlaneRegion, beyond_words
@@ -90,18 +91,25 @@ def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
     return [region for region in loaded.task.weight if isinstance(region, PlaneRegion) and region.value > 0]
 
 
-def on_planes(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> tuple[PlaneFigures, ...]:
+def on_planes(
+    loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: Shadow | None = None
+) -> tuple[PlaneFigures, ...]:
     """What a full scan of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] leaves on each plane.
 
-    A region counts where it has a weight above 0. Masked directions are no part of it.
+    A region counts if it has a weight above 0. Masked directions are no part of it, and beams that `shadow` blocks do
+    not reach it.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
     """
     regions = planes_of(loaded)
     if not regions:
         return ()
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
-    beams = beams[~problem.field.masked_at(beams)]
-    spots = _spots(problem, angles_rad)
+    free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
+    beams = beams[free & ~problem.field.masked_at(beams)]
+    spots = _spots(problem if shadow is None else problem.behind(shadow), angles_rad)
     reach_m = loaded.lidar.practical_range_m
     return tuple(on_plane(region, beams, problem, spots, reach_m) for region in regions)
 

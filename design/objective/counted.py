@@ -14,9 +14,9 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from design.objective.drawn_regions import Layer, drawn_in, layers_of
 from design.arrays import Array, Ints, Setting
 from design.motion import Spin, StopAndGo, Sweep
+from design.objective.drawn_regions import Layer, drawn_in, layers_of
 from design.task.task import LoadedTask
 
 SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region

@@ -13,9 +13,10 @@ from design.arrays import Plane
 from design.catalogue.products import Lidar
 from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
 from design.density.sweep import SweepLines
-from design.errors import TaskError
+from design.errors import BuildError, TaskError
 from design.motion import Motion, Shortest, StopAndGo, Sweep
 from design.objective.named_objectives import Objective, objective_of
+from design.shadow import Shadow
 from design.sphere.directions import EMPTY, equal_angle_grid, require_weight
 from design.sphere.regions import Field, field_of
 from design.task.task import LoadedTask
@@ -77,6 +78,19 @@ class Problem:
     def with_objective(self, objective: Objective) -> Problem:
         """The same scanner with another aim."""
         return replace(self, objective=objective)
+
+    def behind(self, shadow: Shadow) -> Problem:
+        """The same task for the beams that no part blocks that turns with the laser.
+
+        Raises:
+            BuildError: the shadow is of another number of beams.
+        """
+        if len(shadow.beams) != len(self.bearings_rad):
+            raise BuildError(
+                f"own_body.npz: made for a lidar of {len(shadow.beams)} beams, the task has {len(self.bearings_rad)}: "
+                "build the folder again"
+            )
+        return self.with_beams(self.bearings_rad[~shadow.beams], self.lines, self.sweep)
 
     def with_beams(
         self, bearings_rad: Float[ndarray, " beams"], lines: ScanLines, sweep: SweepLines | None = None

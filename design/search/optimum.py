@@ -72,6 +72,7 @@ class Optimum:
         """Names with units and values, for JSON."""
         return {
             "task": self.loaded.task.name,
+            "with_parts": False,
             "duration_s": self.loaded.task.motion.duration_s,
             "best": [
                 {f"{name}_deg": angle for name, angle in zip(NAMES, family.angles_deg, strict=True)}
@@ -102,6 +103,7 @@ class Optimum:
         result = self.search
         return [
             *self.table(),
+            *self._gain_lines(),
             self.long_title,
             f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s",
             *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
@@ -115,7 +117,7 @@ class Optimum:
             found.insert(
                 0, f"no setting of the grid sees all of the region: at least {percent(least)} of the weight is blind"
             )
-        seen = f"every direction that matters has beams within {np.degrees(self.problem.ball_rad):g} deg"
+        seen = f"without parts every direction that matters has beams within {np.degrees(self.problem.ball_rad):g} deg"
         if found or plain is None:
             return found or [seen]
         taken = "the last row of the table" if tabled else _told(plain)
@@ -126,13 +128,19 @@ class Optimum:
         ]
 
     def table(self) -> list[str]:
-        """The best families, a line each, and what the best buys against the standard alignments."""
-        lines = ["  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings"]
+        """The best families without parts, a line each, and where the best one is blind."""
+        lines = [
+            "search, without parts in the way:",
+            "  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings",
+        ]
         lines += [_row(family) for family in self.search.best]
         if self.search.plain is not None:
             lines.append(f"{_row(self.search.plain).rstrip()} [J alone, blind]")
-        lines += self.hole_lines()
-        best = self.search.best[0].score
+        return [*lines, *self.hole_lines()]
+
+    def _gain_lines(self) -> list[str]:
+        """What the best setting is worth against the reference mounts, all of them without parts."""
+        lines, best = [], self.search.best[0].score
         for name, other in self.standard.items():
             if self.problem.objective.name == "log":  # the one objective whose differences are ratios of densities
                 gain = math.exp(other.J - best.J)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray
 
 from design.arrays import Setting
@@ -19,13 +19,13 @@ from design.density.ball_count import ball_count
 from design.density.beams import scan_at
 from design.errors import BuildError
 from design.objective.ball_search import start_phases
-from design.objective.holes import NO_BLIND_WEIGHT, Hole, holes, percent
+from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import Problem
 from design.objective.score import Score, score
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.grid_classes import mirrors_of
-from design.shadow import AXIS_STEPS, Shadow
+from design.shadow import Shadow
 from design.sphere.directions import sample_set
 from design.task.angle_ranges import NAMES, AngleRanges
 from design.task.task import Limits
@@ -63,8 +63,7 @@ class Chosen:
     Attributes:
         family: its angles, and its J with what the parts hide.
         bare: its J without them.
-        hidden: share of all beams of a full scan that the parts hide.
-        holes: where the region is blind behind what turns along.
+        shadow: the beams that the parts block.
         bounded: settings that a bound was computed for.
         built: settings whose solids were made.
         refused: why settings cannot be built, one line each.
@@ -73,8 +72,7 @@ class Chosen:
 
     family: Family
     bare: Score
-    hidden: float
-    holes: tuple[Hole, ...]
+    shadow: Shadow
     bounded: int
     built: int
     refused: tuple[str, ...]
@@ -84,15 +82,10 @@ class Chosen:
         """What was chosen, and what was not and why."""
         setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
         lines = [
-            f"built ({setting}): J = {self.family.score.J:.4f} with its parts, which hide {percent(self.hidden)} of "
-            f"the beams ({self.bare.J:.4f} without); of {self.bounded} settings bounded, {self.built} made, "
-            f"{len(self.refused)} refused",
+            f"built ({setting}): J = {self.bare.J:.4f} without parts; of {self.bounded} settings bounded, {self.built} "
+            f"made, {len(self.refused)} refused",
             *(f"refused {reason}" for reason in self.refused),
         ]
-        lines += [f"with its parts {hole.words()}" for hole in self.holes]
-        blinded = self.family.score.blind_weight - sum(hole.weight for hole in self.holes)
-        if blinded > NO_BLIND_WEIGHT:
-            lines.append(f"with its parts about {percent(blinded)} of the weight is blind behind what stands still")
         if self.open:
             lines.append(f"{self.open} more families might be better with their parts: not made")
         return lines
@@ -130,7 +123,7 @@ def choose_with_parts(
             if isinstance(bound, Refused):
                 refused.append(f"{_shown(angles_deg)}: {bound.reason}")
                 continue
-            bare = score(_seen(problem, bound), np.radians(angles_deg))
+            bare = score(problem.behind(bound), np.radians(angles_deg))
             bounds.append((_blind(bare, avoid), bare.J, angles_deg))
         # the family's own setting stands upright: another one must be better by more than a thousandth
         for blind, J, angles_deg in sorted(bounds, key=lambda bound: (bound[0], round(bound[1], 3)))[:1]:
@@ -142,7 +135,7 @@ def choose_with_parts(
             if isinstance(shadow, Refused):
                 refused.append(f"{_shown(angles_deg)}: {shadow.reason}")
                 continue
-            hidden = float(shadow.hidden().mean())
+            hidden = shadow.share()
             if limits.max_blocked is not None and hidden > limits.max_blocked:
                 refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
                 continue
@@ -152,8 +145,7 @@ def choose_with_parts(
                 best.family.score.J,
             ):
                 chosen = replace(family, angles_deg=angles_deg, score=found)
-                left_blind = holes(_seen(problem, shadow), np.radians(angles_deg))
-                best = Chosen(chosen, family.score, hidden, left_blind, 0, 0, (), 0)
+                best = Chosen(chosen, family.score, shadow, 0, 0, (), 0)
     if best is None:
         raise BuildError(f"none of the {len(families)} best families can be built: {refused[0]}")
     return replace(best, bounded=bounded, built=built, refused=tuple(refused))
@@ -163,21 +155,26 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
     """J of a setting whose parts hide beams.
 
     What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
-    difference of two samplings on the same directions and phases, and so is what it blinds. `least` is told without it.
+    difference of two samplings on the same directions and phases, and so is what it blinds. `least` is then the lowest
+    count of the samples, if that is lower.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
     """
-    visible = ~shadow.beams
-    seen = _seen(problem, shadow)
+    seen = problem.behind(shadow)
     plain = score(seen, angles_rad)
-    if shadow.stator is None or not shadow.stator[visible].any():
+    if not shadow.partly().any():
         return plain
-    sampled = [_sampled(seen, angles_rad, shadow.stator[visible], index) for index in range(SETS)]
-    change = np.array([problem.objective.join(both[0]) - problem.objective.join(both[1]) for both, _ in sampled])
+    at_times = shadow.of(~shadow.beams)
+    sampled = [_sampled(seen, angles_rad, at_times, index) for index in range(SETS)]
+    change = np.array([problem.objective.join(both[0]) - problem.objective.join(both[1]) for both, _, _ in sampled])
     spread = float(4 * np.std(change, ddof=1) / SETS**0.5)
     return replace(
         plain,
         J=plain.J + float(change.mean()),
         J_error=float(np.hypot(plain.J_error, spread)),
-        blind_weight=plain.blind_weight + float(np.mean([blinded for _, blinded in sampled])),
+        least=min(plain.least, *(least for _, _, least in sampled)),
+        blind_weight=plain.blind_weight + float(np.mean([blinded for _, blinded, _ in sampled])),
     )
 
 
@@ -202,40 +199,36 @@ def equivalents(
     return list(dict.fromkeys([found[0], *inside]))
 
 
-def _seen(problem: Problem, shadow: Shadow) -> Problem:
-    """The same task for the beams that nothing hides that turns along."""
-    return problem.with_beams(problem.bearings_rad[~shadow.beams], problem.lines, problem.sweep)
-
-
 def _blind(found: Score, avoid_holes: bool) -> bool:
     """Whether a setting has holes that are to be avoided: it then comes after all that have none."""
     return avoid_holes and found.blind_weight > NO_BLIND_WEIGHT
 
 
 def _sampled(
-    problem: Problem, angles_rad: Setting, stator: Bool[ndarray, "beams angles"], index: int
-) -> tuple[Float[ndarray, "2 moments"], float]:
+    problem: Problem, angles_rad: Setting, shadow: Shadow, index: int
+) -> tuple[Float[ndarray, "2 moments"], float, int]:
     """Moments with and without what stands still, over one set of directions at one start phase, (2, moments).
 
-    And the share of the weight that it blinds.
+    And the share of the weight that it blinds, and the lowest count where a direction has a weight.
     """
     if problem.sweep is None:
         joint = problem.lines.angles_rad + start_phases(problem.lines.count, problem.lines.step_rad)[2 * index]
     else:
         joint = problem.sweep.angles_rad((index + 0.5) / SETS)
     scan = scan_at(problem.bearings_rad, joint, angles_rad)
-    column = np.rint(joint / (2 * np.pi / AXIS_STEPS)).astype(int) % AXIS_STEPS
-    free = ~stator[:, column].T.ravel()  # line after line, as the scan
-    out = []
+    free = shadow.free(joint).ravel()  # line after line, as the scan
+    out, lowest = [], []
     blinded = 0.0
     for moment in problem.objective.moments:
         samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
         counts = [ball_count(beams, samples.directions, problem.ball_rad) for beams in (scan[free], scan)]
         share = samples.weights / samples.weights.sum()
         blinded += moment.share * float(share @ ((counts[0] == 0) & (counts[1] > 0)))
+        if moment.share > 0:
+            lowest.append(problem.lines.repeats * int(counts[0][share > 0].min()))
         g = [moment.g(problem.lines.repeats * count) for count in counts]
         out.append([each.max() if moment.gathered == "highest" else share @ each for each in g])
-    return np.array(out).T, blinded
+    return np.array(out).T, blinded, min(lowest)
 
 
 def _shown(angles_deg: tuple[float, ...]) -> str:

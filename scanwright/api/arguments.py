@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from design.angles import AngleSet, load_angles
 from design.task.task import LoadedTask, load_task
 
+if TYPE_CHECKING:
+    from scanwright.pipeline.built import BuiltScanner
+
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
-"""A loaded task, the name of a shipped one, a file, or a table with the keys of a task file."""
+"""A loaded task, the name of a shipped one, a file, a build folder, or a table with the keys of a task file."""
 AnglesLike = AngleSet | str | Path
 """An angle set, or the file of one."""
 Say = Callable[[str], None]
@@ -19,6 +22,15 @@ Say = Callable[[str], None]
 
 def quiet(_line: str) -> None:
     """Progress that nobody asked for."""
+
+
+def as_built_scanner(task: TaskLike) -> BuiltScanner | None:
+    """Return what a build folder holds; None if the task is given in another form. Raises as `open_built`."""
+    if not isinstance(task, str | Path):
+        return None
+    from scanwright.pipeline.built import is_build_folder, open_built
+
+    return open_built(Path(task)) if is_build_folder(Path(task)) else None
 
 
 def as_task(task: TaskLike) -> LoadedTask:

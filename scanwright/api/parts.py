@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
     """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
 
-    Nothing is done where the folder already holds the build of this very task.
+    Nothing is done if the folder already holds the build of this very task.
+
+    Returns:
+        The build. Every file is written even if checks of the parts fail: do not make the parts if `failed` is not
+        empty.
 
     Raises:
         InstallError: the CAD kernel is not installed.

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from scanwright.api.arguments import Say, TaskLike, as_task, quiet
+import numpy as np
+
+from scanwright.api.arguments import Say, TaskLike, as_built_scanner, as_task, quiet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +45,7 @@ def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
 
 def evaluate(
     task: TaskLike,
-    angles_deg: Sequence[float],
+    angles_deg: Sequence[float] | None = None,
     *,
     pole: str | None = None,
     lever: str | None = None,
@@ -52,14 +54,15 @@ def evaluate(
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
 
     Args:
-        task: what the scanner shall see.
-        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser.
+        task: what the scanner shall see, or a build folder: then `Evaluation.as_built` is with its parts.
+        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; those of the build folder if none are given.
         pole: "WIDTH_MM,HEIGHT_MM,RANGE_M" of a thin upright pole, to tell the chance that it is hit.
         lever: "X_MM,Y_MM,RANGE_M": the optical centre off the axis, as seen at a range.
         say: is told what is being done.
 
     Raises:
         TaskError: the task is malformed, these are not four angles, or no direction has a weight.
+        BuildError: a file of the build folder is gone or was edited.
 
     Example:
         >>> import scanwright as sw
@@ -69,21 +72,29 @@ def evaluate(
     """
     from design.evaluation import evaluation
 
-    loaded = as_task(task)
-    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg), pole, lever, say)
+    built = as_built_scanner(task)
+    loaded = as_task(task) if built is None else built.loaded
+    if built is not None and (angles_deg is None or np.allclose(np.radians(angles_deg), built.setting_rad, atol=1e-9)):
+        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, say, built.shadow)
+    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, say)
 
 
 def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:
     """Put the optimum of a task beside the usual mounts, the scanner for little money, and ready-made ones.
 
+    Every row is without parts, but that of a build folder, which is the first one if the task is given as its folder.
+
     Raises:
         TaskError: as for `optimise`.
+        BuildError: a file of the build folder is gone or was edited.
     """
     from design.evaluation.comparison import compare
     from design.search.optimum import find_optimum
 
-    optimum = find_optimum(as_task(task), say)
-    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
+    built = as_built_scanner(task)
+    optimum = find_optimum(as_task(task) if built is None else built.loaded, say)
+    setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say, setting)
 
 
 def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:

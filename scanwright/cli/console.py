@@ -23,6 +23,9 @@ import typer
 from design.errors import require
 
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
+TaskOrBuild = Annotated[
+    Path, typer.Argument(metavar="TASK", help="Task file, name of a shipped task, or build folder (with its parts).")
+]
 BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
 AllowOrigin = Annotated[
     list[str] | None,

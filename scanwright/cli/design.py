@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cad.kernel import require_kernel
-from scanwright.cli.console import AsJson, Progress, TaskFile, hint, show, show_json
+from scanwright.cli.console import AsJson, Progress, TaskFile, TaskOrBuild, hint, show, show_json
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
@@ -48,8 +48,13 @@ def optimise(
 
 @app.command()
 def evaluate(
-    task: TaskFile,
-    angles: Annotated[str, typer.Option(metavar="A_ROT,B_ROT,A_LASER,B_LASER", help="The setting, in degrees.")],
+    task: TaskOrBuild,
+    angles: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A_ROT,B_ROT,A_LASER,B_LASER", help="The setting, in degrees; default: that of a build folder."
+        ),
+    ] = None,
     cloud: Annotated[
         Path | None, typer.Option(metavar="FILE.ply", help="Write the simulated beams as points on the unit sphere.")
     ] = None,
@@ -64,11 +69,18 @@ def evaluate(
     as_json: AsJson = False,
 ) -> None:
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
+    import numpy as np
+
     from design.evaluation.evaluation import angles_in
     from scanwright import api
+    from scanwright.api.arguments import as_built_scanner
 
-    loaded, angles_deg = api.load_task(task), angles_in(angles)
-    found = api.evaluate(loaded, angles_deg, pole=pole, lever=lever, say=Progress())
+    built = as_built_scanner(task)
+    if built is None and angles is None:
+        raise typer.BadParameter("missing: only a build folder has angles of its own", param_hint="--angles")
+    loaded = api.load_task(task) if built is None else built.loaded
+    found = api.evaluate(task, None if angles is None else angles_in(angles), pole=pole, lever=lever, say=Progress())
+    angles_deg = np.degrees(found.angles_rad).round(9).tolist()
     if cloud is not None:
         from firmware_io.clouds.ply import write_points
 
@@ -123,7 +135,7 @@ def accuracy(
 
 @app.command()
 def compare(
-    task: TaskFile,
+    task: TaskOrBuild,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder that holds one folder of comparisons per task.")
     ] = Path("out/compare"),
@@ -131,10 +143,12 @@ def compare(
 ) -> None:
     """Put the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
     from scanwright import api
+    from scanwright.api.arguments import as_built_scanner
     from scanwright.pipeline.comparison import write_comparison
 
-    loaded = api.load_task(task)
-    found = write_comparison(loaded, out / loaded.task.name, Progress())
+    built = as_built_scanner(task)
+    loaded = api.load_task(task) if built is None else built.loaded
+    found = write_comparison(loaded, out / loaded.task.name, Progress(), built)
     if as_json:
         show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows]})
     else:

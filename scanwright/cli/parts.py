@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,7 +27,7 @@ from scanwright.cli.console import (
 from scanwright.cli.help import Commands
 
 if TYPE_CHECKING:
-    from cad.checks.check import Severity
+    from cad.checks.check import Check, Severity
 
 app = Commands("Parts")
 
@@ -41,7 +42,7 @@ def build(
         bool, typer.Option("--check", help="TASK is a build folder: build it again elsewhere, compare every file.")
     ] = False,
 ) -> None:
-    """Make everything of a task: angles, parts, drawings, parts list, frame chain, pictures, into DIR/<task>/."""
+    """Make everything of a task: angles, parts, drawings, pictures, into DIR/<task>/. Exit 1 if a check fails."""
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
@@ -56,9 +57,14 @@ def build(
     except KeyboardInterrupt as stop:
         complain("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
+    _complain_of(built.checks)
     show(built.lines(in_full=voice() is Voice.VERBOSE))
     warn(built.misfits)
-    hint(f"next: open {built.folder / 'report.html'}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
+    report = built.folder / "report.html"
+    if built.failed:
+        hint(f"next: read the failed checks in {report}, and change the task")
+        raise typer.Exit(1)
+    hint(f"next: open {report}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
 
 
 @app.command()
@@ -72,18 +78,18 @@ def report(out: BuildFolder) -> None:
 
 @app.command()
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
-    """Check the parts of a build folder: room, beams, loads, print. Exit 1 where one fails."""
+    """Check the parts of a build folder: room, beams, loads, print. Exit 1 if one fails."""
     from scanwright import api
 
     checks = api.check(out, say=Progress())
     warn(api.load_task(out / "task.toml").misfits())
-    failed = [entry for entry in checks if entry.severity == "error"]
+    _complain_of(checks)
     if as_json:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
     else:
         show(f"{entry.severity:7} {entry.message}" for entry in checks)
         print(_tally(Counter(entry.severity for entry in checks)))
-    raise typer.Exit(1 if failed else 0)
+    raise typer.Exit(1 if any(entry.severity == "error" for entry in checks) else 0)
 
 
 @app.command()
@@ -114,6 +120,14 @@ def study(
     except KeyboardInterrupt:
         complain("stopped; the same command goes on where it was")
         raise typer.Exit(130) from None
+
+
+def _complain_of(checks: Sequence[Check]) -> None:
+    """Print the failed checks on standard error, before any result."""
+    from cad.checks.check import failure_lines
+
+    for line in failure_lines(checks):
+        complain(line)
 
 
 def _tally(found: Counter[Severity]) -> str:

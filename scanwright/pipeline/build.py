@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cad.checks.check import Check, failed_of, read_checks
 from cad.kernel import require_kernel
 from design.angles import standard_settings
 from design.concurrency.processes import Packed, processes_beside
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from cad.assembly.assembly import Assembly
     from cad.files.part_files import PartReport, PartsResult
     from cad.findings import PartFinding
+    from design.evaluation.as_built import AsBuilt
     from design.evaluation.metres import PlaneFigures
     from design.left_out import LeftOut
     from design.scanner import Scanner
@@ -43,12 +45,14 @@ class Made:
     Attributes:
         optimum: the search.
         chosen: the setting that is best with its parts: the one that was built.
+        as_built: what it sees, without the beams that its parts block.
         findings: what a person should know before the parts are made.
         planes: what one full scan leaves on ground, ceiling and walls of the task.
     """
 
     optimum: Optimum
     chosen: Chosen
+    as_built: AsBuilt
     findings: tuple[PartFinding, ...]
     planes: tuple[PlaneFigures, ...]
 
@@ -61,15 +65,22 @@ class Build:
         folder: where it is.
         files: its files, relative to the folder.
         warnings: what the task can do, but not as well as its author may think.
-        made: what was done; None where the folder was current and there was nothing to do.
+        checks: of its parts, as in `checks.json`.
+        made: what was done; None if the folder was current and there was nothing to do.
         misfits: products that the printed parts do not fit, and why, in lines.
     """
 
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
+    checks: tuple[Check, ...]
     made: Made | None
     misfits: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """The checks that failed; the parts are safe to make only if there are none."""
+        return failed_of(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
         """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
@@ -78,7 +89,8 @@ class Build:
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
-            *(f"one full scan, {plane.words()}" for plane in self.made.planes),
+            *self.made.as_built.lines(),
+            *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
             *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
             f"wrote {len(self.files)} files to {self.folder}",
@@ -113,7 +125,7 @@ def _gathered(findings: Sequence[PartFinding]) -> list[str]:
 
 
 def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
-    """Make the build folder of a task, unless it is current.
+    """Make the build folder of a task, unless it is current. Failed checks do not raise: see `Build.failed`.
 
     Args:
         loaded: the task.
@@ -132,7 +144,8 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
-    return Build(target, listed_files(target), tuple(loaded.warnings()), made, tuple(loaded.misfits()))
+    checks = read_checks(target / "checks.json")
+    return Build(target, listed_files(target), tuple(loaded.warnings()), checks, made, tuple(loaded.misfits()))
 
 
 def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
@@ -238,6 +251,7 @@ def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from cad.files.part_files import write_files
+    from design.evaluation.as_built import as_built
     from design.evaluation.metres import on_planes
     from design.search.optimum import find_optimum
 
@@ -259,9 +273,11 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         _at(say, "pictures")("drawing the density")
         standard = standard_settings()
-        settings = {f"{loaded.task.name}: J = {best.score.J:.3f}": best.angles_rad}
-        settings |= {f"{name}: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()}
-        density_picture(work / "density.png", problem, settings, optimum.title)
+        settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
+        settings |= {
+            f"{name}, without parts: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()
+        }
+        density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
         parts = written()
         exported, drawn = (
             begin(_exported, scanner, parts.result, work, say),
@@ -275,5 +291,6 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         write_manifest(work, asked, [asdict(part) for part in parts.parts])
         _at(say, "report")("writing report.html")
         records.write_report(work, begin)
-    planes = on_planes(loaded, problem, best.angles_rad)
-    return Made(optimum, chosen, (*parts.findings, *findings), planes)
+    planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
+    seen = as_built(problem, best.angles_rad, chosen.shadow, best.score, optimum.standard)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes)

@@ -11,6 +11,7 @@ from design.evaluation.comparison_picture import compare_picture
 from design.evaluation.comparison_table import notes, table, write_csv
 from design.search.optimum import Optimum, find_optimum
 from design.task.task import LoadedTask
+from scanwright.pipeline.built import BuiltScanner
 from scanwright.pipeline.folder import report_folder
 
 
@@ -32,8 +33,10 @@ class Comparison:
         ]
 
 
-def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None]) -> Comparison:
-    """Compare, and write `compare.csv`, `compare.png` and `compare.svg`.
+def write_comparison(
+    loaded: LoadedTask, target: Path, say: Callable[[str], None], built: BuiltScanner | None = None
+) -> Comparison:
+    """Compare, and write `compare.csv`, `compare.png` and `compare.svg`; `built` is a build of the task.
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
@@ -41,7 +44,8 @@ def write_comparison(loaded: LoadedTask, target: Path, say: Callable[[str], None
     """
     with report_folder(target) as folder:
         optimum = find_optimum(loaded, say)
-        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], say)
+        setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
+        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], say, setting)
         write_csv(folder / "compare.csv", rows)
         compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")
     return Comparison(optimum, rows, target)

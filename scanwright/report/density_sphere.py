@@ -21,6 +21,7 @@ from design.arrays import Array
 from design.evaluation.coverage import mean_density_at
 from design.frames import R_world_rot
 from design.objective.problem import Problem
+from design.shadow import Shadow
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
 
@@ -79,7 +80,9 @@ class DensitySphere:
         return {"axis": list(self.axis_world), "look_deg": list(_look(*self.middle)), "views": views}
 
 
-def density_sphere(problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float) -> DensitySphere:
+def density_sphere(
+    problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float, shadow: Shadow | None = None
+) -> DensitySphere:
     """Density of the scanner and of the standard alignments on one scale, J over the axes, and where the axis points.
 
     Args:
@@ -87,12 +90,20 @@ def density_sphere(problem: Problem, angles: AngleSet, axes: Array | None, step_
         angles: what was built.
         axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
         step_deg: of the grid that was searched.
+        shadow: beams that the parts of the scanner block; None if they are not known.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
     """
     setting = mounting_rad(angles)
     directions, shape = _directions()
     weight = problem.field.weight_at(directions).reshape(shape)
     masked = problem.field.masked_at(directions).reshape(shape)
-    maps = _densities(problem, {"this scanner": setting} | standard_settings(), directions, weight, masked)
+    own = f"this scanner, {'without' if shadow is None else 'with'} parts"
+    densities = {own: mean_density_at(problem, setting, directions, shadow)}
+    for name, mount in standard_settings().items():
+        densities[f"{name}, without parts"] = mean_density_at(problem, mount, directions)
+    maps = _drawn(densities, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
@@ -120,12 +131,8 @@ def _directions() -> tuple[Array, tuple[int, int]]:
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3), t.shape
 
 
-def _densities(
-    problem: Problem, settings: dict[str, Array], directions: Array, weight: Array, masked: NDArray[np.bool_]
-) -> list[SphereMap]:
-    maps = {
-        name: mean_density_at(problem, angles, directions).reshape(weight.shape) for name, angles in settings.items()
-    }
+def _drawn(densities: dict[str, Array], weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
+    maps = {name: density.reshape(weight.shape) for name, density in densities.items()}
     highest = max(float(density.max()) for density in maps.values())
     scale = LogNorm(max(1.0, highest / DARKEST), max(highest, 2.0), clip=True)
     words = f"{scale.vmin:,.0f} beams or fewer", f"{scale.vmax:,.0f}"

@@ -16,6 +16,7 @@ from design.arrays import Array
 from design.concurrency.processes import Begin, in_turn
 from design.errors import BuildError
 from design.evaluation.metres import on_planes
+from design.objective.holes import percent
 from design.shadow import load_own_body
 from design.task.task import load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
@@ -72,6 +73,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
         "any_J": planes is not None and bool(np.isfinite(planes[:, 2]).any()),
         "checks": checks,
+        "share": percent,
         "bom": bom,
         "steps": read(
             folder / "assembly.md",
@@ -87,6 +89,8 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         **on_task(),
         **on_bodies(),
     }
+    seen = None if facts["answer"] is None else facts["answer"].as_built.own
+    facts["J"], facts["J_error"] = (angles.J, angles.J_error) if seen is None else (seen.J, seen.J_error)
     try:
         return _environment().get_template("page.html.j2").render(facts)
     except UndefinedError as error:
@@ -111,15 +115,18 @@ def _on_task(folder: Path) -> dict[str, Any]:
     scanner = [] if assembly is None else about_centre(assembly, angles)
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
-    planes = read(folder / "search.csv", _planes)
-    found, sphere = answer(problem, angles), density_sphere(problem, angles, axes, task.angles.step_deg)
+    planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_own_body)
+    shadow = None if own_body is None else own_body[0]
+    found = answer(problem, angles, shadow)
+    sphere = density_sphere(problem, angles, axes, task.angles.step_deg, shadow)
+    figures = on_planes(loaded, problem, setting, shadow)
     return {
         "objective": task.density.objective,
         "ball_deg": task.density.ball_radius_deg,
         "answer": found,
         "sphere": sphere,
-        "room": room_picture(task, folder, problem, setting, sphere, scanner),
-        "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting)),
+        "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
+        "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), figures),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 

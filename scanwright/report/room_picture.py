@@ -20,10 +20,11 @@ from PIL import Image
 from scipy.ndimage import binary_dilation
 
 from design.arrays import Array, Setting
-from design.evaluation.coverage import mean_density_at
+from design.evaluation.coverage import UNSEEN, mean_density_at
 from design.frames import Rx, Ry, Rz
 from design.objective.problem import Problem
 from design.scene import ray_caster
+from design.shadow import Shadow
 from design.task.shapes import MeshRegion
 from design.task.task import Task
 from scanwright.report.check_pictures import PlacedBody
@@ -38,7 +39,6 @@ SCALE = 1, 99  # percentiles of the density on the walls, between which the colo
 INK, LIGHT, MASKED, HATCH, ROBOT = (np.array([float(grey)] * 3) for grey in (17, 255, 221, 119, 150))
 HATCH_PX = 16
 LITTLE = 0.02  # of what counts below the horizon: the floor is cut away
-UNSEEN = 1e-9  # mean beams in a ball
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,13 @@ class RoomPicture:
 
 
 def room_picture(
-    task: Task, folder: Path, problem: Problem, setting: Setting, sphere: DensitySphere, scanner: Sequence[PlacedBody]
+    task: Task,
+    folder: Path,
+    problem: Problem,
+    setting: Setting,
+    sphere: DensitySphere,
+    scanner: Sequence[PlacedBody],
+    shadow: Shadow | None = None,
 ) -> RoomPicture:
     """Draw it.
 
@@ -80,13 +86,18 @@ def room_picture(
         problem: the same as numbers.
         setting: (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
         sphere: says where what counts lies.
-        scanner: its bodies about the optical centre; none where they are not known.
+        scanner: its bodies about the optical centre; none if they are not known.
+        shadow: beams that they block; None if that is not known.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
     """
     looks_up = sphere.below < LITTLE
     room, words = room_about(task)
     camera = pinhole_behind(room, np.array(sphere.middle), looks_up)
     rays = camera.rays()
-    picture, low, high = _painted(problem, setting, room, camera, walls_behind(room, camera, rays))
+    walls = walls_behind(room, camera, rays)
+    picture, low, high = _painted(problem, setting, shadow, room, camera, walls)
     level_m = room.high[2] if looks_up else room.low[2]  # of the ceiling, where the floor is cut away
     post = PlacedBody(_post(level_m), False, (0.35, 0.35, 0.35))
     _add_bodies(picture, camera, rays, [*scanner, post, *_robot(task, folder)])
@@ -97,13 +108,13 @@ def room_picture(
 
 
 def _painted(
-    problem: Problem, setting: Setting, room: Room, camera: Pinhole, walls: Walls
+    problem: Problem, setting: Setting, shadow: Shadow | None, room: Room, camera: Pinhole, walls: Walls
 ) -> tuple[Array, float, float]:
     """Colour of each pixel, shape (rows, columns, 3), NaN beside the room, and the density of darkest and brightest."""
     inside, size = walls.inside, camera.size
     points = walls.points_m[inside]
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
-    density = mean_density_at(problem, setting, directions)
+    density = mean_density_at(problem, setting, directions, shadow)
     weight = problem.field.weight_at(directions)
     masked = problem.field.masked_at(directions)
     seen = (density > UNSEEN) & ~masked

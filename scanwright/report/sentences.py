@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from design.angles import AngleSet
 from design.evaluation.metres import PlaneFigures, rounded
 from design.motion import Motion
+from design.objective.holes import percent
 from scanwright.report.answer import BuildAnswer
 
 AT_M = 3.0  # from the scanner, where a ball of directions is told as a disc
@@ -37,34 +38,34 @@ def turns(motion: Motion | None) -> str:
 
 
 def _is(angles: AngleSet, answer: BuildAnswer) -> str:
-    points = answer.lines * answer.beams
+    blocked = answer.as_built.blocked
+    parts = "" if blocked is None else f". Its own parts block {percent(blocked)} of them"
     return (
-        f"The lidar {angles.sensor}, turned by the servo {angles.servo} {turns(angles.motion)}, measures {points:,} "
-        f"points: {answer.lines:,} lines of {answer.beams:,}."
+        f"The lidar {angles.sensor}, turned by the servo {angles.servo} {turns(angles.motion)}, sends "
+        f"{answer.lines * answer.beams:,} beams: {answer.lines:,} lines of {answer.beams:,}{parts}."
     )
 
 
 def _sees(answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) -> list[str]:
     said = [f"{_capital(figures.words())}." for figures in planes]
-    if answer.holes:
-        return [*said, f"It is {'; and '.join(answer.holes)}."]
+    if blind := answer.as_built.own.blind:
+        return [*said, f"It is {'; and '.join(blind)}."]
     if planes:
         return [*said, "No direction that counts is left out."]
     width_cm = 100 * ball_m * AT_M
     return [
         f"Wherever it counts, a disc {rounded(width_cm)} cm wide, {AT_M:g} m away and facing the scanner, gets "
-        f"{answer.own.least:,} of them or more."
+        f"{answer.as_built.own.least:,} of them or more."
     ]
 
 
 def _is_worth(answer: BuildAnswer) -> list[str]:
-    factors = [(each.factor, each.name) for each in answer.standard if each.factor is not None]
-    if not factors:
+    first = answer.as_built.mounts[0]
+    if first.factor is None:
         return []
-    factor, name = min(factors)
     return [
-        f"Where it counts there are {factor:.2f} times as many as with {name}, the better of the two usual mounts and "
-        "drawn without any parts in its way (geometric mean)."
+        f"Where it counts there are {first.factor:.2f} times as many beams, {answer.as_built.parts}, as with "
+        f"{first.name}, the better of the two usual mounts and taken without parts (geometric mean)."
     ]
 
 

@@ -7,6 +7,7 @@ from threading import Thread
 
 from design.concurrency.processes import processes_beside
 from design.errors import ScanwrightError
+from design.evaluation.as_built import as_built
 from design.search.optimum import Optimum, find_optimum
 from scanwright.pipeline.build import setting_built
 from scanwright.studio.panel.controls import Controls, put
@@ -63,7 +64,9 @@ class Searching:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)
-            self._say("; ".join([found, *chosen.lines(), holes]))
+            setting = chosen.family.angles_rad
+            seen = as_built(optimum.problem, setting, chosen.shadow, chosen.family.score, optimum.standard)
+            self._say("; ".join([found, *chosen.lines(), *seen.lines(), holes]))
         except ScanwrightError as error:
             self._say(str(error), bad=True)
         finally:

@@ -16,8 +16,7 @@ from cad.assembly.shadow import PartsWorkshop, at_setting
 from cad.kernel import require_kernel
 from design.arrays import Array
 from design.errors import BuildError, ScanwrightError, TaskError
-from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps
+from design.evaluation.as_built import seen_of
 from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
@@ -101,17 +100,17 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     setting, score = chosen.family.angles_rad, chosen.family.score
     made = bench.made(setting)  # known by now
     assert not isinstance(made, Refused)
-    seen = problem.with_beams(problem.bearings_rad[~made.shadow.beams], problem.lines, problem.sweep)
+    seen = seen_of(problem, setting, score, made.shadow)
     values = {
         "J": score.J,
         "density_gain": density_gain(problem, found["standard_J"], score.J),
         **of_lidar(loaded.lidar),
         **per_ball(beams_per_ball(problem.objective, score.J), made.values["cost_usd"]),
-        "blind_fraction": coverage(seen, setting).blind_fraction,
-        "line_gap_deg": gaps(problem, setting).line_gap_deg,
+        "blind_fraction": seen.blind_fraction,
+        "line_gap_deg": seen.line_gap_deg,
         "period_s": loaded.task.motion.duration_s,
         "shortest_period_s": _shortest(problem, loaded, chosen.family),
-        "hidden_fraction": chosen.hidden,
+        "hidden_fraction": made.shadow.share(),
         **made.values,
     }
     return {

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cad.checks.check import failure_lines
 from cad.kernel import require_kernel
 from design.arrays import Array
 from design.atomic_file import place_in
@@ -67,8 +68,9 @@ def run_study(
     yield run.tally.line()
     for combination, loaded in run.winners():
         target = place_in(folder, combination.name, BuildError)
-        made = build_task(loaded, target, say).made
-        yield f"built {target}" if made else f"{target}: nothing has changed, no work to do"
+        built = build_task(loaded, target, say)
+        yield f"built {target}" if built.made else f"{target}: nothing has changed, no work to do"
+        yield from (f"{target}: {line}" for line in failure_lines(built.checks))
     if (folder / "study.parquet").exists():
         yield f"wrote study.csv, study.parquet and front.png to {folder}"
     else:

@@ -1,4 +1,4 @@
-"""What the studio tells of a setting, fast enough to follow a hand.
+"""What the studio tells of a setting, without parts, fast enough to follow a hand.
 
 While an angle is dragged J is the real one, mean of g over true counts, on fewer nodes: it carries a larger error, and
 that is shown. When the hand rests it is `design.objective.score.score`, the number that `scanwright evaluate` prints.

@@ -18,14 +18,14 @@ NUMBER = f"{CELL};text-align:right;font-variant-numeric:tabular-nums"
 
 
 def facts_html(facts: Facts, log: bool) -> str:
-    """The facts of the present setting; `log`: J is the mean of -ln(1 + d), whose differences are ratios."""
+    """The facts of the present setting, without parts; `log`: J is the mean of -ln(1 + d), differences are ratios."""
     state = "exact" if facts.exact else "dragging"
     rows = [
-        ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}"),
+        ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}, without parts"),
         *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.standard.items()),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),
-        ("never seen", percent(facts.blind_weight), "of the weight"),
+        ("never seen", percent(facts.blind_weight), "of the weight, without parts"),
         ("shortest turn", _period(facts), f"{facts.density} per ball"),
     ]
     cells = "".join(
@@ -70,7 +70,7 @@ def scale_html(highest: float) -> str:
     return (
         f'<div style="font-size:11px;margin:4px 12px"><div style="{bar}"></div>'
         f'<div style="display:flex;justify-content:space-between"><span>{lowest:,.0f}</span>'
-        f"<span>mean beams per ball, logarithmic</span><span>{highest:,.0f}</span></div>"
+        f"<span>mean beams per ball, without parts, logarithmic</span><span>{highest:,.0f}</span></div>"
         "<div>pale: none; white edge: what matters; red: hidden by the robot; green: axis and fan</div></div>"
     )
 

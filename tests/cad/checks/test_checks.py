@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import cad.checks.run as room
 from cad.assembly import masses
-from cad.checks.check import at_least, at_most, checks_text
+from cad.checks.check import at_least, at_most, checks_text, failed_of, failure_lines, read_checks
 from cad.checks.clearance import together_check, turning_check
 from cad.checks.islands import islands_check, islands_of
 from cad.checks.mechanics import mechanics_checks
@@ -26,6 +26,7 @@ from cad.layout.direct.sizing import direct_stack
 from cad.solids import box, location, upright
 from design.angles import Angles, AngleSet
 from design.catalogue.catalogue import load_catalogue
+from design.errors import BuildError
 from design.motion import Sweep
 from design.scanner import scanner_of
 
@@ -292,6 +293,26 @@ def test_at_a_limit_is_within_it():
     }  # fmt: skip
 
 
+def test_checks_are_read_back_and_the_failed_ones_told_by_their_severity(tmp_path):
+    checks = [at_most("k", 1.0, 2.0, "mm", "w", "error"), at_most("k", 3.0, 2.0, "mm", "w", "what")]
+    (tmp_path / "checks.json").write_text(checks_text(checks))
+    assert read_checks(tmp_path / "checks.json") == tuple(checks)
+    assert failed_of(checks) == (checks[1],)
+    assert failure_lines(checks) == [
+        "check failed: w: what: 3 mm, over 2",
+        "1 of 2 checks failed: do not make these parts",
+    ]
+    assert failure_lines(checks[:1]) == []
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", '{"checks": [{"severity": "error"}]}', '{"checks": 1}'])
+def test_a_file_that_no_build_wrote_is_an_error(content, tmp_path):
+    if content is not None:
+        (tmp_path / "checks.json").write_text(content)
+    with pytest.raises(BuildError, match=r"checks\.json: not as a build writes it"):
+        read_checks(tmp_path / "checks.json")
+
+
 TASK = """name = "small"
 sensor = "URG-04LX"
 servo = "MX-64R"
@@ -328,8 +349,12 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
 
     answer = [at_least("clearance", 0.1, 0.4, "mm", "a and b", "gap")]
     monkeypatch.setattr(room, "check_scanner", lambda _scanner, _say: answer)
-    code, out, _ = command("check", tmp_path, "--json")
+    code, out, complaints = command("check", tmp_path, "--json")
     assert code == 1
+    assert complaints == [
+        "scanwright: check failed: a and b: gap: 0.1 mm, under 0.4",
+        "scanwright: 1 of 1 checks failed: do not make these parts",
+    ]
     failed = [entry for entry in json.loads(out)["checks"] if entry["severity"] == "error"]
     assert [entry["where"] for entry in failed] == ["a and b"]
     code, _, complaint = command("check", tmp_path / "nowhere")

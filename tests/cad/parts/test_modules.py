@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 from quick_tests import samples
-from scanners import GROUND_AHEAD, RING, UPRIGHT, scanner_at
+from scanners import GROUND_AHEAD, RING, ROLLING, UPRIGHT, scanner_at
 
 from cad.assembly.make import make_parts
 from cad.assembly.shadow import PartsWorkshop
@@ -15,6 +16,7 @@ from cad.assembly.steps import steps_of
 from cad.checks.clearance import clearance_checks
 from cad.checks.remarks import left_out_of
 from cad.checks.retention import hanging_on, retention_checks, worst_shares
+from cad.checks.run import module_checks
 from cad.files.bom import items_of
 from cad.layout.all_joints import joints_of
 from cad.layout.deck import FOOT_THICKNESS
@@ -44,6 +46,7 @@ def bought(assembly):
 COVERED_ON_TRIPOD = scanner_for(GROUND_AHEAD, Modules(ring_cover=True, tripod_foot=True))
 HOMED = [scanner_for(angles, Modules(homing_flag=True)) for angles in (GROUND_AHEAD, UPRIGHT)]
 SMALL = {"slip_ring": None, "sensor": "URG-04LX", "servo": "AX-12A"}  # soon made
+PRINTED = {"slip_ring": None, "sensor": "STL27L", "servo": "XL430-W250"}
 
 
 @pytest.fixture(scope="module")
@@ -273,3 +276,23 @@ def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
     scanner = on_bed_of(scanner_at(setting_deg, **SMALL), (60.0, 60.0, 60.0))
     answer = PartsWorkshop(scanner).shadow(np.radians(setting_deg))
     assert isinstance(answer, Refused) and "as it is printed: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
+
+
+@pytest.mark.parametrize(
+    ("module", "options", "why"),
+    [
+        ("homing_flag", PRINTED, "neither ring nor bearing"),
+        ("homing_flag", {"slip_ring": "SRC022A-6"}, "the tower around the capsule"),
+        ("ring_cover", PRINTED, "no slip ring"),
+        ("ring_cover", {"slip_ring": "SRC022A-6"}, "the tower is around the ring"),
+    ],
+)
+def test_a_module_that_the_task_requires_and_that_has_no_place_is_an_error(module, options, why):
+    angles = ROLLING if options["slip_ring"] else (0, 0, 0, 50)
+    scanner = scanner_at(angles, modules=Modules(**{module: True}), **options)
+    layout = layout_of(scanner)
+    without = replace(layout, scanner=replace(scanner, modules=NO_MODULES))
+    found = [module_checks(each.scanner, left_out_of(SimpleNamespace(layout=each))) for each in (layout, without)]
+    (failed,), none = found
+    assert (failed.severity, failed.kind, failed.where) == ("error", "module", module) and why in failed.message
+    assert none == []

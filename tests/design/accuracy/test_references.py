@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from design.objective.counted import counted_J
 from design.accuracy.methods import METHODS
 from design.accuracy.reference import is_smooth, reference, smooth_reference
+from design.objective.counted import counted_J
 from design.objective.problem import problem_of
 from design.task.task import load_task
 

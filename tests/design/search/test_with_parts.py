@@ -107,7 +107,7 @@ def test_the_equivalent_that_hides_least_is_built():
     assert away is not None and workshop.bound(np.radians(towards)).beams.any()
     chosen = choose_with_parts(p, (family(p, *towards),), AngleRanges(), Limits(), workshop, lambda _: None)
     assert chosen.family.angles_deg == away
-    assert chosen.hidden == 0 and chosen.family.score.J == pytest.approx(chosen.bare.J, abs=1e-9)
+    assert chosen.shadow.share() == 0 and chosen.family.score.J == pytest.approx(chosen.bare.J, abs=1e-9)
     assert chosen.bounded == 2 and chosen.built == 1
 
 

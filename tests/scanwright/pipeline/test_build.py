@@ -14,6 +14,7 @@ import pytest
 from imports import ROOT
 from patience import BOUND_S
 
+import scanwright.api as sw
 from cad.findings import PartFinding
 from design.angles import load_angles
 from design.errors import BuildError
@@ -23,7 +24,7 @@ from scanwright.cli.app import run as scanwright_command
 from scanwright.pipeline import build as pipeline
 from scanwright.pipeline.build import Build, Made
 from scanwright.pipeline.folder import fresh_folder
-from scanwright.pipeline.manifest import first_difference, is_current, require_as_built
+from scanwright.pipeline.manifest import enter, first_difference, is_current, require_as_built
 
 METAL = ("servo_shaft", "journal_sleeve", "counterweight")
 PARTS = ("alignment_linkage", "slip_ring_adapter", "bearing_cage", "base_mount", *METAL)
@@ -110,6 +111,28 @@ def test_a_second_run_does_no_work_and_says_so(tilted, monkeypatch, capsys):
     build(monkeypatch, tilted / "task.toml", "--out", tilted.parent)
     assert "nothing has changed" in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in tilted.rglob("*")} == before
+
+
+def test_a_build_whose_checks_fail_says_so_first_and_exits_with_1(tilted, tmp_path, command):
+    folder = shutil.copytree(tilted, tmp_path / "tilted")
+    words = "build", folder / "task.toml", "--out", tmp_path
+    code, _, complaints = command(*words)
+    assert code == 0 and len(complaints) == 1 and complaints[0].startswith("next: open ")
+    built = sw.build(folder / "task.toml", tmp_path)
+    assert built.failed == () and len(built.checks) > 20
+
+    checks = json.loads((folder / "checks.json").read_text())
+    checks["checks"][3] |= {"severity": "error", "message": "all is well"}  # the severity decides, not the words
+    (folder / "checks.json").write_text(json.dumps(checks))
+    enter(folder, "checks.json")
+    code, out, complaints = command(*words)
+    assert code == 1 and out == f"{folder}: nothing has changed, no work to do ({len(FILES) - 1} files)\n"
+    assert complaints == [
+        "scanwright: check failed: all is well",
+        f"scanwright: 1 of {len(built.checks)} checks failed: do not make these parts",
+        f"next: read the failed checks in {folder / 'report.html'}, and change the task",
+    ]
+    assert [check.message for check in sw.build(folder / "task.toml", tmp_path).failed] == ["all is well"]
 
 
 def test_the_resolved_task_builds_the_same(tilted):
@@ -385,13 +408,13 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     found = [PartFinding("turn_from_metal", "note", "shaft", "shaft: have it turned")]
     found += [PartFinding("unverified", "warning", "UTM", f"UTM: {v} is not verified", v) for v in ("a = 1", "b = 2")]
     told = SimpleNamespace(table=list, lines=list)
-    made = Made(told, told, tuple(found), ())
-    gathered = Build(tmp_path, ("one",), ("slow",), made).lines()
+    made = Made(told, told, told, tuple(found), ())
+    gathered = Build(tmp_path, ("one",), ("slow",), (), made).lines()
     assert gathered[0] == "warning: slow"
     assert gathered[1] == "note: shaft: have it turned"
     assert gathered[2].startswith("warning: measure these on your own before you print")
     assert gathered[3] == "  UTM: a = 1, b = 2"
-    assert Build(tmp_path, ("one",), (), made).lines(in_full=True)[:3] == [
+    assert Build(tmp_path, ("one",), (), (), made).lines(in_full=True)[:3] == [
         "note: shaft: have it turned",
         "warning: UTM: a = 1 is not verified",
         "warning: UTM: b = 2 is not verified",

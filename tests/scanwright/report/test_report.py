@@ -4,6 +4,7 @@ import html
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_folder import ANGLES, EVIL, Page, drawn, own_body, sphere
 
+from design.objective.holes import percent
 from design.objective.problem import NODES, problem_of
 from design.objective.score import quick_J, score
-from design.shadow import AXIS_STEPS
+from design.shadow import AXIS_STEPS, load_own_body
 from design.task.task import Limits, load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import page as report_page
@@ -76,17 +78,25 @@ def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_pat
     assert read_manifest(again) == entered
 
 
-def test_the_answer_says_what_the_files_say(page):
+def answered(folder):
+    problem = problem_as_built(load_task(folder / "task.toml"), ANGLES)
+    return answer(problem, ANGLES, load_own_body(folder / "own_body.npz")[0])
+
+
+def test_the_answer_says_what_the_files_say(folder, page):
     answer = " ".join(page.text["answer"].split())
     assert "0, 90 deg" in answer and "0, -90 deg" in answer
-    assert "-5.7636 +- 0.0005" in answer
+    seen = answered(folder).as_built
+    assert f"{seen.own.J} +- {seen.own.J_error}, with parts" in answer and seen.own.J > ANGLES.J + 0.002
     assert "at least 5,438 USD" in answer and "sum of 4" in answer  # no cents of what has no price
     assert "18 s: one turn" in answer
     hidden = (100 * AXIS_STEPS + 100 * 180) / (1081 * AXIS_STEPS)
-    assert f"{100 * hidden:.2f} % of all beams" in answer and "of 1081 beams 100 always, 100 at times" in answer
+    assert f"{hidden:.1%} of all beams" in answer and "of 1081 beams 100 always, 100 at times" in answer
     assert "1 error, 1 warning, 1 note, 2 passed" in answer
-    # rolling against itself, and 40 lines a second over 18 s
-    assert "1.00 times the beams" in answer
+    # rolling against itself without parts, and 40 lines a second over 18 s
+    assert seen.mounts[0].name == "rolling" and seen.mounts[0].factor < 0.998
+    assert f"{seen.mounts[0].factor:.2f} times the beams per direction where it counts, with parts" in answer
+    assert f"and {percent(seen.own.blind_fraction)} of the sphere" in answer
     assert f"{720 * 1081:,} beams: 720 lines of 1081" in answer
     # the field of view of 270 deg leaves 90 deg open, straight behind the axis that points ahead
     assert "No beam enters the cone of 45.0 deg half angle about theta 90.0, phi 180.0." in answer
@@ -94,25 +104,30 @@ def test_the_answer_says_what_the_files_say(page):
 
 def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
     said = answer(problem_as_built(load_task(Path("ground_ahead")), ANGLES), ANGLES)
-    rolling, pitching = said.standard
+    rolling, pitching = said.as_built.mounts
+    own = said.as_built.own
     assert rolling.factor == pytest.approx(1, abs=1e-3)
-    assert pitching.factor == pytest.approx(np.exp(pitching.J - ANGLES.J), abs=1e-3)
+    assert pitching.factor == pytest.approx(np.exp(pitching.seen.J - own.J), abs=1e-3)
     # a blind cone of 45 deg, smaller by the ball of 2 deg; the mask covers part of it
     everywhere = (1 - np.cos(np.radians(43))) / 2
-    assert 0 < said.own.blind_fraction < everywhere
+    assert 0 < own.blind_fraction < everywhere
     assert said.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
-    assert said.own.line_gap_deg == rolling.seen.line_gap_deg == pytest.approx(0.5)
-    assert said.own == rolling.seen != pitching.seen
+    assert own.line_gap_deg == rolling.seen.line_gap_deg == pytest.approx(0.5)
+    assert own == rolling.seen != pitching.seen
     assert said.worst == pytest.approx(1 - np.exp(-max(said.rises.values())), abs=1e-12)
     problem = problem_of(load_task(Path("ground_ahead")))
     off = [quick_J(problem, np.radians([0, 90 + d, 0, -90]), NODES) for d in (-1, 0, 1)]
     assert said.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
 
 
-def test_other_motions_and_objectives_make_no_claim_of_factors():
+def test_another_objective_than_a_logarithm_makes_no_claim_of_factors():
     loaded = load_task(Path("indoor_urg"))
+    density = loaded.task.density.model_copy(update={"objective": "homogeneity"})
+    loaded = replace(loaded, task=loaded.task.model_copy(update={"density": density}))
     angles = ANGLES.model_copy(update={"sensor": "URG-04LX", "motion": loaded.task.motion, "J": None})
-    assert all(standard.factor is None for standard in answer(problem_as_built(loaded, angles), angles).standard)
+    found = answer(problem_as_built(loaded, angles), angles)
+    assert all(mount.factor is None for mount in found.as_built.mounts)
+    assert f"J = {found.as_built.mounts[0].seen.J:g} for " in found.as_built.gain()
 
 
 def test_what_is_in_the_files_stays_text(page, text):
@@ -125,9 +140,14 @@ def test_what_is_in_the_files_stays_text(page, text):
 def test_errors_come_first_and_what_nobody_knows_with_them(page, tmp_path):
     found = re.findall(r"(error|warning|note|pass) of", page.text["checks"])
     assert found == ["error", "warning", "note", "pass", "pass"]
+    assert page.text["answer"].split()[:7] == ["1", "check", "failed:", "do", "not", "make", "these"]
+    assert page.text["answer"].index(f"error of {EVIL}") < page.text["answer"].index("The answer")
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     write_json(tmp_path / "checks.json", {"checks": [{"severity": "fatal", "message": "a new word"}]})
-    assert "1 error" in Page(report_html(tmp_path)).text["answer"]
+    unknown = Page(report_html(tmp_path)).text["answer"]
+    assert "1 error" in unknown and "1 check failed" in unknown
+    write_json(tmp_path / "checks.json", {"checks": [{"severity": "warning", "message": "a check failed"}]})
+    assert "check failed: do not" not in Page(report_html(tmp_path)).text["answer"]
 
 
 def test_a_folder_with_nothing_but_angles_has_every_section(tmp_path):

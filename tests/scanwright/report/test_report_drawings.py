@@ -75,9 +75,9 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
     loaded = load_task(Path("ground_ahead"))
     ball = sphere(loaded, AXES)
     assert [shown.title for shown in ball.maps] == [
-        "density of this scanner",
-        "density of rolling",
-        "density of pitching",
+        "density of this scanner, without parts",
+        "density of rolling, without parts",
+        "density of pitching, without parts",
         "J over the direction of the axis",
     ]
     own, rolling, pitching, axes = (picture(shown.picture) for shown in ball.maps)

@@ -145,7 +145,7 @@ def test_the_ball_is_wrapped_the_right_way_round(shown):
         right = int(width / 2 + 0.052 * height / 2 / 1.25 * np.cos(pitch))
         np.testing.assert_allclose(shot[height // 2, right], np.array(wrapped.getpixel(cell(towards))) / 255, atol=0.05)
         seen.append(shot)
-    assert [changed(*pair) for pair in itertools.pairwise(seen)] == [False, True, True]
+    assert all(changed(*pair) for pair in itertools.pairwise(seen))  # the first is rolling behind its parts
     shown.locator("#sphere-canvas").press("ArrowUp")
     assert changed(shot_of(shown, "#sphere-canvas"), seen[3])
     assert {"ahead", "left", "axis"} <= set(shown.locator(".mark:visible").all_inner_texts())

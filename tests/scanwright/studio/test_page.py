@@ -173,7 +173,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     tab(page, "Angles")
     page.get_by_role("button", name="Optimise").click()
     page.get_by_text("is still looked for").wait_for()
-    page.get_by_text("with its parts, which hide").wait_for(timeout=300_000)  # ten times what it needs
+    page.get_by_text("with parts, which block").wait_for(timeout=300_000)  # ten times what it needs
     until(lambda: studio.facts.exact and studio.setting == studio.facts.setting)
     dab = studio.judge.loaded.task.weight[1]
     assert dab.half_angle_deg == 12.0 and dab.value == 50.0

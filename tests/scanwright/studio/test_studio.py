@@ -146,6 +146,7 @@ def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(
     assert (exact.J, exact.J_error, exact.exact) == (truth.J, truth.J_error, True)
     assert not quick.exact and abs(quick.J - truth.J) <= quick.J_error + truth.J_error
     assert f"{truth.J:.5f}" in panel_html.facts_html(exact, log=True)
+    assert panel_html.facts_html(exact, log=True).count("without parts") == 2  # J, and what is never seen
     assert exact.gap_mm == pytest.approx(math.radians(exact.gap_deg) * 10_000)
 
 

@@ -1,0 +1,165 @@
+"""What a scanner sees as built: without the beams that its own parts block, and with the reference mounts beside it.
+
+Console, report, studio, `evaluate` and `compare` print the numbers of this record, so that all of them state the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from design.angles import standard_settings
+from design.arrays import Setting
+from design.evaluation.coverage import coverage
+from design.evaluation.gaps import gaps
+from design.objective.holes import NO_BLIND_WEIGHT, holes, percent
+from design.objective.problem import Problem
+from design.objective.score import Score, score
+from design.objective.stated_error import rounded_to_error
+from design.search.with_parts import score_with
+from design.shadow import Shadow
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What one setting sees.
+
+    Attributes:
+        J: the objective, rounded to its error.
+        J_error: its error.
+        blind: where the weighted region is blind, in words.
+        blind_weight: share of the weight of the task that is never seen.
+        blind_fraction: share of the sphere outside the masks that is never seen.
+        least: lowest number of beams per ball in the weighted region, at any start phase.
+        line_gap_deg: widest distance between neighbouring scan lines.
+    """
+
+    J: float
+    J_error: float
+    blind: tuple[str, ...]
+    blind_weight: float
+    blind_fraction: float
+    least: int
+    line_gap_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceMount:
+    """A reference mount on the same task, without parts.
+
+    Attributes:
+        factor: beams per direction of the scanner over those of the mount, in the geometric mean; None if J is no
+            logarithm.
+    """
+
+    name: str
+    seen: Seen
+    factor: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class AsBuilt:
+    """A scanner, and the reference mounts beside it.
+
+    Attributes:
+        blocked: share of all beams that its parts block; None if the parts are not known, and nothing is left out.
+        own: what it sees.
+        mounts: the reference mounts, the smallest factor first.
+    """
+
+    blocked: float | None
+    own: Seen
+    mounts: tuple[ReferenceMount, ...]
+
+    @property
+    def parts(self) -> str:
+        """Whether the numbers are with the parts, in two words."""
+        return "without parts" if self.blocked is None else "with parts"
+
+    def gain(self) -> str:
+        """What the scanner is worth against the reference mounts, in a line."""
+        return "; ".join(
+            f"J = {mount.seen.J:g} for {mount.name}"
+            if mount.factor is None
+            else f"{mount.factor:.2f} x {mount.name} (J = {mount.seen.J:g})"
+            for mount in self.mounts
+        )
+
+    def lines(self) -> list[str]:
+        """The same, a line for each number."""
+        own = self.own
+        blocked = "" if self.blocked is None else f", which block {percent(self.blocked)} of the beams"
+        return [
+            f"{self.parts}{blocked}: J = {own.J:g} +- {own.J_error:g}",
+            *(f"{self.parts}: {words}" for words in own.blind),
+            f"{self.parts}: never seen: {percent(own.blind_weight)} of the weight, "
+            f"{percent(own.blind_fraction)} of the unmasked sphere",
+            f"{self.parts}: beams per ball, against reference mounts without parts: {self.gain()}",
+        ]
+
+    def facts(self) -> dict[str, Any]:
+        """Names with units and values, for JSON."""
+        return {"with_parts": self.blocked is not None, **asdict(self)}
+
+
+def as_built(
+    problem: Problem,
+    angles_rad: Setting,
+    shadow: Shadow | None,
+    own: Score | None = None,
+    mounts: Mapping[str, Score] | None = None,
+) -> AsBuilt:
+    """Judge a setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with its parts.
+
+    Args:
+        problem: the task as numbers, with the motion that was built.
+        angles_rad: the setting.
+        shadow: the beams that its parts block; None if they are not known.
+        own: its score with the parts, if it is known already.
+        mounts: scores of the reference mounts by name, if they are known already.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+        TaskError: no direction has a weight.
+    """
+    if own is None:
+        own = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
+    logarithmic = problem.objective.name == "log"
+    found = []
+    for name, setting in standard_settings().items():
+        judged = mounts[name] if mounts is not None else score(problem, setting)
+        factor = float(np.exp(judged.J - own.J)) if logarithmic else None
+        found.append(ReferenceMount(name, seen_of(problem, setting, judged), factor))
+    return AsBuilt(
+        None if shadow is None else shadow.share(),
+        seen_of(problem, angles_rad, own, shadow),
+        tuple(sorted(found, key=lambda mount: -np.inf if mount.factor is None else mount.factor)),
+    )
+
+
+def seen_of(problem: Problem, angles_rad: Setting, found: Score, shadow: Shadow | None = None) -> Seen:
+    """Return what a setting of a known score sees, without the beams that `shadow` blocks.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+        TaskError: no direction has a weight.
+    """
+    moving = problem if shadow is None else problem.behind(shadow)
+    spots = holes(moving, angles_rad)
+    blind = [spot.words() for spot in spots]
+    behind = found.blind_weight - sum(spot.weight for spot in spots)
+    if shadow is not None and shadow.partly().any() and behind > NO_BLIND_WEIGHT:
+        blind.append(f"blind behind what stands still: about {percent(behind)} of the weight")
+    J, J_error = rounded_to_error(found.J, found.J_error)
+    return Seen(
+        J=J,
+        J_error=J_error,
+        blind=tuple(blind),
+        blind_weight=found.blind_weight,
+        blind_fraction=coverage(problem, angles_rad, shadow).blind_fraction,
+        least=found.least,
+        line_gap_deg=gaps(moving, angles_rad).line_gap_deg,
+    )

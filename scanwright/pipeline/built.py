@@ -1,0 +1,51 @@
+"""A build folder read back: its task, its angles, and the beams that its parts block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from design.angles import AngleSet, load_angles
+from design.arrays import Setting
+from design.shadow import Shadow, load_own_body
+from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.pipeline.manifest import require_as_built
+from scanwright.report.answer import mounting_rad, task_as_built
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltScanner:
+    """What a build folder holds.
+
+    Attributes:
+        loaded: the task, with the motion that was built.
+        angles: the angle set.
+        shadow: the beams that the parts block; None if the folder has no `own_body.npz`.
+    """
+
+    loaded: LoadedTask
+    angles: AngleSet
+    shadow: Shadow | None
+
+    @property
+    def setting_rad(self) -> Setting:
+        """(alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+        return mounting_rad(self.angles)
+
+
+def is_build_folder(task: Path) -> bool:
+    """Return whether a path names a build folder; the name of a shipped task always means that task."""
+    return str(task) not in shipped_tasks() and (task / "angles.json").is_file()
+
+
+def open_built(folder: Path) -> BuiltScanner:
+    """Read a build folder.
+
+    Raises:
+        TaskError: the folder has no angle set or no task.
+        BuildError: a file of the build is gone or was edited, or is not as a build writes it.
+    """
+    require_as_built(folder)
+    angles, own_body = load_angles(folder / "angles.json"), folder / "own_body.npz"
+    loaded = task_as_built(load_task(folder / "task.toml"), angles)
+    return BuiltScanner(loaded, angles, load_own_body(own_body)[0] if own_body.is_file() else None)
