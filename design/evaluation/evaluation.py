@@ -21,9 +21,10 @@ from design.evaluation.poles import PoleChances, parse_pole, pole_chances
 from design.objective.ball_search import BallScore, ball_score
 from design.objective.holes import Hole, holes, percent
 from design.objective.problem import Problem, problem_of
-from design.objective.score import Score, score
+from design.objective.score import Score
 from design.objective.stated_error import error_words, rounded_to_error
 from design.objective.tolerance import rise_words, sensitivity
+from design.search.with_parts import checked_score
 from design.shadow import Shadow
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
@@ -198,6 +199,7 @@ def evaluate(
     Raises:
         BuildError: the shadow is of another number of beams.
         TaskError: no direction has a weight, or the pole or the lever makes no sense.
+        NumericalError: J differs from a count over simulated beams.
     """
     asked = None if pole is None else parse_pole(pole, loaded.lidar)
     off_axis = None if lever is None else _parse_lever(lever)
@@ -208,7 +210,10 @@ def evaluate(
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
     interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
-    found = score(problem, angles_rad)
+    found = checked_score(loaded, problem, angles_rad, None)
+    built = None
+    if shadow is not None:
+        built = as_built(problem, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
     progress("ball search, 8 start phases")
     return Evaluation(
         problem=problem,
@@ -225,7 +230,7 @@ def evaluate(
         hit=None if asked is None else pole_chances(problem, angles_rad, asked),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
-        as_built=None if shadow is None else as_built(problem, angles_rad, shadow),
+        as_built=built,
     )
 
 

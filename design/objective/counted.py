@@ -1,8 +1,9 @@
 """J by counting: random directions at random start phases, line by line, for any field, motion and objective.
 
-It shares nothing with what it judges but the numbers of the task, the beam table, and what the rays into a mesh hit:
-rotations are scipy's, windows come from the law of cosines, weights are painted region by region, no sum is zonal.
-Directions and phases are scrambled Sobol points; the spread of independent scramblings is its error.
+It shares nothing with what it judges but the numbers of the task, the beam table, what the rays into a mesh hit, and
+the beams that parts block: rotations are Rodrigues', windows come from the law of cosines, weights are painted region
+by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
+three dimensions); the spread of independent shifts is its error.
 """
 
 from __future__ import annotations
@@ -11,17 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.spatial.transform import Rotation
-from scipy.stats import qmc
 
-from design.arrays import Array, Ints, Setting
+from design.arrays import Array, Ints, Mask, Setting
 from design.motion import Spin, StopAndGo, Sweep
 from design.objective.drawn_regions import Layer, drawn_in, layers_of
+from design.shadow import Shadow
 from design.task.task import LoadedTask
 
-SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
+SETS, POINTS = 8, 2**15  # shifts, and directions that each draws in every region
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
 PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
+MOST_LISTED = 4_000_000  # lines of all phases of a sweep
+BITS = 32  # of a coordinate of the net
+X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,21 +40,36 @@ class Counted:
     none: float
 
 
-def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = POINTS) -> Counted:
+def counted_J(
+    loaded: LoadedTask,
+    angles_rad: Setting,
+    seed: int,
+    points: int = POINTS,
+    sets: int = SETS,
+    shadow: Shadow | None = None,
+    lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Counted:
     """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Args:
         loaded: the task.
         angles_rad: the setting.
-        seed: of the scramblings.
-        points: directions that each scrambling draws in every region; a power of two.
+        seed: of the shifts.
+        points: directions that each shift draws in every region; a power of two.
+        sets: number of shifts.
+        shadow: the beams that the parts of the scanner block, if they are to be left out.
+        lever: the optical centre off the axis, in the rotation frame, as a share of the range.
     """
     layers = layers_of(loaded)
     ball = np.radians(loaded.task.density.ball_radius_deg)
-    to_rot = Rotation.from_euler("XY", angles_rad[:2]).inv()
     bearings = loaded.lidar.bearings_rad()
+    blocked = np.zeros((len(bearings), 1), dtype=bool)
+    if shadow is not None:
+        blocked = shadow.beams[:, None] | (blocked if shadow.stator is None else shadow.stator)
     in_laser = np.stack([np.cos(bearings), np.sin(bearings), 0 * bearings], axis=1)
-    beams = Rotation.from_euler("YX", angles_rad[[3, 2]]).apply(in_laser)
+    alpha_rot, beta_rot, alpha_laser, beta_laser = angles_rad
+    beams = _turned(_turned(in_laser, X, alpha_laser), Y, beta_laser) + lever
+    beams /= np.linalg.norm(beams, axis=1, keepdims=True)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
     lines, first, repeats, span = _lines(loaded)
     objective = loaded.task.density.objective
@@ -60,19 +78,20 @@ def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = 
     def counted(cubes: list[Array]) -> tuple[Ints, Array, Array, Array]:
         directions, value, area, required, phase = _weighted(layers, cubes)
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
-        counts = repeats * _counts(to_rot.apply(directions), beams[order], turned, mine, lines, first, ball)
+        in_rot = _turned(_turned(directions, X, -alpha_rot), Y, -beta_rot)
+        counts = repeats * _counts(in_rot, beams[order], turned, mine, lines, first, ball, blocked[order])
         return counts, value, area, required
 
     drawing = drawn_in(layers)
-    for k in range(SETS):
+    for k in range(sets):
         rng = np.random.default_rng([seed, k])
-        cubes = [qmc.Sobol(3, rng=rng).random(points) for _ in drawing]
+        cubes = [_net(points, rng) for _ in drawing]
         counts, value, area, required = counted(cubes)
         keep = value > 0
         moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
         least = min(least, int(counts[keep].min()))
         weight = value * area
-        none += float(weight[counts == 0].sum() / weight.sum()) / SETS
+        none += float(weight[counts == 0].sum() / weight.sum()) / sets
         for reach in NEARER if objective == "worst" else ():
             cubes = _about_the_lowest(cubes, np.where(keep, counts, np.inf), reach, rng)
             counts, value, area, required = counted(cubes)
@@ -83,7 +102,28 @@ def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = 
         return Counted(-float(np.log(1 + least)), 0.0, least, none)
     each = np.array([_joined(objective, m) for m in moments])
     J = _joined(objective, np.mean(moments, axis=0))
-    return Counted(float(J), float(3 * np.std(each, ddof=1) / SETS**0.5), least, none)
+    return Counted(float(J), float(3 * np.std(each, ddof=1) / sets**0.5), least, none)
+
+
+def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:
+    """Vectors (n, 3) turned about a unit axis by Rodrigues' formula."""
+    along = np.outer(vectors @ axis, axis)
+    return along + np.cos(angle_rad) * (vectors - along) + np.sin(angle_rad) * np.cross(axis, vectors)
+
+
+def _net(count: int, rng: np.random.Generator) -> Array:
+    """The first points of a Sobol net in three dimensions, shifted digit by digit, shape (count, 3), 0 to below 1."""
+    bits = np.arange(BITS, dtype=np.uint64)
+    numbers = [np.ones(BITS, dtype=np.uint64), np.ones(BITS, dtype=np.uint64), np.ones(BITS, dtype=np.uint64)]
+    for k in range(1, BITS):
+        numbers[1][k] = 2 * numbers[1][k - 1] ^ numbers[1][k - 1]
+        numbers[2][k] = 3 if k == 1 else 2 * numbers[2][k - 1] ^ 4 * numbers[2][k - 2] ^ numbers[2][k - 2]
+    directions = np.stack(numbers, axis=1) << (BITS - 1 - bits)[:, None]
+    points = np.zeros((count, 3), dtype=np.uint64) ^ rng.integers(1 << BITS, size=3, dtype=np.uint64)
+    index = np.arange(count, dtype=np.uint64)
+    for bit in range(count.bit_length()):
+        points ^= np.where((index >> np.uint64(bit) & np.uint64(1))[:, None] > 0, directions[bit], np.uint64(0))
+    return (points + 0.5) / float(1 << BITS)
 
 
 def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.random.Generator) -> list[Array]:
@@ -120,7 +160,8 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
     """
     motion, rate = loaded.task.motion, loaded.lidar.scan_rate_hz
     listed, span = [], 0.0
-    for s in (np.arange(PHASES) + 0.5) / PHASES if isinstance(motion, Sweep) else (0.0,):
+    phases = int(np.clip(MOST_LISTED / (motion.duration_s * rate), 64, PHASES)) if isinstance(motion, Sweep) else 1
+    for s in (np.arange(phases) + 0.5) / phases:
         if isinstance(motion, Sweep):
             time = (np.arange(int(np.ceil(motion.period_s * rate - s - 1e-12))) + s) / rate
             lower, upper = motion.limits_deg
@@ -147,9 +188,29 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
 
 
 @njit(cache=True)
+def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> int:
+    """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
+    steps = len(blocked)
+    if steps == 1:
+        return 0 if blocked[0] else last - first
+    free = 0
+    for k in range(first, last):
+        free += not blocked[int(np.rint((lines[k] + turned) * steps / (2 * np.pi))) % steps]
+    return free
+
+
+@njit(cache=True)
 def _counts(
-    directions: Array, beams: Array, turned: Array, listed: Ints, lines: Array, first: Ints, ball: float
+    directions: Array,
+    beams: Array,
+    turned: Array,
+    listed: Ints,
+    lines: Array,
+    first: Ints,
+    ball: float,
+    blocked: Mask,
 ) -> Ints:
+    """Free beams within the ball of each direction; `blocked` is at equal steps of the axis angle, (beams, steps)."""
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
@@ -168,14 +229,16 @@ def _counts(
             if free < 0:
                 continue
             if free >= around:
-                counts[i] += len(mine)
+                counts[i] += _free(mine, 0, len(mine), turned[i], blocked[b])
                 continue
             half = 2 * np.arcsin(np.sqrt(free / around))
             low = (p - azimuth[b] - half) % turn
             high = low + 2 * half
-            counts[i] += np.searchsorted(mine, high, side="right") - np.searchsorted(mine, low)
+            last = np.searchsorted(mine, high, side="right")
+            counts[i] += _free(mine, np.searchsorted(mine, low), last, turned[i], blocked[b])
             if high > turn:
-                counts[i] += np.searchsorted(mine, high - turn, side="right")
+                last = np.searchsorted(mine, high - turn, side="right")
+                counts[i] += _free(mine, 0, last, turned[i], blocked[b])
     return counts
 
 

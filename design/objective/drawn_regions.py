@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from design.arrays import Array, Mask
 from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
@@ -53,8 +52,11 @@ class Layer:
             sine = np.sin(half / 2) * np.sqrt(u[:, 0])  # of half the angle from the axis: equal areas
             polar = 2 * np.arcsin(sine)
             d = np.stack([np.sin(polar) * np.cos(2 * np.pi * u[:, 1]), np.sin(polar) * np.sin(2 * np.pi * u[:, 1])])
-            there, _ = Rotation.align_vectors([region.axis], [[0, 0, 1]])
-            return there.apply(np.column_stack([*d, np.cos(polar)])), 4 * np.pi * np.sin(half / 2) ** 2
+            axis = np.array(region.axis) / np.linalg.norm(region.axis)
+            across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+            across /= np.linalg.norm(across)
+            directions = np.column_stack([*d, np.cos(polar)]) @ np.stack([across, np.cross(axis, across), axis])
+            return directions, 4 * np.pi * np.sin(half / 2) ** 2
         if isinstance(region, PlaneRegion):
             return _On(region).drawn(u), float("nan")
         z, phi = (-1.0, 1.0), (0.0, 2 * np.pi)

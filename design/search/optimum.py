@@ -16,6 +16,7 @@ from design.motion import Shortest
 from design.objective.holes import holes, percent
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score, score
+from design.objective.self_check import require_counted
 from design.objective.stated_error import error_words, rounded_to_error
 from design.search.coarse import Progress
 from design.search.families import Family
@@ -173,6 +174,7 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
+        NumericalError: the best J differs from a count over simulated beams.
     """
     progress("reading the task (the first run compiles the numerics: some 5 s)")
     found = loaded
@@ -182,6 +184,8 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
     else:
         problem = problem_of(loaded)
         result = search(problem, loaded.task.angles, progress, loaded.task.limits)
+    best = result.best[0]
+    require_counted(found, best.angles_rad, best.score)
     standard = {name: score(problem, setting) for name, setting in standard_settings().items()}
     return Optimum(loaded, found, problem, result, standard)
 

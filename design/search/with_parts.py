@@ -22,13 +22,14 @@ from design.objective.ball_search import start_phases
 from design.objective.holes import NO_BLIND_WEIGHT
 from design.objective.problem import Problem
 from design.objective.score import Score, score
+from design.objective.self_check import require_counted
 from design.search.coarse import Progress
 from design.search.families import Family
 from design.search.grid_classes import mirrors_of
 from design.shadow import Shadow
 from design.sphere.directions import sample_set
 from design.task.angle_ranges import NAMES, AngleRanges
-from design.task.task import Limits
+from design.task.task import Limits, LoadedTask
 
 SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
 MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told
@@ -176,6 +177,17 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
         least=min(plain.least, *(least for _, _, least in sampled)),
         blind_weight=plain.blind_weight + float(np.mean([blinded for _, blinded, _ in sampled])),
     )
+
+
+def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: Shadow | None) -> Score:
+    """Score a setting, with its parts if they are known, and compare J with a count over simulated beams.
+
+    Raises:
+        NumericalError: they differ by more than their errors.
+    """
+    found = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
+    require_counted(loaded, angles_rad, found, shadow, problem.lever)
+    return found
 
 
 def equivalents(

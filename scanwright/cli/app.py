@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from design.errors import ScanwrightError, notes_of
+from design.errors import NumericalError, ScanwrightError, notes_of
 from scanwright.cli import clouds, design, devices, new, pages, parts
 from scanwright.cli.console import complain, own_voice
 from scanwright.cli.help import Commands, GroupedHelp
@@ -77,7 +77,7 @@ def run() -> None:
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):
             complain(line)
-        sys.exit(2)
+        sys.exit(1 if isinstance(error, NumericalError) else 2)
     except BrokenPipeError:  # whoever read the results has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

@@ -178,10 +178,13 @@ def setting_built(optimum: Optimum) -> Chosen:
 
 
 def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
+    from design.objective.self_check import require_counted
     from design.search.with_parts import choose_with_parts
 
     task = optimum.loaded.task
-    return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
+    chosen = choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
+    require_counted(optimum.loaded, chosen.family.angles_rad, chosen.family.score, chosen.shadow)
+    return chosen
 
 
 def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Packed[Assembly]]:

@@ -13,6 +13,7 @@ from design.evaluation.coverage import coverage
 from design.evaluation.gaps import gaps
 from design.objective.problem import Problem, problem_of
 from design.objective.tolerance import sensitivity
+from design.search.with_parts import checked_score
 from design.shadow import Shadow
 from design.task.angle_ranges import NAMES
 from design.task.task import LoadedTask
@@ -62,18 +63,20 @@ class BuildAnswer:
     worst: float | None
 
 
-def answer(problem: Problem, angles: AngleSet, shadow: Shadow | None = None) -> BuildAnswer:
-    """Judge the angle set on its task (`problem_as_built`), without the beams that `shadow` blocks.
+def answer(loaded: LoadedTask, angles: AngleSet, shadow: Shadow | None = None) -> BuildAnswer:
+    """Judge the angle set on its task, without the beams that `shadow` blocks.
 
     Raises:
         BuildError: the shadow is of another number of beams.
         TaskError: no direction has a weight.
+        NumericalError: J differs from a count over simulated beams.
     """
-    setting = mounting_rad(angles)
+    built = task_as_built(loaded, angles)
+    problem, setting = problem_of(built), mounting_rad(angles)
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     seen = problem if shadow is None else problem.behind(shadow)
     return BuildAnswer(
-        as_built=as_built(problem, setting, shadow),
+        as_built=as_built(problem, setting, shadow, checked_score(built, problem, setting, shadow)),
         ball_deg=float(np.degrees(problem.ball_rad)),
         cones=tuple(
             _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(seen, setting).blind_cones

@@ -15,11 +15,12 @@ import numpy as np
 from cad.assembly.shadow import PartsWorkshop, at_setting
 from cad.kernel import require_kernel
 from design.arrays import Array
-from design.errors import BuildError, ScanwrightError, TaskError
+from design.errors import BuildError, TaskError
 from design.evaluation.as_built import seen_of
 from design.objective.named_objectives import beams_per_ball
 from design.objective.problem import Problem, problem_of
 from design.objective.score import Score
+from design.objective.self_check import require_counted
 from design.scanner import Scanner
 from design.search.families import Family
 from design.search.optimum import angle_set
@@ -95,9 +96,10 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
         problem = problem_of(loaded)
         bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
         chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
-    except ScanwrightError as error:
+    except (TaskError, BuildError) as error:
         return {"status": "refused", "reason": why(error, loaded)}
     setting, score = chosen.family.angles_rad, chosen.family.score
+    require_counted(loaded, setting, score, chosen.shadow)
     made = bench.made(setting)  # known by now
     assert not isinstance(made, Refused)
     seen = seen_of(problem, setting, score, made.shadow)

@@ -20,7 +20,7 @@ from design.shadow import AXIS_STEPS, load_own_body
 from design.task.task import Limits, load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import page as report_page
-from scanwright.report.answer import answer, problem_as_built
+from scanwright.report.answer import answer
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.landscapes import other_mounts
 from scanwright.report.page import report_html
@@ -79,8 +79,7 @@ def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_pat
 
 
 def answered(folder):
-    problem = problem_as_built(load_task(folder / "task.toml"), ANGLES)
-    return answer(problem, ANGLES, load_own_body(folder / "own_body.npz")[0])
+    return answer(load_task(folder / "task.toml"), ANGLES, load_own_body(folder / "own_body.npz")[0])
 
 
 def test_the_answer_says_what_the_files_say(folder, page):
@@ -103,7 +102,7 @@ def test_the_answer_says_what_the_files_say(folder, page):
 
 
 def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
-    said = answer(problem_as_built(load_task(Path("ground_ahead")), ANGLES), ANGLES)
+    said = answer(load_task(Path("ground_ahead")), ANGLES)
     rolling, pitching = said.as_built.mounts
     own = said.as_built.own
     assert rolling.factor == pytest.approx(1, abs=1e-3)
@@ -125,7 +124,7 @@ def test_another_objective_than_a_logarithm_makes_no_claim_of_factors():
     density = loaded.task.density.model_copy(update={"objective": "homogeneity"})
     loaded = replace(loaded, task=loaded.task.model_copy(update={"density": density}))
     angles = ANGLES.model_copy(update={"sensor": "URG-04LX", "motion": loaded.task.motion, "J": None})
-    found = answer(problem_as_built(loaded, angles), angles)
+    found = answer(loaded, angles)
     assert all(mount.factor is None for mount in found.as_built.mounts)
     assert f"J = {found.as_built.mounts[0].seen.J:g} for " in found.as_built.gain()
 

@@ -24,7 +24,7 @@ ANGLES = AngleSet(
 
 @pytest.fixture(scope="module")
 def found():
-    return answer(problem_as_built(load_task("ground_ahead"), ANGLES), ANGLES)
+    return answer(load_task("ground_ahead"), ANGLES)
 
 
 def test_what_it_is_what_it_sees_and_what_that_is_worth(found):

@@ -1,0 +1,93 @@
+"""What is reported is counted first: J of a setting against a brute-force count over its simulated beams.
+
+The count (`design.objective.counted`) shares neither regions nor quadrature with J, so that no fault of either leaves
+the program as an answer: angles are cut into parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from design.arrays import Setting
+from design.density.beams import NO_LEVER
+from design.errors import NumericalError
+from design.objective.counted import counted_J
+from design.objective.named_objectives import log
+from design.objective.problem import problem_of
+from design.objective.score import Score, score
+from design.shadow import Shadow
+from design.task.task import LoadedTask
+
+SURE = 4.0 / 3.0  # times the three standard errors that a count states
+NEAR = 5e-3  # a wrong field is off by far more
+SETS = 16
+DRAWN = 256, 1024, 4096  # directions of each set, in all regions together, until the count is near enough
+AGAIN = 16384  # the same before a difference is an error: one count in a thousand is off by more than it states
+LEAST_DRAWN = 8  # in each region
+
+
+def require_counted(
+    loaded: LoadedTask,
+    angles_rad: Setting,
+    found: Score,
+    shadow: Shadow | None = None,
+    lever: tuple[float, float, float] = NO_LEVER,
+) -> None:
+    """Compare the score of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count.
+
+    Of the objective `worst` a count finds an upper bound only, so J of `log` is compared too.
+
+    Args:
+        loaded: the task, with the motion of the score.
+        angles_rad: the setting.
+        found: its score, with the parts if `shadow` is given.
+        shadow: the beams that its parts block.
+        lever: of the optical centre off the axis, as in `design.objective.problem.Problem`.
+
+    Raises:
+        NumericalError: they differ by more than their errors.
+    """
+    if loaded.task.density.objective == "worst":
+        if shadow is None and lever == NO_LEVER:
+            _require_least(loaded, angles_rad, found)
+            _require_log(loaded, angles_rad)
+        return
+    for most in (DRAWN, (AGAIN,)):
+        J, J_error = _counted(loaded, angles_rad, most, shadow, lever)
+        if J == found.J or abs(J - found.J) <= found.J_error + J_error:
+            return
+    raise NumericalError(
+        f"J = {found.J:.6g} +- {found.J_error:.1g}, but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
+    )
+
+
+def _counted(
+    loaded: LoadedTask,
+    angles_rad: Setting,
+    drawn: tuple[int, ...],
+    shadow: Shadow | None,
+    lever: tuple[float, float, float],
+) -> tuple[float, float]:
+    """J by counting, and four standard errors of it."""
+    regions = max(1, len(loaded.task.weight))
+    for total in drawn:
+        points = max(LEAST_DRAWN, 1 << (total // regions).bit_length() - 1)
+        count = counted_J(loaded, angles_rad, total, points, SETS, shadow, lever)
+        if SURE * count.J_error <= NEAR:
+            break
+    return count.J, SURE * count.J_error
+
+
+def _require_least(loaded: LoadedTask, angles_rad: Setting, found: Score) -> None:
+    count = counted_J(loaded, angles_rad, 0, LEAST_DRAWN * SETS, 2)
+    if found.J + found.J_error < count.J:
+        raise NumericalError(f"min_density = {found.least}, but a count over simulated beams finds {count.least}")
+
+
+def _require_log(loaded: LoadedTask, angles_rad: Setting) -> None:
+    density = loaded.task.density.model_copy(update={"objective": "log"})
+    as_log = replace(loaded, task=loaded.task.model_copy(update={"density": density}))
+    problem = problem_of(loaded)
+    require_counted(as_log, angles_rad, score(problem.with_objective(log(problem.field)), np.asarray(angles_rad)))

@@ -1,0 +1,127 @@
+"""What is reported is counted first: right answers pass, and answers on another field, fan or turn are errors."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from quick_tests import samples
+
+from design.catalogue.catalogue import load_catalogue
+from design.errors import NumericalError
+from design.objective.counted import _net
+from design.objective.problem import problem_of
+from design.objective.score import score
+from design.objective.self_check import require_counted
+from design.search.search import search
+from design.search.with_parts import checked_score
+from design.shadow import AXIS_STEPS, Shadow
+from design.sphere import polar_rule
+from design.task.task import LoadedTask, Task, load_task
+
+GROUND = {"shape": "ground", "height_m": 0.5, "from_m": 0.5, "to_m": 2.0, "width_m": 2.0}
+CONE = {"shape": "cone", "axis": [1, 0, -0.5], "half_angle_deg": 30}
+TURN = {"period_s": 3.0}
+MOTIONS = {
+    "spin": TURN,
+    "seam": {"period_s": 3.013},
+    "sweep": {"mode": "sweep", "limits_deg": [-80, 100], "period_s": 6.0},
+    "stop_and_go": {"mode": "stop_and_go", "stops": 60, "dwell_s": 0.2},
+}
+OBJECTIVES = "log", "kl", "required", "homogeneity", "worst"
+SETTING = np.radians([10.0, -20.0, 40.0, -30.0])
+
+
+def a_task(weight=(GROUND, CONE | {"value": 0.3}), mask=(), motion=TURN, maps=(), **density):
+    table = {
+        "name": "t",
+        "sensor": "URG-04LX",
+        "servo": "MX-64R",
+        "motion": motion,
+        "weight": list(weight),
+        "mask": list(mask),
+        "density": {"ball_radius_deg": 3.0} | density,
+    }
+    return LoadedTask(Task.model_validate(table), Path("t.toml"), load_catalogue(), tuple(maps))
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_a_right_score_passes(objective, motion):
+    loaded = a_task(motion=MOTIONS[motion], objective=objective, required=20.0)
+    require_counted(loaded, SETTING, score(problem_of(loaded), SETTING))
+
+
+WRONG = {
+    "a mask less": lambda loaded: replace(loaded, task=loaded.task.model_copy(update={"mask": ()})),
+    "a region less": lambda loaded: replace(
+        loaded, task=loaded.task.model_copy(update={"weight": loaded.task.weight[1:]})
+    ),
+    "another ball": lambda loaded: a_task(mask=[CONE], ball_radius_deg=3.05, objective=loaded.task.density.objective),
+    "another turn": lambda loaded: a_task(
+        mask=[CONE], motion={"period_s": 3.1}, objective=loaded.task.density.objective
+    ),
+}
+
+
+@pytest.mark.parametrize("objective", ["log", "worst"])
+@pytest.mark.parametrize("wrong", samples(WRONG, ["a mask less", "a region less"]))
+def test_a_score_of_something_else_is_an_error(wrong, objective):
+    loaded = a_task(mask=[{"shape": "cone", "axis": [1, 0.4, -0.5], "half_angle_deg": 15}], objective=objective)
+    other = WRONG[wrong](loaded)
+    found = score(problem_of(other), SETTING)
+    if objective == "worst":  # a fan that sees less somewhere than what is stated
+        found = replace(found, J=found.J - 1.0, least=found.least + 100)
+    with pytest.raises(NumericalError, match=r"count over simulated beams .*please report"):
+        require_counted(loaded, SETTING, found)
+
+
+def test_a_mirrored_plane_is_an_error():
+    loaded = a_task()
+    found = score(problem_of(loaded), SETTING)
+    with pytest.raises(NumericalError):
+        require_counted(loaded, SETTING * [1, 1, 1, -1], found)
+
+
+def half_hidden():
+    """A fan of which a quarter never leaves the scanner, and another one at half of the axis angles."""
+    bearings = load_task(Path("indoor_urg")).lidar.bearings_rad()
+    stator = np.zeros((len(bearings), AXIS_STEPS), dtype=bool)
+    stator[len(bearings) // 2 :, : AXIS_STEPS // 2] = True
+    beams = np.zeros(len(bearings), dtype=bool)
+    beams[: len(bearings) // 4] = True
+    return Shadow(beams, stator)
+
+
+def test_a_score_with_parts_is_counted_with_them():
+    loaded, shadow = a_task(), half_hidden()
+    problem = problem_of(loaded)
+    built = checked_score(loaded, problem, SETTING, shadow)
+    bare = score(problem, SETTING)
+    assert built.J > bare.J + 0.1
+    with pytest.raises(NumericalError):
+        require_counted(loaded, SETTING, bare, shadow)
+    with pytest.raises(NumericalError):
+        require_counted(loaded, SETTING, built)
+
+
+def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monkeypatch):
+    """The fault of commit 099f72a put back: segments kept by their middle circle, no sum compared."""
+    rng = np.random.default_rng(5)
+    cells = np.zeros((24, 48))
+    cells[8:20, 4:40] = rng.random((12, 36)) < 0.25
+    loaded = a_task([{"shape": "map", "file": "w.npy"}], maps=[cells])
+    monkeypatch.setattr(polar_rule, "has_all_breaks", lambda _: True)
+    monkeypatch.setattr(polar_rule, "WEIGHT_OFF", np.inf)
+    problem = problem_of(loaded)
+    best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 30.0})).best[0]
+    with pytest.raises(NumericalError):
+        require_counted(loaded, best.angles_rad, best.score)
+
+
+def test_the_points_drawn_are_a_net():
+    """Of 64 points one lies in each of the 64 cells of 2 x 2 x 2 .. 64 x 1 x 1, whatever the shift."""
+    points = _net(64, np.random.default_rng(1))
+    for shape in ((64, 1, 1), (1, 64, 1), (1, 1, 64), (8, 8, 1), (4, 16, 1)):
+        cells = np.ravel_multi_index((points * shape).astype(int).T, shape)
+        assert len(set(cells.tolist())) == 64, shape
