@@ -13,9 +13,17 @@ import tempfile
 import time
 from pathlib import Path
 
-EXTRAS = {
-    "design": set(),
-    "firmware_io": {"laspy", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},  # from launch on: of ROS 2
+EXTRAS = {  # of the modules below a package, if no name below it has its own
+    "scanwright.design": set(),
+    "scanwright.firmware_io": {
+        "laspy",
+        "pye57",
+        "pypcd4",
+        "launch",
+        "builtin_interfaces",
+        "rclpy",
+    },  # last three: ROS 2
+    "scanwright.cad": {"cadquery"},
     "scanwright": {"cadquery", "foxglove", "jinja2", "manifold3d", "msgspec", "viser"},
 }
 ANGLES = {
@@ -31,26 +39,28 @@ COMMAND = Path(sys.executable).with_name("scanwright")
 
 def load_every_module() -> None:
     """Import all there is; what is missing belongs to an extra, and to one of those that the room may ask for."""
-    for room, missing in EXTRAS.items():
-        lacks = set()
-        for module in pkgutil.walk_packages(importlib.import_module(room).__path__, f"{room}."):
-            try:
-                if not module.name.endswith("__main__"):
-                    importlib.import_module(module.name)
-            except ModuleNotFoundError as error:
-                lacks.add(str(error.name).partition(".")[0])
-        assert lacks <= missing, f"{room} lacks {lacks - missing}: in the base, or in an extra that is asked for first?"
+    for module in pkgutil.walk_packages(importlib.import_module("scanwright").__path__, "scanwright."):
+        package = next(name for name in EXTRAS if module.name.startswith(name))
+        try:
+            if package != "scanwright.cad" and not module.name.endswith("__main__"):
+                importlib.import_module(module.name)
+        except ModuleNotFoundError as error:
+            lacks = str(error.name).partition(".")[0]
+            assert lacks in EXTRAS[package], (
+                f"{module.name} lacks {lacks}: in the base, or in an extra asked for first?"
+            )
     assert "cadquery" not in sys.modules
 
 
 def find_every_file() -> None:
     """What is no code is installed beside it: products, tasks, templates, scripts of the pages, type marks."""
     checkout = Path(__file__).parents[1]
-    for room in (*EXTRAS, "cad"):
-        installed = Path(str(importlib.import_module(room).__file__)).parent
-        files = [path.relative_to(checkout / room) for path in (checkout / room).rglob("*") if path.is_file()]
+    for package in EXTRAS:
+        installed = Path(str(importlib.import_module(package).__file__)).parent
+        folder = checkout / package.rpartition(".")[2]
+        files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
         absent = [file for file in files if "__pycache__" not in file.parts and not (installed / file).exists()]
-        assert not absent, f"{room}: not in the wheel: {absent}"
+        assert not absent, f"{package}: not in the wheel: {absent}"
 
 
 def run(*words: str | Path) -> str:

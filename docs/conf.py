@@ -14,9 +14,10 @@ from pkgutil import resolve_name
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("scanwright", "design", "cad", "firmware_io")
-OURS = re.compile(rf"({'|'.join(PACKAGES)})(\.[A-Za-z_]\w*)+")
-IN_THE_PROJECT = re.compile(rf"(({'|'.join(PACKAGES)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
+FOLDERS = ("scanwright", "design", "cad", "firmware_io")
+OURS = re.compile(r"scanwright(\.[A-Za-z_]\w*)+")
+SHORT = re.compile(r"(?<=`)(?=(design|cad|firmware_io)\.[a-z_])")  # docstrings leave the name of the package out
+IN_THE_PROJECT = re.compile(rf"(({'|'.join(FOLDERS)}|docs|examples|tests|benchmarks)/[\w./-]+|[\w-]+\.md)")
 WRITTEN_BY_A_BUILD = {"wiring.md", "assembly.md"}
 
 project = "Scanwright"
@@ -54,13 +55,13 @@ napoleon_use_ivar = True
 
 apidoc_modules = [
     {
-        "path": f"../{package}",
-        "destination": f"reference/{package}",
+        "path": "../scanwright",
+        "destination": "reference/modules",
+        "follow_links": True,
         "max_depth": 1,
         "module_first": True,
         "automodule_options": {"members", "undoc-members"},
     }
-    for package in PACKAGES
 ]
 
 
@@ -115,6 +116,11 @@ def drawn_as_typed(_app: Any, _what: str, _name: str, _it: Any, _options: Any, l
             lines[k:k] = [" " * _indent(before) + "::", ""]
 
 
+def named_in_full(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
+    """Write `design.frames` as the `scanwright.design.frames` that can be imported."""
+    lines[:] = [SHORT.sub("scanwright.", line) for line in lines]
+
+
 def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
 
@@ -125,5 +131,6 @@ def setup(app: Any) -> None:
         import_module(heavy)  # once: Sphinx forks its readers
     app.connect("source-read", name_rooms)
     app.connect("builder-inited", describe_commands)
+    app.connect("autodoc-process-docstring", named_in_full)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
     app.connect("missing-reference", points_nowhere)

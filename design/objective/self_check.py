@@ -10,15 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.arrays import Setting
-from design.density.beams import NO_LEVER
-from design.errors import NumericalError
-from design.objective.counted import counted_J
-from design.objective.named_objectives import log
-from design.objective.problem import problem_of
-from design.objective.score import Score, score
-from design.shadow import Shadow
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Setting
+from scanwright.design.density.beams import NO_LEVER
+from scanwright.design.errors import NumericalError
+from scanwright.design.objective.counted import counted_J
+from scanwright.design.objective.named_objectives import log
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import Score, score
+from scanwright.design.shadow import Shadow
+from scanwright.design.task.task import LoadedTask
 
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
 NEAR = 5e-3  # a wrong field is off by far more

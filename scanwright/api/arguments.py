@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from design.angles import AngleSet, load_angles
-from design.task.task import LoadedTask, load_task
+from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.task.task import LoadedTask, load_task
 
 if TYPE_CHECKING:
-    from scanwright.pipeline.built import BuiltScanner
+    from scanwright.pipeline.built_scanner import BuiltScanner
 
 TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A loaded task, the name of a shipped one, a file, a build folder, or a table with the keys of a task file."""
@@ -28,7 +28,7 @@ def as_built_scanner(task: TaskLike) -> BuiltScanner | None:
     """Return what a build folder holds; None if the task is given in another form. Raises as `open_built`."""
     if not isinstance(task, str | Path):
         return None
-    from scanwright.pipeline.built import is_build_folder, open_built
+    from scanwright.pipeline.built_scanner import is_build_folder, open_built
 
     return open_built(Path(task)) if is_build_folder(Path(task)) else None
 

@@ -15,13 +15,14 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from design.atomic_file import place_in
-from design.errors import BuildError
-from design.task.task import LoadedTask
+from scanwright.design.atomic_file import place_in
+from scanwright.design.errors import BuildError
+from scanwright.design.task.task import LoadedTask
 
 MANIFEST = "manifest.json"
 _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
-_ROOMS = ("design", "cad", "scanwright")
+_PACKAGES = ("scanwright.design", "scanwright.cad", "scanwright")
+_NESTED = {"design", "cad", "firmware_io"}  # links in a checkout, folders of an installed package: each file once
 _NAMED = 3  # files of a kind in one line; of more their number
 
 
@@ -58,12 +59,14 @@ def versions() -> dict[str, str]:
 def code_digest() -> str:
     """Digest of our own code, 12 hex digits: a checkout may be ahead of its version."""
     digest = hashlib.sha256()
-    for room in _ROOMS:
-        spec = find_spec(room)
+    for package in _PACKAGES:
+        spec = find_spec(package)
         for root in [] if spec is None else sorted(spec.submodule_search_locations or []):
-            for path in sorted(path for path in Path(root).rglob("*") if path.suffix in _CODE):
-                digest.update(f"{room}/{path.relative_to(root).as_posix()}\n".encode())
-                digest.update(path.read_bytes())
+            for path in sorted(path for path in Path(root).resolve().rglob("*") if path.suffix in _CODE):
+                name = path.relative_to(Path(root).resolve())
+                if package != "scanwright" or name.parts[0] not in _NESTED:
+                    digest.update(f"{package}/{name.as_posix()}\n".encode())
+                    digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 

@@ -16,7 +16,7 @@ from typing import get_args
 from beartype import beartype
 from jaxtyping import AbstractArray, jaxtyped
 
-FLOORS = ("design", "firmware_io")
+FLOORS = ("scanwright.design", "scanwright.firmware_io")
 CALLS = 3
 
 _calls = Counter()
@@ -35,7 +35,7 @@ def install():
 class _Finder:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        if name.split(".")[0] not in FLOORS:
+        if not name.startswith(FLOORS):
             return None
         spec = PathFinder.find_spec(name, path, target)
         if spec is not None and type(spec.loader) is SourceFileLoader:

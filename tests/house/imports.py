@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-FLOORS = ("design", "cad", "firmware_io", "scanwright")
+PACKAGE = "scanwright"
+FLOORS = ("design", "cad", "firmware_io", PACKAGE)  # folders; in the package the first three are links, and are skipped
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,9 @@ def modules(root=ROOT, floors=FLOORS):
     for floor in floors:
         for path in sorted((root / floor).rglob("*.py")):
             parts = path.relative_to(root).with_suffix("").parts
+            if floor == PACKAGE and parts[1] in FLOORS:
+                continue
+            parts = parts if floor == PACKAGE else (PACKAGE, *parts)
             found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 

@@ -11,7 +11,7 @@ import networkx as nx
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from imports import FLOORS, ROOT, imports, loaded_by, modules
+from imports import FLOORS, PACKAGE, ROOT, imports, loaded_by, modules
 
 MOST = 12
 MOST_IN = {"cad/parts": 24}  # one a part
@@ -50,7 +50,7 @@ HEAVY = {
 def folders():
     """How many modules stand in each folder, `__init__` not counted."""
     tops = (*FLOORS, "benchmarks", "tests", "examples")
-    files = [path for top in tops for path in (ROOT / top).rglob("*.py") if path.name != "__init__.py"]
+    files = {path.resolve() for top in tops for path in (ROOT / top).rglob("*.py") if path.name != "__init__.py"}
     return Counter(path.parent.relative_to(ROOT).as_posix() for path in files)
 
 
@@ -66,23 +66,23 @@ def test_every_room_says_in_one_line_what_one_finds_there():
 
 
 def test_no_files_import_each_other_in_a_circle():
-    graph = nx.DiGraph((one.importer, one.imported) for one in imports() if one.imported.split(".")[0] in FLOORS)
+    graph = nx.DiGraph((one.importer, one.imported) for one in imports() if one.imported.split(".")[0] == PACKAGE)
     assert [sorted(circle) for circle in nx.strongly_connected_components(graph) if len(circle) > 1] == []
 
 
 def test_the_search_for_circles_sees_imports_in_functions_and_for_types(tmp_path):
     (tmp_path / "design").mkdir()
-    (tmp_path / "design" / "a.py").write_text("def f():\n    import design.b\n")
-    (tmp_path / "design" / "b.py").write_text("if TYPE_CHECKING:\n    from design.a import f\n")
+    (tmp_path / "design" / "a.py").write_text("def f():\n    import scanwright.design.b\n")
+    (tmp_path / "design" / "b.py").write_text("if TYPE_CHECKING:\n    from scanwright.design.a import f\n")
     graph = nx.DiGraph((one.importer, one.imported) for one in imports(tmp_path, ("design",)))
-    assert {"design.a", "design.b"} in list(nx.strongly_connected_components(graph))
+    assert {"scanwright.design.a", "scanwright.design.b"} in list(nx.strongly_connected_components(graph))
 
 
 def test_an_import_inside_a_function_keeps_a_heavy_library_out_of_the_start():
     every = imports()
     idle = []
     for one in every:
-        if one.where == "function" and one.imported.split(".")[0] in FLOORS:
+        if one.where == "function" and one.imported.split(".")[0] == PACKAGE:
             spared = loaded_by(one.imported, every) - loaded_by(one.importer, every)
             if not {name.split(".")[0] for name in spared} & HEAVY:
                 idle.append(f"{one.importer} -> {one.imported}")

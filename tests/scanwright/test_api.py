@@ -1,18 +1,22 @@
 """The Python interface: what a notebook does, and what importing it costs."""
 
+import ast
 import doctest
+import shutil
 import subprocess
 import sys
-from inspect import isfunction
+from importlib.metadata import version
+from inspect import isclass, isfunction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import scanwright as sw
-from design.errors import RecordingError, TaskError
 from scanwright import api
 from scanwright.api import tasks
+from scanwright.design import errors as design_errors
+from scanwright.design.errors import RecordingError, TaskError
 
 TASK = {
     "name": "ahead",
@@ -42,12 +46,56 @@ def test_loading_a_task_loads_neither_kernel_nor_compiler_nor_pictures():
     assert not loaded & {"cadquery", "OCP", "scipy.spatial", "numba", "matplotlib", "trimesh"}
 
 
-def test_every_public_name_is_a_documented_function_and_no_other_is_there():
-    assert set(sw.__all__) == {name for name, value in vars(api).items() if isfunction(value)}
-    for name in sw.__all__:
-        assert getattr(sw, name) is getattr(api, name)
-        assert callable(getattr(sw, name))
+def test_every_public_name_is_documented_and_is_a_function_of_the_api_or_a_type():
+    functions = {name for name, value in vars(api).items() if isfunction(value)}
+    for name in set(sw.__all__) - {"__version__"}:
         assert getattr(sw, name).__doc__, name
+        assert isclass(getattr(sw, name)) is (name not in functions), name
+    assert functions <= set(sw.__all__)
+    assert sw.__version__ == version("scanwright")
+
+
+def test_all_that_the_functions_take_and_return_is_public():
+    """Names of our own in the annotations of the API; aliases such as `TaskLike` are unions of public types."""
+    private = set()
+    for path in Path(api.__file__).parent.glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        ours = {
+            alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("scanwright.")
+            for alias in node.names
+        }
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef) and node.name in sw.__all__:
+                hints = [one.annotation for one in (*node.args.args, *node.args.kwonlyargs)] + [node.returns]
+                used = {one.id for hint in hints for one in ast.walk(hint) if isinstance(one, ast.Name)}
+                private |= used & ours - set(sw.__all__)
+    assert private <= {"AnglesLike", "Say", "TaskLike", "Trajectory"}, private
+
+
+def test_every_error_is_public():
+    errors = {name for name, value in vars(design_errors).items() if isclass(value) and issubclass(value, Exception)}
+    assert errors <= set(sw.__all__)
+
+
+@pytest.mark.parametrize(
+    "command", [["-c", "import scanwright; scanwright.load_task('ceiling')"], ["-m", "scanwright", "catalogue"]]
+)
+def test_files_named_like_our_folders_do_not_matter(tmp_path, command):
+    for name in ("design", "cad", "firmware_io"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('the wrong module was imported')")
+    ran = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_a_clone_without_symbolic_links_says_so(tmp_path):
+    package = Path(sw.__file__).parent
+    (tmp_path / "scanwright").mkdir()
+    shutil.copy(package / "__init__.py", tmp_path / "scanwright")
+    (tmp_path / "scanwright" / "design").write_text("../design")
+    ran = subprocess.run([sys.executable, "-c", "import scanwright"], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.stderr.splitlines()[-1].startswith("ImportError: scanwright/design is no folder")
     assert set(sw.__all__) <= set(dir(sw))
     with pytest.raises(AttributeError, match="no attribute 'optimize'"):
         _ = sw.optimize
@@ -88,8 +136,8 @@ def test_a_linkage_comes_as_a_shape_of_cadquery():
 
 
 def test_a_recording_comes_as_arrays(tmp_path):
-    from firmware_io.recording.recording import RecordingWriter
-    from firmware_io.samples import Scan
+    from scanwright.firmware_io.recording.recording import RecordingWriter
+    from scanwright.firmware_io.samples import Scan
 
     start_ns = 1_700_000_000_000_000_000
     with RecordingWriter(tmp_path / "two.mcap", {}) as writer:

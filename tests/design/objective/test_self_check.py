@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from design.catalogue.catalogue import load_catalogue
-from design.errors import NumericalError
-from design.objective.counted import _net
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.objective.self_check import require_counted
-from design.search.search import search
-from design.search.with_parts import checked_score
-from design.shadow import AXIS_STEPS, Shadow
-from design.sphere import polar_rule
-from design.task.task import LoadedTask, Task, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import NumericalError
+from scanwright.design.objective.counted import _net
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.objective.self_check import require_counted
+from scanwright.design.search.search import search
+from scanwright.design.search.with_parts import checked_score
+from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.sphere import polar_rule
+from scanwright.design.task.task import LoadedTask, Task, load_task
 
 GROUND = {"shape": "ground", "height_m": 0.5, "from_m": 0.5, "to_m": 2.0, "width_m": 2.0}
 CONE = {"shape": "cone", "axis": [1, 0, -0.5], "half_angle_deg": 30}

@@ -12,10 +12,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design import frames
-from design.errors import SceneError
-from design.scene.nearest import by_boxes, by_embree
-from design.scene.ray_caster import Scene, build_scene, cast, load_scene, load_triangles
+from scanwright.design import frames
+from scanwright.design.errors import SceneError
+from scanwright.design.scene.nearest import by_boxes, by_embree
+from scanwright.design.scene.ray_caster import Scene, build_scene, cast, load_scene, load_triangles
 
 seeds = st.integers(0, 2**32 - 1)
 each_search = pytest.mark.parametrize("search", [by_embree, by_boxes])
@@ -234,7 +234,6 @@ def test_a_unit_that_the_file_contradicts_is_refused(tmp_path):
 
 
 def test_who_casts_no_ray_loads_no_mesh_library():
-    code = (
-        "import sys, design.scene.ray_caster; sys.exit(any(m in sys.modules for m in ('trimesh', 'embreex', 'rtree')))"
-    )
+    heavy = "('trimesh', 'embreex', 'rtree')"
+    code = f"import sys, scanwright.design.scene.ray_caster; sys.exit(any(m in sys.modules for m in {heavy}))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -9,8 +9,8 @@ import pytest
 from quick_tests import samples
 
 import scanwright.api as sw
-from design.task.task import shipped_tasks
-from scanwright.pipeline.built import is_build_folder, open_built
+from scanwright.design.task.task import shipped_tasks
+from scanwright.pipeline.built_scanner import is_build_folder, open_built
 
 
 @pytest.fixture
