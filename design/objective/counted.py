@@ -23,6 +23,7 @@ SETS, POINTS = 8, 2**15  # shifts, and directions that each draws in every regio
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
 PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
 MOST_LISTED = 4_000_000  # lines of all phases of a sweep
+PROBED, SPARSEST = 4096, 256.0  # directions that tell how many have a weight; times more are drawn if few have
 BITS = 32  # of a coordinate of the net
 X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
@@ -31,7 +32,7 @@ X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 class Counted:
     """J, three standard errors of it, the least count met, and the share of weight where none was.
 
-    Of `worst` the error is 0: the least count that was found.
+    Of `worst` the error is 0: the least count that was found. It is infinite if no drawn direction has a weight.
     """
 
     J: float
@@ -79,15 +80,22 @@ def counted_J(
         directions, value, area, required, phase = _weighted(layers, cubes)
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
         in_rot = _turned(_turned(directions, X, -alpha_rot), Y, -beta_rot)
-        counts = repeats * _counts(in_rot, beams[order], turned, mine, lines, first, ball, blocked[order])
+        counts, keep = np.zeros(len(value), dtype=np.int64), value > 0
+        counts[keep] = repeats * _counts(
+            in_rot[keep], beams[order], turned[keep], mine[keep], lines, first, ball, blocked[order]
+        )
         return counts, value, area, required
 
     drawing = drawn_in(layers)
+    probe = _weighted(layers, [_net(PROBED, np.random.default_rng(seed)) for _ in drawing])[1]
+    points *= 1 << int(np.log2(min(SPARSEST, 1 / max((probe > 0).mean(), 1e-9))))
     for k in range(sets):
         rng = np.random.default_rng([seed, k])
         cubes = [_net(points, rng) for _ in drawing]
         counts, value, area, required = counted(cubes)
         keep = value > 0
+        if not keep.any():
+            continue
         moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
         least = min(least, int(counts[keep].min()))
         weight = value * area
@@ -98,11 +106,13 @@ def counted_J(
             keep = value > 0
             if keep.any():
                 least = min(least, int(counts[keep].min()))
+    if len(moments) < 2:
+        return Counted(np.nan, np.inf, 0, np.nan)
     if objective == "worst":
         return Counted(-float(np.log(1 + least)), 0.0, least, none)
     each = np.array([_joined(objective, m) for m in moments])
     J = _joined(objective, np.mean(moments, axis=0))
-    return Counted(float(J), float(3 * np.std(each, ddof=1) / sets**0.5), least, none)
+    return Counted(float(J), float(3 * np.std(each, ddof=1) / len(moments) ** 0.5), least, none)
 
 
 def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:

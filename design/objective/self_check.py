@@ -12,7 +12,7 @@ import numpy as np
 
 from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import NO_LEVER
-from scanwright.design.errors import NumericalError
+from scanwright.design.errors import NumericalError, TaskError
 from scanwright.design.objective.counted import counted_J
 from scanwright.design.objective.named_objectives import log
 from scanwright.design.objective.problem import problem_of
@@ -48,6 +48,7 @@ def require_counted(
 
     Raises:
         NumericalError: they differ by more than their errors.
+        TaskError: the masks leave next to nothing of the regions.
     """
     if loaded.task.density.objective == "worst":
         if shadow is None and lever == NO_LEVER:
@@ -56,6 +57,8 @@ def require_counted(
         return
     for most in (DRAWN, (AGAIN,)):
         J, J_error = _counted(loaded, angles_rad, most, shadow, lever)
+        if np.isinf(J_error):
+            raise TaskError("weight: masks leave too little of the regions to draw directions in: widen them")
         if J == found.J or abs(J - found.J) <= found.J_error + J_error:
             return
     raise NumericalError(

@@ -12,7 +12,8 @@ from numpy import ndarray
 from scanwright.design.arrays import Vector
 from scanwright.design.sphere.regions import Field, cross, frames_about
 
-LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
+LOOKS_AROUND = 12  # at what lies around a point of an edge
+LOOK_RAD = 2e-6  # how far from it: regions are 0.001 deg thick at least, what masks leave of them may be less
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
 MOST_CORNERED = 256  # edges of bands and cones whose corners are looked for: pairs of them
 

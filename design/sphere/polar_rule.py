@@ -179,6 +179,8 @@ def _touched_points(field: Field, axis: Vector) -> Float[ndarray, "n 3"]:
     """Points at which a circle about `axis` touches an edge of the region, shape (n, 3)."""
     planes = breaking_planes(field)
     touched = touched_points(planes, axis)
-    across = LOOK_RAD * np.concatenate([planes[:, :3], planes[:, :3]])
+    across = np.tile(planes[:, :3], (2, 1))
+    across -= touched * np.einsum("ij,ij->i", touched, across)[:, None]  # along the sphere
+    across *= LOOK_RAD / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
     inside, outside = field.weight_at(np.concatenate([touched + across, touched - across])).reshape(2, -1)
     return touched[inside != outside]
