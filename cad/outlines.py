@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 
 def diamond(half: float, y: float) -> Array:

@@ -13,10 +13,9 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 from numpy.typing import ArrayLike
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 from scipy.spatial import ConvexHull
-
-from design.arrays import Array
-from design.errors import BuildError
 
 
 @contextmanager

@@ -6,8 +6,9 @@ servo="/dev/serial/by-id/...")`. The folder needs no more than an `angles.json`.
 
 from pathlib import Path
 
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+
 import scanwright as sw
-from firmware_io.twins.scanner import emulated_scanner, room
 
 TASK = {
     "name": "twins",

@@ -7,11 +7,11 @@ Times are nanoseconds since 1970. Here both come from a simulation; put your own
 from pathlib import Path
 
 import numpy as np
+from scanwright.firmware_io.recording.arrays import RecordingArrays
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import Scan
 
 import scanwright as sw
-from firmware_io.recording.arrays import RecordingArrays
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import Scan
 
 TASK = {
     "name": "own_device",

@@ -6,12 +6,12 @@ The scanner is simulated at two places of a room, the second turned by 40 deg; n
 from pathlib import Path
 
 import numpy as np
+from scanwright.design.frames import Rz, apply, rigid
+from scanwright.design.scene.ray_caster import build_scene
+from scanwright.firmware_io.twins.simulated import simulated_recording
+from scanwright.firmware_io.twins.world import furnished_room
 
 import scanwright as sw
-from design.frames import Rz, apply, rigid
-from design.scene.ray_caster import build_scene
-from firmware_io.twins.simulated import simulated_recording
-from firmware_io.twins.world import furnished_room
 
 TASK = {
     "name": "stands",

@@ -9,12 +9,11 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from scanwright.design.atomic_file import place_in, whole_file
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.errors import DeviceError
 from serial.tools import list_ports
-
-from design.atomic_file import place_in, whole_file
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar, Servo
-from design.errors import DeviceError
 
 _FILE = "emulated.json"
 

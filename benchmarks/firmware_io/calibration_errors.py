@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scanwright.design.errors import ScanwrightError
+from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 from scipy.stats import chi2
 
 from benchmarks.firmware_io.calibration import MOUNT, designed, faulty
@@ -34,8 +36,6 @@ from benchmarks.firmware_io.rooms import (
     walked,
     write,
 )
-from design.errors import ScanwrightError
-from firmware_io.calibration.calibrate import calibrate_recordings
 
 WRONG = 18.5
 BEAMS = 180

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import JointLog, Scan
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
-
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import JointLog, Scan
 
 Floats = NDArray[np.float64]
 START_NS = 1_700_000_000_000_000_000

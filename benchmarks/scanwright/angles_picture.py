@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from matplotlib.figure import Figure
+from scanwright.design.arrays import Array
+from scanwright.design.frames import R_rot_laser, R_world_rot, rigid
 
 from benchmarks.scanwright.canvas import Canvas
-from design.arrays import Array
-from design.frames import R_rot_laser, R_world_rot, rigid
 
 PICTURE = Path(__file__).parents[2] / "docs/pictures/angles.png"
 TURNED_DEG = 35.0

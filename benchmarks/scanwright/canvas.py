@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import trimesh
 from PIL import Image
+from scanwright.design.arrays import Array
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -26,8 +27,6 @@ from vtkmodules.vtkRenderingCore import (
     vtkWindowToImageFilter,
 )
 from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
-
-from design.arrays import Array
 
 Rgb = tuple[float, float, float]
 SMOOTH_DEG = 30.0  # edges sharper than this stay sharp

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import trimesh
+from scanwright.design.arrays import Array
 
 from benchmarks.scanwright.robot_picture import box, surroundings
-from design.arrays import Array
 
 SEED = 7
 

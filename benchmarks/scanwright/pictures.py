@@ -16,11 +16,11 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from scanwright.design.angles import AngleSet
 
 import scanwright as sw
 from benchmarks.scanwright.canvas import Canvas
 from benchmarks.scanwright.robot_picture import height_colours, points_of, scanner_bodies
-from design.angles import AngleSet
 
 HERE = Path(__file__).parents[2] / "docs/pictures"
 ROLLING = (0.0, 90.0, 0.0, -90.0)

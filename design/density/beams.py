@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 from numpy.typing import ArrayLike
-
-from design import frames
+from scanwright.design import frames
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
+from scanwright.design.task.task import LoadedTask
 from scipy.spatial.transform import Rotation
-
-from design.arrays import Array, Mask
-from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
-from design.task.task import LoadedTask
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ from jaxtyping import Float64
 from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
-
-from design.arrays import Floats
+from scanwright.design.arrays import Floats
 
 
 @njit(cache=True)

@@ -10,12 +10,11 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TransformStamped
 from numpy.typing import NDArray
+from scanwright.design.arrays import Pose
+from scanwright.firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
+from scanwright.firmware_io.samples import Scan
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2, PointField
-
-from design.arrays import Pose
-from firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
-from firmware_io.samples import Scan
 
 
 def time_of(time_ns: int) -> Any:

@@ -1,9 +1,8 @@
 """A full scan direction by direction, and the count of its beams by floor and ceil: what densities are held against."""
 
 import numpy as np
-
-from design.density.beams import scan_at
-from design.density.phase_walk import half_width, halves
+from scanwright.design.density.beams import scan_at
+from scanwright.design.density.phase_walk import half_width, halves
 
 
 def simulated_scan(bearings_rad, lines, angles_rad, start_phase_rad=0.0):

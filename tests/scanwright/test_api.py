@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scanwright.design.errors import RecordingError, TaskError
 
 import scanwright as sw
-from design.errors import RecordingError, TaskError
 from scanwright import api
 from scanwright.api import tasks
 
@@ -88,8 +88,8 @@ def test_a_linkage_comes_as_a_shape_of_cadquery():
 
 
 def test_a_recording_comes_as_arrays(tmp_path):
-    from firmware_io.recording.recording import RecordingWriter
-    from firmware_io.samples import Scan
+    from scanwright.firmware_io.recording.recording import RecordingWriter
+    from scanwright.firmware_io.samples import Scan
 
     start_ns = 1_700_000_000_000_000_000
     with RecordingWriter(tmp_path / "two.mcap", {}) as writer:

@@ -17,12 +17,13 @@ import argparse
 import sys
 from pathlib import Path
 
+from scanwright.design.errors import ScanwrightError
+
 from benchmarks.scanwright.study.costs import measure_costs
 from benchmarks.scanwright.study.efficiency import efficiency
 from benchmarks.scanwright.study.invented import run_invented
 from benchmarks.scanwright.study.kills import kills
 from benchmarks.scanwright.study.memory import memory
-from design.errors import ScanwrightError
 
 
 def main() -> None:

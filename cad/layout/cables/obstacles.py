@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scanwright.design.arrays import Array, Mask
 from scipy.spatial import ConvexHull
-
-from design.arrays import Array, Mask
 
 HUB_SIDES = 24
 Way = Callable[[Array], Mask]

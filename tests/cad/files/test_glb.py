@@ -7,10 +7,9 @@ import struct
 import numpy as np
 import pytest
 import trimesh
+from scanwright.cad.files.glb import shaded
+from scanwright.cad.geometry.mesh import TriMesh
 from scipy.spatial.transform import Rotation
-
-from cad.files.glb import shaded
-from cad.geometry.mesh import TriMesh
 
 SIZE = {5123: ("<u2", 2), 5125: ("<u4", 4), 5126: ("<f4", 4)}
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from quick_tests import samples
 from scanners import CAPSULE, UPRIGHT, scanner_at
+from scanwright.cad.layout.names import BASE_MOUNT
 
 from benchmarks.cad import elements, freecad
-from cad.layout.names import BASE_MOUNT
 
 SETTINGS = {  # five linkages, three of them on a mount
     "ground_ahead": None,

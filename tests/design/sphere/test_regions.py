@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from quick_tests import samples
 from random_fields import field, random_case
+from scanwright.design.sphere.outline import reach_about
 from scipy.spatial.transform import Rotation
-
-from design.sphere.outline import reach_about
 
 
 def slow_value(direction, regions, maps, background):

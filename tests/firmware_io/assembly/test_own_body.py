@@ -1,8 +1,7 @@
 """Which beams end on the scanner: what was looked at reaches to the next beam and not beyond."""
 
 import numpy as np
-
-from firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.own_body import OwnBody
 
 STEP_RAD = 0.01
 

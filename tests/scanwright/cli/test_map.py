@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
 import scanwright as sw
-from design.angles import AngleSet
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
 
 ANGLES = {
     "schema": "scanwright/angles/1",

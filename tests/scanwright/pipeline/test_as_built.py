@@ -7,9 +7,9 @@ import re
 
 import pytest
 from quick_tests import samples
+from scanwright.design.task.task import shipped_tasks
 
 import scanwright.api as sw
-from design.task.task import shipped_tasks
 from scanwright.pipeline.built import is_build_folder, open_built
 
 

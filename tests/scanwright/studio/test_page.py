@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import viser.transforms
 from matplotlib.image import imread
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.task.task import load_task
 
-from design.search.optimum import find_optimum
-from design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
 from scanwright.serving.style import ramp
 from scanwright.studio.page import Studio
