@@ -17,6 +17,7 @@ import tarfile
 import tempfile
 import tomllib
 import zipfile
+from collections import Counter
 from pathlib import Path
 
 from hatchling.builders.sdist import SdistBuilder
@@ -56,22 +57,22 @@ def source_files(source: Path) -> list[Path]:
     return sorted(path for name in set(listed.split("\0")) if name and (path := source / name).is_file())
 
 
-def package_files(source: Path) -> dict[str, Path]:
-    """Return the source of each file that the packages in pyproject.toml hold, by the file's SHA-256."""
+def package_files(source: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file of the packages that pyproject.toml names, by its path in the checkout."""
     wheel = tomllib.loads((source / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
     folders = [(source / package).resolve() for package in wheel["packages"]]
     files = [path for path in source_files(source) if any(folder in path.resolve().parents for folder in folders)]
-    return {hashlib.sha256(path.read_bytes()).hexdigest(): path.relative_to(source) for path in files}
+    return {path.relative_to(source).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def faults_of_wheel(held: dict[str, str], packages: dict[str, Path]) -> list[str]:
+def faults_of_wheel(held: dict[str, str], packages: dict[str, str]) -> list[str]:
     """Compare the files of a wheel with those of the packages, by content: a build may give folders other names."""
-    foreign = [name for name, digest in held.items() if ".dist-info/" not in name and digest not in packages]
-    absent = [path.as_posix() for digest, path in packages.items() if digest not in held.values()]
-    legal = [] if any(name.endswith(".dist-info/licenses/LICENSE") for name in held) else ["LICENSE"]
-    return [f"{name}: in the wheel, but in no package" for name in foreign] + [
-        f"{name}: not in the wheel" for name in absent + legal
-    ]
+    packed = {name: digest for name, digest in held.items() if ".dist-info/" not in name}
+    foreign = Counter(packed.values()) - Counter(packages.values())
+    absent = Counter(packages.values()) - Counter(packed.values())
+    faults = [f"{name}: in the wheel, but in no package" for name, digest in packed.items() if digest in foreign]
+    faults += [f"{name}: not in the wheel" for name, digest in packages.items() if digest in absent]
+    return faults if any(name.endswith("licenses/LICENSE") for name in held) else [*faults, "LICENSE: not in the wheel"]
 
 
 def faults_of_sdist(source: Path, tree: Path) -> list[str]:
