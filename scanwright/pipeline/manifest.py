@@ -18,7 +18,6 @@ from typing import Any
 from design.atomic_file import place_in
 from design.errors import BuildError
 from design.task.task import LoadedTask
-from scanwright import __version__
 
 MANIFEST = "manifest.json"
 _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
@@ -52,7 +51,7 @@ class Changes:
 def versions() -> dict[str, str]:
     """Versions of this program and of everything that writes bytes of a build: what the extra `cad` pins."""
     pinned = {line.split("==")[0] for line in requires("scanwright") or () if re.search(r"extra == .cad\b", line)}
-    return {"scanwright": __version__} | {name: _version(name) for name in sorted(pinned)}
+    return {name: _version(name) for name in ("scanwright", *sorted(pinned))}
 
 
 @cache
