@@ -52,7 +52,7 @@ def unpacked(sdist: Path, folder: Path) -> Path:
 
 def source_files(source: Path) -> list[Path]:
     """Return the files of a checkout, sorted, without those that git ignores."""
-    command = ["git", "-C", source, "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    command = ["git", "-C", str(source), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     listed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return sorted(path for name in set(listed.split("\0")) if name and (path := source / name).is_file())
 
@@ -95,7 +95,7 @@ def slow_starts(wheel: Path, environment: Path) -> list[str]:
     sync = ["uv", "sync", "--quiet", "--offline", "--frozen", "--no-default-groups", "--no-install-project"]
     at = {"UV_PROJECT_ENVIRONMENT": str(environment)}
     subprocess.run([*sync, "--python", sys.executable], check=True, cwd=ROOT, env=os.environ | at)
-    install = ["uv", "pip", "install", "--quiet", "--offline", "--no-deps", "--python", environment, wheel]
+    install = ["uv", "pip", "install", "--quiet", "--offline", "--no-deps", "--python", str(environment), str(wheel)]
     subprocess.run(install, check=True)
     subprocess.run(["uv", "pip", "check", "--quiet", "--python", environment], check=True)
     faults = []
