@@ -16,7 +16,7 @@ from pathlib import Path
 EXTRAS = {
     "design": set(),
     "firmware_io": {"laspy", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},  # from launch on: of ROS 2
-    "scanwright": {"cadquery", "foxglove", "jinja2", "manifold3d", "msgspec", "viser"},
+    "scanwright": {"cadquery", "jinja2", "manifold3d", "msgspec", "viser", "websockets"},
 }
 ANGLES = {
     "schema": "scanwright/angles/1",

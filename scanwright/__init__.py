@@ -2,7 +2,7 @@
 
     import scanwright as sw
 
-The names below are those of `scanwright.api`, each loaded when it is first asked for.
+The names below are those of `scanwright.api`; each is loaded at its first use.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
         simulate,
         write_cloud,
     )
+
+__version__ = "0.2.0"  # the only place that states it: the build and `--version` read it here
 
 __all__ = [
     "assemble",
