@@ -15,16 +15,9 @@ from pathlib import Path
 
 EXTRAS = {  # of the modules below a package, if no name below it has its own
     "scanwright.design": set(),
-    "scanwright.firmware_io": {
-        "laspy",
-        "pye57",
-        "pypcd4",
-        "launch",
-        "builtin_interfaces",
-        "rclpy",
-    },  # last three: ROS 2
+    "scanwright.firmware_io": {"laspy", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},
     "scanwright.cad": {"cadquery"},
-    "scanwright": {"cadquery", "foxglove", "jinja2", "manifold3d", "msgspec", "viser"},
+    "scanwright": {"cadquery", "jinja2", "manifold3d", "msgspec", "viser", "websockets"},
 }
 ANGLES = {
     "schema": "scanwright/angles/1",

@@ -13,6 +13,8 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+from scanwright import __version__
+
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("scanwright", "design", "cad", "firmware_io")
 OURS = re.compile(r"scanwright(\.[A-Za-z_]\w*)+")
@@ -27,7 +29,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphin
 suppress_warnings = ["ref.python"]  # a word that several classes have, such as shape, is no reference
 exclude_patterns = ["_build", "reference/*/modules.rst"]
 html_theme = "furo"
-html_title = "Scanwright"
+html_title = f"Scanwright {__version__}"
 html_show_sphinx = False
 default_role = "py:obj"
 

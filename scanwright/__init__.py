@@ -12,8 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+__version__ = "0.2.0"
+
 if TYPE_CHECKING:
-    __version__: str
     from scanwright.api import assemble as assemble
     from scanwright.api import build as build
     from scanwright.api import calibrate as calibrate
@@ -167,16 +168,10 @@ __all__ = [
 ]
 
 if not Path(__file__).with_name("design").is_dir():
-    raise ImportError(
-        "scanwright/design is no folder: clone again with symbolic links (git -c core.symlinks=true clone)"
-    )
+    raise ImportError("scanwright/design is no folder: clone with symbolic links (git clone -c core.symlinks=true)")
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        from importlib.metadata import version
-
-        return version("scanwright")
     if name in __all__:
         return getattr(import_module(_TYPES.get(name, "scanwright.api")), name)
     raise AttributeError(f"module 'scanwright' has no attribute '{name}'")

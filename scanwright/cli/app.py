@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from scanwright import __version__
 from scanwright.cli import clouds, design, devices, new, pages, parts
 from scanwright.cli.console import complain, own_voice
 from scanwright.cli.help import Commands, GroupedHelp
@@ -50,9 +51,7 @@ def scanwright(
 ) -> None:
     """One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar."""
     if version:
-        from importlib.metadata import version as version_of
-
-        print(f"scanwright {version_of('scanwright')}")
+        print(f"scanwright {__version__}")
     elif context.invoked_subcommand is None:
         print(context.get_help())
 
