@@ -276,7 +276,7 @@ def section(entry: Entry, folder: Path) -> str:
     problem = problem_as_built(loaded, angles)
     shadow = load_own_body(folder / "own_body.npz")[0]
     planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
-    said = sentences(angles, answer(problem, angles, shadow), 2 * float(np.tan(problem.ball_rad)), planes)
+    said = sentences(angles, answer(problem, loaded.task, angles, shadow), 2 * float(np.tan(problem.ball_rad)), planes)
     found = angles.angles_deg
     four = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
     words = (

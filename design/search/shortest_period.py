@@ -15,8 +15,10 @@ from design.objective.problem import NODES, Problem, problem_of
 from design.objective.quadrature import polar_rule
 from design.objective.score import score
 from design.search.coarse import Progress
+from design.search.constraints import Requirements
 from design.search.families import Family
 from design.search.limits import line_gaps_deg
+from design.search.mounts.preference import simplest_first
 from design.search.search import SearchResult, search
 from design.task.named_products import fastest_rpm
 from design.task.task import LoadedTask
@@ -51,7 +53,12 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
         progress(f"{period:g} s keep the limits: searching again")
         now = _at(loaded, period)
         problem = problem_of(now)
-        result = replace(result, best=_rescored(problem, result.best, periods, period))
+        able = _rescored(problem, result.best, periods, period)
+        required = Requirements(problem, limits, now.task.angles.holes == "avoid" and result.least_blind is None)
+        if now.task.angles.prefer == "simple":
+            result = replace(result, best=simplest_first(required, now.task.angles, able), lowest=able[0])
+        else:
+            result = replace(result, best=able)
         try:
             result = search(problem, now.task.angles, progress, limits)
         except TaskError:  # none of the families of this period is the one that allows it: that one stays

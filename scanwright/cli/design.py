@@ -141,7 +141,7 @@ def compare(
     ] = Path("out/compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Put the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
+    """Compare the optimum with the reference mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
     from scanwright import api
     from scanwright.api.arguments import as_built_scanner
     from scanwright.pipeline.comparison import write_comparison

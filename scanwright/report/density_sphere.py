@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from design.angles import AngleSet, standard_settings
+from design.angles import AngleSet
 from design.arrays import Array
+from design.evaluation.as_built import AsBuilt
 from design.evaluation.coverage import mean_density_at
 from design.frames import R_world_rot
 from design.objective.problem import Problem
@@ -81,13 +82,19 @@ class DensitySphere:
 
 
 def density_sphere(
-    problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float, shadow: Shadow | None = None
+    problem: Problem,
+    angles: AngleSet,
+    seen: AsBuilt,
+    axes: Array | None,
+    step_deg: float,
+    shadow: Shadow | None = None,
 ) -> DensitySphere:
-    """Density of the scanner and of the standard alignments on one scale, J over the axes, and where the axis points.
+    """Density of the scanner and of the reference mounts on one scale, J over the axes, and where the axis points.
 
     Args:
         problem: the task, `problem_as_built`.
         angles: what was built.
+        seen: the same with the reference mounts.
         axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
         step_deg: of the grid that was searched.
         shadow: beams that the parts of the scanner block; None if they are not known.
@@ -101,8 +108,8 @@ def density_sphere(
     masked = problem.field.masked_at(directions).reshape(shape)
     own = f"this scanner, {'without' if shadow is None else 'with'} parts"
     densities = {own: mean_density_at(problem, setting, directions, shadow)}
-    for name, mount in standard_settings().items():
-        densities[f"{name}, without parts"] = mean_density_at(problem, mount, directions)
+    for gain in (mount.gain for mount in seen.mounts):
+        densities[f"{gain.mount.name}, without parts"] = mean_density_at(problem, gain.mount.angles_rad, directions)
     maps = _drawn(densities, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))
