@@ -150,7 +150,8 @@ def compare(
     loaded = api.load_task(task) if built is None else built.loaded
     found = write_comparison(loaded, out / loaded.task.name, Progress(), built)
     if as_json:
-        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows]})
+        gains = [gain.facts() for gain in found.optimum.gains]
+        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows], "gains": gains})
     else:
         show(found.lines())
 

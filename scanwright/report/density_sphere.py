@@ -6,6 +6,7 @@ a build have the same colours.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,10 +19,10 @@ from scipy.spatial import cKDTree
 
 from design.angles import AngleSet
 from design.arrays import Array
-from design.evaluation.as_built import AsBuilt
 from design.evaluation.coverage import mean_density_at
 from design.frames import R_world_rot
 from design.objective.problem import Problem
+from design.search.mounts.reference import TunedMount
 from design.shadow import Shadow
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
@@ -84,7 +85,7 @@ class DensitySphere:
 def density_sphere(
     problem: Problem,
     angles: AngleSet,
-    seen: AsBuilt,
+    mounts: Iterable[TunedMount],
     axes: Array | None,
     step_deg: float,
     shadow: Shadow | None = None,
@@ -94,7 +95,7 @@ def density_sphere(
     Args:
         problem: the task, `problem_as_built`.
         angles: what was built.
-        seen: the same with the reference mounts.
+        mounts: the reference mounts.
         axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
         step_deg: of the grid that was searched.
         shadow: beams that the parts of the scanner block; None if they are not known.
@@ -108,8 +109,8 @@ def density_sphere(
     masked = problem.field.masked_at(directions).reshape(shape)
     own = f"this scanner, {'without' if shadow is None else 'with'} parts"
     densities = {own: mean_density_at(problem, setting, directions, shadow)}
-    for gain in (mount.gain for mount in seen.mounts):
-        densities[f"{gain.mount.name}, without parts"] = mean_density_at(problem, gain.mount.angles_rad, directions)
+    for mount in mounts:
+        densities[f"{mount.name}, without parts"] = mean_density_at(problem, mount.angles_rad, directions)
     maps = _drawn(densities, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))

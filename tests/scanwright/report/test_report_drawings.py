@@ -78,9 +78,11 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
         "density of this scanner, without parts",
         "density of rolling, without parts",
         "density of pitching, without parts",
+        "density of upright, one tilt, without parts",
+        "density of Bonn, 45 deg, without parts",
         "J over the direction of the axis",
     ]
-    own, rolling, pitching, axes = (picture(shown.picture) for shown in ball.maps)
+    own, rolling, pitching, _, _, axes = (picture(shown.picture) for shown in ball.maps)
     assert own.tobytes() == rolling.tobytes() != pitching.tobytes()
     shades = {tuple((np.array(colormaps["cividis"](i / (SHADES - 1))[:3]) * 255).round()) for i in range(SHADES)}
     bright = max(shades, key=sum)
