@@ -155,6 +155,8 @@ class Optimum:
             "  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings",
         ]
         lines += [_row(family) for family in self.search.best]
+        if self.search.lowest is not None:
+            lines[2] = f"{lines[2].rstrip()} [preferred]"
         if self.search.plain is not None:
             lines.append(f"{_row(self.search.plain).rstrip()} [J alone, blind]")
         return [*lines, *self.hole_lines(), *self.preferred_lines()]

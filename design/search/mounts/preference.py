@@ -43,8 +43,7 @@ def simplest_first(required: Requirements, ranges: AngleRanges, families: tuple[
             answer = known.get(setting) or Family(setting, found, 1, "")
             break
     others = [family for family in families if family.angles_deg != answer.angles_deg]
-    word = ", ".join(filter(None, [answer.word, "simplest"]))
-    return (replace(answer, word=word), *others)
+    return (answer, *others)
 
 
 def highest_J(problem: Problem, J: float, loss: float) -> float:

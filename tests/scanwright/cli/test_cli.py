@@ -146,7 +146,9 @@ def test_optimise_as_json(command):
     assert answer["best"] == sorted(answer["best"], key=lambda family: family["J"])
     for family in answer["best"]:
         assert (family["alpha_rot_deg"], family["beta_rot_deg"]) == (180, 0)
-    assert answer["best"][0]["J"] < min(other["J"] for other in answer["standard"].values())
+    best, factors = answer["best"][0], [gain["factor"] for gain in answer["gains"]]
+    assert best["J"] - best["J_error"] < min(other["J"] for other in answer["standard"].values())
+    assert len(factors) == 4 and factors == sorted(factors) and factors[0] > 0.999
     assert {entry["unit"] for entry in answer["left_out"]} >= {"settings", "square degrees"}
 
 

@@ -106,7 +106,7 @@ def test_axes_that_nobody_searched_stay_white():
     axes = picture(sphere(loaded, few).maps[-1].picture)
     assert axes.getpixel(cell(R_world_rot(np.radians(60), 0.0)[:, 2])) != (255, 255, 255)
     assert axes.getpixel(cell(R_world_rot(np.radians(-60), 0.0)[:, 2])) == (255, 255, 255)
-    assert len(sphere(loaded, AXES[:1]).maps) == 3
+    assert len(sphere(loaded, AXES[:1]).maps) == 5
 
 
 def test_a_check_knows_its_bodies():
