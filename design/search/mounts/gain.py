@@ -89,18 +89,23 @@ def gain_lines(found: tuple[Gain, ...]) -> list[str]:
 
 
 def verdict(found: tuple[Gain, ...]) -> list[str]:
-    """A sentence about a simple mount that is as good, if there is one: one that the task allows, if there is one."""
+    """A sentence about a simple mount that is as good or better; of several the one that nothing speaks against."""
     good = [gain for gain in found if gain.factor is not None and gain.factor <= AS_GOOD]
     if not good:
         return []
-    best = min(good, key=lambda gain: (bool(_against(gain)), not gain.same, not gain.simpler))
+    best = min(good, key=lambda gain: (bool(_against(gain)), not _better(gain), not gain.same, not gain.simpler))
     if best.same:
         return [f"the answer is itself a simple mount: {best.mount.name}"]
     assert best.factor is not None
-    better = best.factor < 2 - AS_GOOD
+    better = _better(best)
     how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
     rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
     return [f"{best.mount.name} {_four(best.mount.angles_deg)} is {how}{rest}"]
+
+
+def _better(gain: Gain) -> bool:
+    """Whether the mount is better than the answer by more than makes it as good."""
+    return gain.factor is not None and gain.factor < 2 - AS_GOOD
 
 
 def _against(gain: Gain) -> str:
