@@ -93,11 +93,12 @@ def verdict(found: tuple[Gain, ...]) -> list[str]:
     good = [gain for gain in found if gain.factor is not None and gain.factor <= AS_GOOD]
     if not good:
         return []
-    best = min(good, key=lambda gain: (bool(_against(gain)), not _better(gain), not gain.same, not gain.simpler))
+    free = [gain for gain in good if not _against(gain)] or good
+    better = _better(free[0])  # the best one first
+    best = free[0] if better else min(free, key=lambda gain: (not gain.same, not gain.simpler))
     if best.same:
         return [f"the answer is itself a simple mount: {best.mount.name}"]
     assert best.factor is not None
-    better = _better(best)
     how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
     rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
     return [f"{best.mount.name} {_four(best.mount.angles_deg)} is {how}{rest}"]
