@@ -127,7 +127,7 @@ ENTRIES = (
         (-17, -15, 13),
         (0, 0, 1.5),
         44,
-        "The same kind of band as in the mine, steeper, gives another plane: 55 and 60 deg instead of 24 and 55. "
+        "The same kind of band as in the mine, steeper, wants the plane tilted more: 73 deg instead of 58. "
         "At half a minute a turn the lines are less than 3 cm apart on a stem 5 m away; the period is one number "
         "of the task.",
     ),
@@ -183,7 +183,7 @@ ENTRIES = (
         (-4.2, -5.6, 5.0),
         (0, 0, 0.1),
         40,
-        "The axis points straight down, and the gain is the scan plane's again. The toolbox on the pad is found "
+        "The axis points straight down, and one tilt of the scan plane is enough. The toolbox on the pad is found "
         "in 4 s; straight below, where the axis points, what is smaller than 28 cm may go unseen.",
     ),
 )
