@@ -224,7 +224,7 @@ def evaluate(
         hit=None if asked is None else pole_chances(problem, angles_rad, asked),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
-        as_built=None if shadow is None else as_built(problem, angles_rad, shadow),
+        as_built=None if shadow is None else as_built(problem, loaded.task, angles_rad, shadow),
     )
 
 

@@ -15,7 +15,7 @@ from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.tolerance import sensitivity
 from scanwright.design.shadow import Shadow
 from scanwright.design.task.angle_ranges import NAMES
-from scanwright.design.task.task import LoadedTask
+from scanwright.design.task.task import LoadedTask, Task
 
 OFF_DEG = 1.0  # what a printed and screwed mount may be off by
 
@@ -62,8 +62,8 @@ class BuildAnswer:
     worst: float | None
 
 
-def answer(problem: Problem, angles: AngleSet, shadow: Shadow | None = None) -> BuildAnswer:
-    """Judge the angle set on its task (`problem_as_built`), without the beams that `shadow` blocks.
+def answer(problem: Problem, task: Task, angles: AngleSet, shadow: Shadow | None = None) -> BuildAnswer:
+    """Judge the angle set on its task (`problem` by `problem_as_built`), without the beams that `shadow` blocks.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -73,7 +73,7 @@ def answer(problem: Problem, angles: AngleSet, shadow: Shadow | None = None) -> 
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     seen = problem if shadow is None else problem.behind(shadow)
     return BuildAnswer(
-        as_built=as_built(problem, setting, shadow),
+        as_built=as_built(problem, task, setting, shadow),
         ball_deg=float(np.degrees(problem.ball_rad)),
         cones=tuple(
             _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(seen, setting).blind_cones

@@ -117,8 +117,9 @@ def _on_task(folder: Path) -> dict[str, Any]:
     setting = mounting_rad(angles)
     planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_own_body)
     shadow = None if own_body is None else own_body[0]
-    found = answer(problem, angles, shadow)
-    sphere = density_sphere(problem, angles, axes, task.angles.step_deg, shadow)
+    found = answer(problem, task, angles, shadow)
+    mounts = [mount.gain.mount for mount in found.as_built.mounts]
+    sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
         "objective": task.density.objective,
