@@ -100,9 +100,9 @@ ENTRIES = (
         (-3.6, -5.0, 4.6),
         (1.2, 0.1, 0.5),
         36,
-        "Ground and ceiling at once want an axis almost upright and a scan plane 17 deg off rolling: it looks "
-        "like a careless mount, and gives a third more beams than a careful one. Three lengths were enough to say "
-        "what of the robot is in the way.",
+        "Ground and ceiling at once want an axis almost upright. An upright axis with one tilt is as good within 2 %, "
+        "and easier to build; rolling, the mount that comes to mind first, is a quarter worse. Three lengths were "
+        "enough to say what of the robot is in the way.",
     ),
     Entry(
         "mine",
@@ -114,8 +114,8 @@ ENTRIES = (
         (-7.0, -8.0, 4.2),
         (-0.6, 0.6, 1.1),
         42,
-        "A band all around wants its axis upright; the factor of 3 over rolling is the scan plane's alone, tilted "
-        "so that its dense edges lie on the walls.",
+        "A band all around wants its axis upright, and one tilt of the scan plane is enough: its dense edges then lie "
+        "on the walls. The second angle that the search found gains nothing, so build the tilt.",
     ),
     Entry(
         "forest_plot",
@@ -127,7 +127,7 @@ ENTRIES = (
         (-17, -15, 13),
         (0, 0, 1.5),
         44,
-        "The same kind of band as in the mine, steeper, gives another plane: 55 and 60 deg instead of 24 and 55. "
+        "The same kind of band as in the mine, steeper, wants the plane tilted more: 73 deg instead of 58. "
         "At half a minute a turn the lines are less than 3 cm apart on a stem 5 m away; the period is one number "
         "of the task.",
     ),
@@ -142,7 +142,7 @@ ENTRIES = (
         (0.3, 0.2, 0.9),
         37,
         "Where the scanner hangs fixes its axis, and only two angles are searched: 1,369 settings in place of 3.7 "
-        "million. Pitching, the worse of the two usual mounts in the other worlds, is the better one here.",
+        "million. One of the two is enough: a tilt alone loses nothing.",
     ),
     Entry(
         "stairs",
@@ -183,7 +183,7 @@ ENTRIES = (
         (-4.2, -5.6, 5.0),
         (0, 0, 0.1),
         40,
-        "The axis points straight down, and the gain is the scan plane's again. The toolbox on the pad is found "
+        "The axis points straight down, and one tilt of the scan plane is enough. The toolbox on the pad is found "
         "in 4 s; straight below, where the axis points, what is smaller than 28 cm may go unseen.",
     ),
 )

@@ -5,13 +5,11 @@ Console, report, studio, `evaluate` and `compare` print the numbers of this reco
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from scanwright.design.angles import standard_settings
 from scanwright.design.arrays import Setting
 from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps
@@ -19,8 +17,11 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT, holes, percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.stated_error import rounded_to_error
+from scanwright.design.search.mounts.gain import Gain, gains, verdict
+from scanwright.design.search.mounts.reference import TunedMount, reference_mounts
 from scanwright.design.search.with_parts import score_with
 from scanwright.design.shadow import Shadow
+from scanwright.design.task.task import Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +49,20 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceMount:
-    """A reference mount on the same task, without parts.
+    """A reference mount on the same task, without parts: what the scanner gains over it, and what it sees."""
 
-    Attributes:
-        factor: beams per direction of the scanner over those of the mount, in the geometric mean; None if J is no
-            logarithm.
-    """
-
-    name: str
+    gain: Gain
     seen: Seen
-    factor: float | None
+
+    @property
+    def name(self) -> str:
+        """Of the mount."""
+        return self.gain.mount.name
+
+    @property
+    def factor(self) -> float | None:
+        """Beams per direction of the scanner over those of the mount, in the geometric mean; None if J is no log."""
+        return self.gain.factor
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +72,7 @@ class AsBuilt:
     Attributes:
         blocked: share of all beams that its parts block; None if the parts are not known, and nothing is left out.
         own: what it sees.
-        mounts: the reference mounts, the smallest factor first.
+        mounts: the reference mounts, the best one first: it has the smallest factor.
     """
 
     blocked: float | None
@@ -80,46 +85,55 @@ class AsBuilt:
         return "without parts" if self.blocked is None else "with parts"
 
     def gain(self) -> str:
-        """What the scanner is worth against the reference mounts, in a line."""
-        return "; ".join(
-            f"J = {mount.seen.J:g} for {mount.name}"
-            if mount.factor is None
-            else f"{mount.factor:.2f} x {mount.name} (J = {mount.seen.J:g})"
-            for mount in self.mounts
-        )
+        """What the scanner is worth against the reference mounts, the best of them first, in a line."""
+        return "; ".join(mount.gain.words() for mount in self.mounts)
+
+    def verdict(self) -> list[str]:
+        """A sentence about a reference mount that is as good, if there is one."""
+        return verdict(tuple(mount.gain for mount in self.mounts))
 
     def lines(self) -> list[str]:
         """The same, a line for each number."""
         own = self.own
+        what = "J" if self.mounts[0].factor is None else "beams per ball"
         blocked = "" if self.blocked is None else f", which block {percent(self.blocked)} of the beams"
         return [
             f"{self.parts}{blocked}: J = {own.J:g} +- {own.J_error:g}",
             *(f"{self.parts}: {words}" for words in own.blind),
             f"{self.parts}: never seen: {percent(own.blind_weight)} of the weight, "
             f"{percent(own.blind_fraction)} of the unmasked sphere",
-            f"{self.parts}: beams per ball, against reference mounts without parts: {self.gain()}",
+            f"{self.parts}: {what}, against reference mounts without parts, the best first: {self.gain()}",
+            *(f"{self.parts}: {sentence}" for sentence in self.verdict()),
         ]
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
-        return {"with_parts": self.blocked is not None, **asdict(self)}
+        mounts = [{**mount.gain.facts(), "seen": asdict(mount.seen)} for mount in self.mounts]
+        return {
+            "with_parts": self.blocked is not None,
+            "blocked": self.blocked,
+            "own": asdict(self.own),
+            "mounts": mounts,
+        }
 
 
 def as_built(
     problem: Problem,
+    task: Task,
     angles_rad: Setting,
     shadow: Shadow | None,
     own: Score | None = None,
-    mounts: Mapping[str, Score] | None = None,
+    mounts: tuple[TunedMount, ...] | None = None,
 ) -> AsBuilt:
     """Judge a setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with its parts.
 
     Args:
         problem: the task as numbers, with the motion that was built.
+        task: the same: the reference mounts are tuned to what it asks.
         angles_rad: the setting.
         shadow: the beams that its parts block; None if they are not known.
         own: its score with the parts, if it is known already.
-        mounts: scores of the reference mounts by name, if they are known already.
+        mounts: the reference mounts, if they are known already.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -127,16 +141,13 @@ def as_built(
     """
     if own is None:
         own = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
-    logarithmic = problem.objective.name == "log"
-    found = []
-    for name, setting in standard_settings().items():
-        judged = mounts[name] if mounts is not None else score(problem, setting)
-        factor = float(np.exp(judged.J - own.J)) if logarithmic else None
-        found.append(ReferenceMount(name, seen_of(problem, setting, judged), factor))
+    if mounts is None:
+        mounts = reference_mounts(problem, task)
+    found = gains(problem, np.degrees(angles_rad).round(6).tolist(), own.J, mounts)
     return AsBuilt(
         None if shadow is None else shadow.share(),
         seen_of(problem, angles_rad, own, shadow),
-        tuple(sorted(found, key=lambda mount: -np.inf if mount.factor is None else mount.factor)),
+        tuple(ReferenceMount(gain, seen_of(problem, gain.mount.angles_rad, gain.mount.score)) for gain in found),
     )
 
 

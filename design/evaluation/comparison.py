@@ -1,15 +1,9 @@
 """The optimum of a task beside what else one could mount or buy.
 
-Rotating candidates have the lidar, the servo and the period of the task, whatever angles the task allows:
-
-- rolling and pitching, the standard alignments (Schubert 2016, section 4);
-- Bonn: axis 45 deg down ahead, scan plane along the axis, heading twisted away from it "slightly" (the UTM-30LX-EW on
-  an MX-28 that their MAV carries). How far was not found: the twist up to 45 deg that suits the task best is taken;
-- pitch only, as in Malaga (Mandow; Morales 2018): the axis stands upright, only `beta_laser` is free.
-
-Two more scanners stand beside it with all of their own, lidar, servo, motion and the angles that their shipped tasks
-allow: the one of the paper and the one for little money. So a dollar can be weighed: beams per ball on the geometric
-mean, `exp(-J) - 1`, over the price, beside the range and the noise that it buys. Each counts for its own time.
+The reference mounts (`design.search.mounts.reference`) have the lidar, the servo and the period of the task. Two more
+scanners have products, motion and angles of their own: the shipped tasks `SCANNERS`, the one of the paper and the one
+for little money. So a dollar can be weighed: beams per ball on the geometric mean, `exp(-J) - 1`, over the price,
+beside the range and the noise that it buys. Each counts for its own time.
 
 Ready-made scanners are the `multibeam` products of the catalogue, mounted upright with x ahead. Their layers are cones
 about the axis, so their density is zonal as that of a fan whose bearings are the elevations and whose plane holds the
@@ -32,7 +26,6 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.arrays import Array, Counts, Setting
 from scanwright.design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
 from scanwright.design.density.ball_count import ball_count
@@ -42,22 +35,18 @@ from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import NODES, Problem, with_scanner
-from scanwright.design.objective.score import Score, blind_share, score, score_on
+from scanwright.design.objective.score import Score, blind_share, score_on
 from scanwright.design.search.coarse import Progress
 from scanwright.design.search.families import Family
+from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.search.search import search
 from scanwright.design.search.with_parts import score_with
 from scanwright.design.shadow import Shadow
 from scanwright.design.sphere.directions import sample_set, spiral
-from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import LoadedTask, load_task
 
 LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations
-SEARCHED = {
-    "Bonn, 45 deg": AngleRanges(alpha_rot_deg=180, beta_rot_deg=45, alpha_laser_deg=90, beta_laser_deg=(-90, -45)),
-    "pitch only": AngleRanges(alpha_rot_deg=0, beta_rot_deg=0, alpha_laser_deg=0, beta_laser_deg=(-90, 90)),
-}
 AS_BUILT = "as built, with parts"
 SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks: their products, motion and allowed angles
 PHASES = 4  # start phases, and directions, for a scanner that sees part of a turn only: it is no longer zonal
@@ -111,15 +100,17 @@ def compare(
     loaded: LoadedTask,
     problem: Problem,
     best: Family,
+    mounts: tuple[TunedMount, ...],
     progress: Progress = lambda _: None,
     built: tuple[Setting, Shadow] | None = None,
 ) -> list[ComparisonRow]:
-    """Rows of the optimum, the alignments known from others, other scanners, and every multibeam of the catalogue.
+    """Rows of the answer, the reference mounts, other scanners, and every multibeam of the catalogue.
 
     Args:
         loaded: the task.
         problem: its numbers.
-        best: its optimum, the first family of `search`.
+        best: its answer, the first family of `search`.
+        mounts: the reference mounts.
         progress: told of each step.
         built: setting [rad] of a build of the task, and the beams that its parts block: the first row.
 
@@ -132,13 +123,7 @@ def compare(
         setting, shadow = built
         found = score_with(problem, setting, shadow)
         rows.insert(0, _rotating(AS_BUILT, loaded, problem, setting, found, shadow))
-    for name, angles_deg in STANDARD_DEG.items():
-        setting = np.radians(angles_deg)
-        rows.append(_rotating(name, loaded, problem, setting, score(problem, setting)))
-    for name, ranges in SEARCHED.items():
-        progress(name)
-        family = search(problem, ranges).best[0]
-        rows.append(_rotating(name, loaded, problem, family.angles_rad, family.score))
+    rows += [_rotating(mount.name, loaded, problem, mount.angles_rad, mount.score) for mount in mounts]
     for name in SCANNERS:
         other = load_task(Path(name))
         if bought(other) != bought(loaded):

@@ -57,7 +57,7 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
         "range, noise: of the 2D lidar as its maker states them, one standard deviation; ? for ready-made scanners",
         "practical: the range [m] that users of the 2D lidar get; the stated one where nobody knows",
         "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
-        "ready-made scanners stand upright; Bonn takes the twist, pitch only the pitch, that suits this task best",
+        "ready-made scanners stand upright; one tilt (pitch or roll) and Bonn (twist) are tuned to this task",
         f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
         *(f"{name} sees nothing of the weight: its J is that of no beam, and has no error" for name in blind),
         *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts if fields),

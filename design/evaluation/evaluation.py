@@ -213,7 +213,7 @@ def evaluate(
     found = checked_score(loaded, problem, angles_rad, None)
     built = None
     if shadow is not None:
-        built = as_built(problem, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
+        built = as_built(problem, loaded.task, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
     progress("ball search, 8 start phases")
     return Evaluation(
         problem=problem,

@@ -1,4 +1,4 @@
-"""The answer to a task: the search, the standard alignments beside it, and what is said of both."""
+"""The answer to a task: the search, its gain over the reference mounts, and both in words."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Shortest
 from scanwright.design.objective.holes import holes, percent
 from scanwright.design.objective.problem import Problem, problem_of
-from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.self_check import require_counted
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.search.coarse import Progress
 from scanwright.design.search.families import Family
+from scanwright.design.search.mounts.gain import Gain, gain_lines, gains
+from scanwright.design.search.mounts.reference import TunedMount, angles_used, reference_mounts
 from scanwright.design.search.search import SearchResult, search
 from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import spiral
@@ -38,14 +39,14 @@ class Optimum:
         loaded: the same; where it asks for the shortest period, with the one that was found.
         problem: its numbers.
         search: the best families and how they were found.
-        standard: scores of the standard alignments by name.
+        mounts: the reference mounts, tuned to the task.
     """
 
     asked: LoadedTask
     loaded: LoadedTask
     problem: Problem
     search: SearchResult
-    standard: dict[str, Score]
+    mounts: tuple[TunedMount, ...]
 
     @property
     def title(self) -> str:
@@ -63,6 +64,12 @@ class Optimum:
     def angle_set(self, rank: int = 0) -> AngleSet:
         """The designed angles of a family, the best one first."""
         return angle_set(self.loaded, self.search.best[rank])
+
+    @property
+    def gains(self) -> tuple[Gain, ...]:
+        """What the answer is worth against the reference mounts, all without parts; the smallest gain first."""
+        answer = self.search.best[0]
+        return gains(self.problem, answer.angles_deg, answer.score.J, self.mounts)
 
     @property
     def left_out(self) -> list[LeftOut]:
@@ -84,11 +91,24 @@ class Optimum:
             "holes": [asdict(hole) for hole in holes(self.problem, self.search.best[0].angles_rad)],
             "plain": None if self.search.plain is None else self._plain_facts(self.search.plain),
             "least_blind_weight": self.search.least_blind,
-            "standard": {name: {"J": s.J, "J_error": s.J_error} for name, s in self.standard.items()},
+            "preferred": self._preferred_facts(),
+            "standard": {mount.name: {"J": mount.score.J, "J_error": mount.score.J_error} for mount in self.mounts},
+            "gains": [gain.facts() for gain in self.gains],
             "covered": self.search.covered,
             "evaluated": self.search.evaluated,
             "seconds": round(self.search.seconds, 3),
             "left_out": [asdict(entry) for entry in self.left_out],
+        }
+
+    def _preferred_facts(self) -> dict[str, Any] | None:
+        if self.search.lowest is None:
+            return None
+        optimum = self.search.lowest
+        return {
+            "accepted_loss": self.loaded.task.angles.prefer_loss,
+            "J_more": self.search.best[0].score.J - optimum.score.J,
+            "lowest_J": {f"{name}_deg": angle for name, angle in zip(NAMES, optimum.angles_deg, strict=True)}
+            | {"J": optimum.score.J, "J_error": optimum.score.J_error},
         }
 
     def _plain_facts(self, plain: Family) -> dict[str, Any]:
@@ -104,7 +124,7 @@ class Optimum:
         result = self.search
         return [
             *self.table(),
-            *self._gain_lines(),
+            *gain_lines(self.gains),
             self.long_title,
             f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s",
             *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
@@ -113,6 +133,7 @@ class Optimum:
     def hole_lines(self, tabled: bool = True) -> list[str]:
         """Where the answer is blind, or what it costs that it is not; `tabled`: they stand below `table`."""
         best, plain, least = self.search.best[0], self.search.plain, self.search.least_blind
+        lowest = best if self.search.lowest is None else self.search.lowest
         found = [hole.words() for hole in holes(self.problem, best.angles_rad)]
         if least is not None:
             found.insert(
@@ -125,7 +146,7 @@ class Optimum:
         return [
             f"{seen}; J alone, not asked for that, would take {taken}",
             *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
-            f"what has no hole costs {price(self.problem, best.score.J, plain.score.J)} against it",
+            f"what has no hole costs {price(self.problem, lowest.score.J, plain.score.J)} against it",
         ]
 
     def table(self) -> list[str]:
@@ -135,20 +156,31 @@ class Optimum:
             "  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings",
         ]
         lines += [_row(family) for family in self.search.best]
+        if self.search.lowest is not None:
+            lines[2] = f"{lines[2].rstrip()} [preferred]"
         if self.search.plain is not None:
             lines.append(f"{_row(self.search.plain).rstrip()} [J alone, blind]")
-        return [*lines, *self.hole_lines()]
+        return [*lines, *self.hole_lines(), *self.preferred_lines()]
 
-    def _gain_lines(self) -> list[str]:
-        """What the best setting is worth against the reference mounts, all of them without parts."""
-        lines, best = [], self.search.best[0].score
-        for name, other in self.standard.items():
-            if self.problem.objective.name == "log":  # the one objective whose differences are ratios of densities
-                gain = math.exp(other.J - best.J)
-                lines.append(f"beams per ball over the weighted region: {gain:.2f} x {name} (J = {other.J:.4f})")
-            else:
-                lines.append(f"J = {other.J:.4f} +- {error_words(other.J, other.J_error)} for {name}")
-        return lines
+    def preferred_lines(self) -> list[str]:
+        """What was preferred to the lowest J, and what that costs."""
+        if self.search.lowest is None:
+            return []
+        answer, optimum = self.search.best[0], self.search.lowest
+        loss = self.loaded.task.angles.prefer_loss
+        accepted = f"at most {percent(loss)} {'of the beams per ball' if self._logarithmic else 'of J'}"
+        if answer.angles_deg == optimum.angles_deg:
+            return [f"no simpler mount costs {accepted}: the answer is the lowest J"]
+        used = angles_used(answer.angles_deg)
+        return [
+            f"preferred as the simplest mount that costs {accepted}: {_shown(answer)}, {used} "
+            f"{'angle is' if used == 1 else 'angles are'} not 0",
+            f"it costs {price(self.problem, answer.score.J, optimum.score.J)} against the lowest J, {_told(optimum)}",
+        ]
+
+    @property
+    def _logarithmic(self) -> bool:
+        return self.problem.objective.name == "log"
 
 
 def price(problem: Problem, J: float, less: float) -> str:
@@ -159,8 +191,11 @@ def price(problem: Problem, J: float, less: float) -> str:
 
 
 def _told(family: Family) -> str:
-    angles = ", ".join(f"{angle:g}" for angle in np.round(family.angles_deg, 2) + 0.0)
-    return f"({angles}) with J = {family.score.J:.4f}"
+    return f"{_shown(family)} with J = {family.score.J:.4f}"
+
+
+def _shown(family: Family) -> str:
+    return "(" + ", ".join(f"{angle:g}" for angle in np.round(family.angles_deg, 2) + 0.0) + ")"
 
 
 def _row(family: Family) -> str:
@@ -186,8 +221,8 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
         result = search(problem, loaded.task.angles, progress, loaded.task.limits)
     best = result.best[0]
     require_counted(found, best.angles_rad, best.score)
-    standard = {name: score(problem, setting) for name, setting in standard_settings().items()}
-    return Optimum(loaded, found, problem, result, standard)
+    progress("tuning the reference mounts")
+    return Optimum(loaded, found, problem, result, reference_mounts(problem, found.task))
 
 
 def directions_left_out(problem: Problem) -> list[LeftOut]:

@@ -20,6 +20,7 @@ from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
 from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from scanwright.design.search.limits import allowed_planes
+from scanwright.design.search.mounts.preference import simplest_first
 from scanwright.design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits
@@ -34,13 +35,15 @@ class SearchResult:
     """What the search found.
 
     Attributes:
-        best: families, best first; all keep the limits, and none has a hole where they can be avoided.
+        best: families, best first; all keep the limits, and none has a hole where they can be avoided. With
+            `prefer = "simple"` the simplest mount comes first.
         plain: the optimum of J alone, where holes are avoided and it has some.
         least_blind: where every setting has holes that were to be avoided, the smallest share of weight in them.
         covered: grid settings that the answer stands for.
         evaluated: distinct values of J computed.
         seconds: time of the search and the rescoring.
         left_out: what was skipped.
+        lowest: the family of the lowest J, to which the simplest mount is preferred; None if that is not asked for.
         planes: one row per scan-plane setting of the grid: alpha_laser, beta_laser [deg], the lowest J of the search
             over all axes, and the axis alpha_rot, beta_rot [deg] it was found about.
         axes: one row per axis of the grid: alpha_rot, beta_rot [deg], the lowest J of the search over all planes.
@@ -53,6 +56,7 @@ class SearchResult:
     evaluated: int
     seconds: float
     left_out: tuple[LeftOut, ...]
+    lowest: Family | None
     planes: Float[ndarray, "planes columns"]
     axes: Float[ndarray, "axes 3"]
 
@@ -94,16 +98,18 @@ def search(
         )
     progress("refining the minima")
     families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds)
+    simple = ranges.prefer == "simple"
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
     return SearchResult(
-        best=families,
+        best=simplest_first(required, ranges, families) if simple else families,
         plain=_plain(problem, ranges, limits, land, fine, families[0]) if avoid else None,
         least_blind=least_blind,
         covered=covered,
         evaluated=different,
         seconds=time.perf_counter() - start,
         left_out=_left_out(ranges, covered, different, len(fine[0].first) - found.exact),
+        lowest=families[0] if simple else None,
         planes=_plane_table(*fine, land.plain),
         axes=np.column_stack([fine[1].settings_deg, land.plain.by_axis[fine[1].flip.astype(int), fine[1].classes]]),
     )

@@ -15,8 +15,10 @@ from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.objective.score import score
 from scanwright.design.search.coarse import Progress
+from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.limits import line_gaps_deg
+from scanwright.design.search.mounts.preference import simplest_first
 from scanwright.design.search.search import SearchResult, search
 from scanwright.design.task.named_products import fastest_rpm
 from scanwright.design.task.task import LoadedTask
@@ -51,7 +53,12 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
         progress(f"{period:g} s keep the limits: searching again")
         now = _at(loaded, period)
         problem = problem_of(now)
-        result = replace(result, best=_rescored(problem, result.best, periods, period))
+        able = _rescored(problem, result.best, periods, period)
+        required = Requirements(problem, limits, now.task.angles.holes == "avoid" and result.least_blind is None)
+        if now.task.angles.prefer == "simple":
+            result = replace(result, best=simplest_first(required, now.task.angles, able), lowest=able[0])
+        else:
+            result = replace(result, best=able)
         try:
             result = search(problem, now.task.angles, progress, limits)
         except TaskError:  # none of the families of this period is the one that allows it: that one stays

@@ -28,7 +28,7 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.grid_classes import mirrors_of
 from scanwright.design.shadow import Shadow
 from scanwright.design.sphere.directions import sample_set
-from scanwright.design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask
 
 SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
@@ -100,18 +100,20 @@ def choose_with_parts(
     workshop: Workshop,
     progress: Progress,
 ) -> Chosen:
-    """The family that is best with its parts.
+    """The family that is best with its parts; with `prefer = "simple"` the first one that can be built.
 
     Raises:
         BuildError: none can be built within the limits of the task.
     """
     best: Chosen | None = None
-    avoid = ranges.holes == "avoid"
+    lowest: tuple[bool, int, float] | None = None  # rank of the best one
+    avoid, simple = ranges.holes == "avoid", ranges.prefer == "simple"
     refused: list[str] = []
     bounded = built = 0
-    queue = sorted(families, key=lambda family: family.score.J)
+    queue = families if simple else sorted(families, key=lambda family: family.score.J)
     for place, family in enumerate(queue):
-        if best is not None and (_blind(best.family.score, avoid), best.family.score.J) <= (False, family.score.J):
+        first = place if simple else 0
+        if lowest is not None and lowest <= (False, first, family.score.J):
             break
         if built == MOST_BUILT and best is not None:
             left = sum(other.score.J < best.family.score.J for other in queue[place:])
@@ -125,10 +127,11 @@ def choose_with_parts(
                 refused.append(f"{_shown(angles_deg)}: {bound.reason}")
                 continue
             bare = score(problem.behind(bound), np.radians(angles_deg))
-            bounds.append((_blind(bare, avoid), bare.J, angles_deg))
+            turned = simple and angles_deg != family.angles_deg
+            bounds.append((_blind(bare, avoid), turned, bare.J, angles_deg))
         # the family's own setting stands upright: another one must be better by more than a thousandth
-        for blind, J, angles_deg in sorted(bounds, key=lambda bound: (bound[0], round(bound[1], 3)))[:1]:
-            if best is not None and (_blind(best.family.score, avoid), best.family.score.J) <= (blind, J):
+        for blind, _, J, angles_deg in sorted(bounds, key=lambda bound: (*bound[:2], round(bound[2], 3)))[:1]:
+            if lowest is not None and lowest <= (blind, first, J):
                 continue
             progress(f"parts of {_shown(angles_deg)}: what they hide")
             built += 1
@@ -141,10 +144,9 @@ def choose_with_parts(
                 refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
                 continue
             found = score_with(problem, np.radians(angles_deg), shadow)
-            if best is None or (_blind(found, avoid), found.J) < (
-                _blind(best.family.score, avoid),
-                best.family.score.J,
-            ):
+            rank = _blind(found, avoid), first, found.J
+            if lowest is None or rank < lowest:
+                lowest = rank
                 chosen = replace(family, angles_deg=angles_deg, score=found)
                 best = Chosen(chosen, family.score, shadow, 0, 0, (), 0)
     if best is None:
@@ -202,13 +204,7 @@ def equivalents(
     for beta, alpha in np.diagonal(mirrors_of(problem.bearings_rad), axis1=1, axis2=2).tolist():
         plane = 0.0 + alpha * c, 0.0 + beta * d  # q0 has the sign of beta_laser, q1 that of alpha_laser
         found += [(a, b, *plane), (turned, 0.0 - b, 0.0 - plane[0], 0.0 - plane[1])]
-    limits = [ranges.limits(name) for name in NAMES]
-    inside = [
-        setting
-        for setting in found[1:]
-        if all(low - 1e-9 <= x <= high + 1e-9 for x, (low, high) in zip(setting, limits, strict=True))
-    ]
-    return list(dict.fromkeys([found[0], *inside]))
+    return list(dict.fromkeys([found[0], *filter(ranges.hold, found[1:])]))
 
 
 def _blind(found: Score, avoid_holes: bool) -> bool:

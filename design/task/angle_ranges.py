@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -39,8 +40,20 @@ class AngleRanges(Record):
         default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
     )
 
+    prefer: Literal["lowest_J", "simple"] = Field(
+        default="lowest_J", description="'simple' takes the mount with the fewest angles that costs at most prefer_loss"
+    )
+    prefer_loss: Number = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="share of the beams per ball (of J if not log) that 'simple' may cost",
+    )
+
     @model_validator(mode="after")
     def _within_bounds(self) -> AngleRanges:
+        if self.prefer_loss and self.prefer != "simple":
+            raise ValueError(f"prefer_loss = {self.prefer_loss:g} is for prefer = 'simple': the lowest J costs nothing")
         setting = {name: self.limits(name) for name in BOUNDS}
         for name, (lower, upper) in setting.items():
             bound = BOUNDS[name]
@@ -55,6 +68,11 @@ class AngleRanges(Record):
         """Range of one angle in degrees; both ends are equal where it is fixed."""
         angle: Angle = getattr(self, f"{name}_deg")
         return angle if isinstance(angle, tuple) else (angle, angle)
+
+    def hold(self, angles_deg: Sequence[float]) -> bool:
+        """Whether a setting, in the order of `NAMES`, is within all ranges."""
+        limits = [self.limits(name) for name in NAMES]
+        return all(low - 1e-9 <= angle <= high + 1e-9 for angle, (low, high) in zip(angles_deg, limits, strict=True))
 
     def grid_deg(self, name: str) -> Array:
         """Settings of one angle that the search visits, both limits included."""

@@ -80,7 +80,7 @@ def evaluate(
 
 
 def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:
-    """Put the optimum of a task beside the usual mounts, the scanner for little money, and ready-made ones.
+    """Put the optimum of a task beside the reference mounts, the scanner for little money, and ready-made ones.
 
     Every row is without parts, but that of a build folder, which is the first one if the task is given as its folder.
 
@@ -94,7 +94,7 @@ def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[Comparis
     built = as_built_scanner(task)
     optimum = find_optimum(as_task(task) if built is None else built.loaded, say)
     setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
-    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], say, setting)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, say, setting)
 
 
 def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:

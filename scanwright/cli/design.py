@@ -141,7 +141,7 @@ def compare(
     ] = Path("out/compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Put the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
+    """Compare the optimum with the reference mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
     from scanwright import api
     from scanwright.api.arguments import as_built_scanner
     from scanwright.pipeline.comparison import write_comparison
@@ -150,7 +150,8 @@ def compare(
     loaded = api.load_task(task) if built is None else built.loaded
     found = write_comparison(loaded, out / loaded.task.name, Progress(), built)
     if as_json:
-        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows]})
+        gains = [gain.facts() for gain in found.optimum.gains]
+        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows], "gains": gains})
     else:
         show(found.lines())
 

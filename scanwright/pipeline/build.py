@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from scanwright.cad.checks.check import Check, failed_of, read_checks
 from scanwright.cad.kernel import require_kernel
-from scanwright.design.angles import standard_settings
 from scanwright.design.concurrency.processes import Packed, processes_beside
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
@@ -38,6 +37,9 @@ KERNEL = (
     "scanwright.report.page",
 )
 """What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
+
+DRAWN = 2
+"""Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
 
 BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files": 0.73, "report": 0.9}
 """Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
@@ -280,10 +282,10 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         checked = begin(_checked, scanner, assembly, say)
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         _at(say, "pictures")("drawing the density")
-        standard = standard_settings()
         settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {
-            f"{name}, without parts: J = {score.J:.3f}": standard[name] for name, score in optimum.standard.items()
+            f"{gain.mount.name}, without parts: J = {gain.mount.score.J:.3f}": gain.mount.angles_rad
+            for gain in optimum.gains[:DRAWN]
         }
         density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
         parts = written()
@@ -300,5 +302,5 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         _at(say, "report")("writing report.html")
         records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
-    seen = as_built(problem, best.angles_rad, chosen.shadow, best.score, optimum.standard)
+    seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
     return Made(optimum, chosen, seen, (*parts.findings, *findings), planes)

@@ -1,4 +1,4 @@
-"""`out/compare/<task>/`: the optimum of a task beside the usual mounts, a cheap scanner and ready-made ones."""
+"""`out/compare/<task>/`: the optimum of a task beside the reference mounts, a cheap scanner and ready-made ones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from scanwright.design.evaluation.comparison import ComparisonRow, compare
 from scanwright.design.evaluation.comparison_picture import compare_picture
 from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.search.mounts.gain import gain_lines
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.built_scanner import BuiltScanner
@@ -28,6 +29,8 @@ class Comparison:
         return [
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),
+            *(f"optimum: {line}" for line in gain_lines(self.optimum.gains)),
+            *(f"optimum: {line}" for line in self.optimum.preferred_lines()),
             *notes(self.optimum.loaded, self.rows),
             f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
         ]
@@ -45,7 +48,7 @@ def write_comparison(
     with report_folder(target) as folder:
         optimum = find_optimum(loaded, say)
         setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
-        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], say, setting)
+        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, say, setting)
         write_csv(folder / "compare.csv", rows)
         compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")
     return Comparison(optimum, rows, target)

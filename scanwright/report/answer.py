@@ -76,7 +76,7 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: Shadow | None = None) -
     rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     seen = problem if shadow is None else problem.behind(shadow)
     return BuildAnswer(
-        as_built=as_built(problem, setting, shadow, checked_score(built, problem, setting, shadow)),
+        as_built=as_built(problem, built.task, setting, shadow, checked_score(built, problem, setting, shadow)),
         ball_deg=float(np.degrees(problem.ball_rad)),
         cones=tuple(
             _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(seen, setting).blind_cones

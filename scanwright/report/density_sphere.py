@@ -6,6 +6,7 @@ a build have the same colours.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +17,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
+from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.shadow import Shadow
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
@@ -81,13 +83,19 @@ class DensitySphere:
 
 
 def density_sphere(
-    problem: Problem, angles: AngleSet, axes: Array | None, step_deg: float, shadow: Shadow | None = None
+    problem: Problem,
+    angles: AngleSet,
+    mounts: Iterable[TunedMount],
+    axes: Array | None,
+    step_deg: float,
+    shadow: Shadow | None = None,
 ) -> DensitySphere:
-    """Density of the scanner and of the standard alignments on one scale, J over the axes, and where the axis points.
+    """Density of the scanner and of the reference mounts on one scale, J over the axes, and where the axis points.
 
     Args:
         problem: the task, `problem_as_built`.
         angles: what was built.
+        mounts: the reference mounts.
         axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
         step_deg: of the grid that was searched.
         shadow: beams that the parts of the scanner block; None if they are not known.
@@ -101,8 +109,8 @@ def density_sphere(
     masked = problem.field.masked_at(directions).reshape(shape)
     own = f"this scanner, {'without' if shadow is None else 'with'} parts"
     densities = {own: mean_density_at(problem, setting, directions, shadow)}
-    for name, mount in standard_settings().items():
-        densities[f"{name}, without parts"] = mean_density_at(problem, mount, directions)
+    for mount in mounts:
+        densities[f"{mount.name}, without parts"] = mean_density_at(problem, mount.angles_rad, directions)
     maps = _drawn(densities, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))

@@ -118,7 +118,8 @@ def _on_task(folder: Path) -> dict[str, Any]:
     planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_own_body)
     shadow = None if own_body is None else own_body[0]
     found = answer(loaded, angles, shadow)
-    sphere = density_sphere(problem, angles, axes, task.angles.step_deg, shadow)
+    mounts = [mount.gain.mount for mount in found.as_built.mounts]
+    sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
         "objective": task.density.objective,

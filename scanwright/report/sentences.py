@@ -8,6 +8,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.evaluation.metres import PlaneFigures, rounded
 from scanwright.design.motion import Motion
 from scanwright.design.objective.holes import percent
+from scanwright.design.search.mounts.gain import Gain
 from scanwright.report.answer import BuildAnswer
 
 AT_M = 3.0  # from the scanner, where a ball of directions is told as a disc
@@ -60,13 +61,19 @@ def _sees(answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) ->
 
 
 def _is_worth(answer: BuildAnswer) -> list[str]:
-    first = answer.as_built.mounts[0]
+    first, *others = (mount.gain for mount in answer.as_built.mounts)
     if first.factor is None:
         return []
+    rest = "; ".join(f"{gain.factor:.2f} times as with {_named(gain)}" for gain in others)
     return [
-        f"Where it counts there are {first.factor:.2f} times as many beams, {answer.as_built.parts}, as with "
-        f"{first.name}, the better of the two usual mounts and taken without parts (geometric mean)."
+        f"Where it counts there are {first.factor:.2f} times as many beams, {answer.as_built.parts}, as with the best "
+        f"simple mount, {_named(first)} (geometric mean, mounts without parts); {rest}.",
+        *(f"{_capital(sentence)}." for sentence in answer.as_built.verdict()),
     ]
+
+
+def _named(gain: Gain) -> str:
+    return f"{gain.mount.name} ({gain.flaws})" if gain.flaws else gain.mount.name
 
 
 def _capital(words: str) -> str:

@@ -65,7 +65,9 @@ class Searching:
             if (canvas, bare) == self._now():
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)
             setting = chosen.family.angles_rad
-            seen = as_built(optimum.problem, setting, chosen.shadow, chosen.family.score, optimum.standard)
+            seen = as_built(
+                optimum.problem, optimum.loaded.task, setting, chosen.shadow, chosen.family.score, optimum.mounts
+            )
             self._say("; ".join([found, *chosen.lines(), *seen.lines(), holes]))
         except ScanwrightError as error:
             self._say(str(error), bad=True)

@@ -105,7 +105,7 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     seen = seen_of(problem, setting, score, made.shadow)
     values = {
         "J": score.J,
-        "density_gain": density_gain(problem, found["standard_J"], score.J),
+        "density_gain": density_gain(problem, found["reference_J"], score.J),
         **of_lidar(loaded.lidar),
         **per_ball(beams_per_ball(problem.objective, score.J), made.values["cost_usd"]),
         "blind_fraction": seen.blind_fraction,

@@ -62,23 +62,23 @@ def search_candidate(loaded: LoadedTask) -> Result:
         optimum = find_optimum(loaded, lambda _: None)
     except TaskError as error:
         return {"status": "refused", "reason": why(error, loaded)}
-    standard_J = min(score.J for score in optimum.standard.values())
+    reference_J = min(mount.score.J for mount in optimum.mounts)
     return {
         "status": "found",
         "motion": optimum.loaded.task.motion.model_dump(mode="json"),
-        "standard_J": standard_J,
+        "reference_J": reference_J,
         "families": [asdict(family) for family in optimum.search.best],
-        "bounds": _bounds(optimum, standard_J),
+        "bounds": _bounds(optimum, reference_J),
     }
 
 
-def _bounds(optimum: Optimum, standard_J: float) -> dict[str, float | None]:
+def _bounds(optimum: Optimum, reference_J: float) -> dict[str, float | None]:
     """Over all families: hiding beams lets no column get better than the best of them, but within its error."""
     families, problem = optimum.search.best, optimum.problem
     J = min(f.score.J for f in families) if problem.objective.name in BOUNDED else -np.inf
     return {
         "J": J,
-        "density_gain": density_gain(problem, standard_J, J),
+        "density_gain": density_gain(problem, reference_J, J),
         "beams_per_ball": beams_per_ball(problem.objective, J),
         "blind_fraction": min(coverage(problem, f.angles_rad).blind_fraction for f in families),
         "line_gap_deg": min(gaps(problem, f.angles_rad).line_gap_deg for f in families),
@@ -113,9 +113,9 @@ def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | N
     return {"beams_per_ball": beams, "beams_per_ball_per_usd": each}
 
 
-def density_gain(problem: Problem, standard_J: float, J: float) -> float | None:
-    """Times the beams per ball of the better standard alignment: differences of the logarithm are ratios."""
-    return exp(standard_J - J) if problem.objective.name == "log" else None
+def density_gain(problem: Problem, reference_J: float, J: float) -> float | None:
+    """Times the beams per ball of the best reference mount: differences of the logarithm are ratios."""
+    return exp(reference_J - J) if problem.objective.name == "log" else None
 
 
 def price_usd(products: Iterable[Bought]) -> float | None:

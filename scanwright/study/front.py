@@ -25,7 +25,7 @@ COLUMNS = {
     column.name: column
     for column in (
         Column("J", "low", "the objective of the task, with what the parts hide"),
-        Column("density_gain", "high", "times the beams per ball of the better standard alignment (objective log)"),
+        Column("density_gain", "high", "times the beams per ball of the best reference mount (objective log)"),
         Column("beams_per_ball", "high", "exp(-J) - 1, the geometric mean (objective log)"),
         Column("beams_per_ball_per_usd", "high", "the same over cost_usd: what a dollar sees"),
         Column("range_m", "high", "farthest that the lidar measures, as its maker states it"),

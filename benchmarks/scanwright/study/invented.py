@@ -43,7 +43,7 @@ def invented_search(loaded: LoadedTask) -> Result:
     motion = loaded.task.motion.model_dump(mode="json")
     J = -math.log(period_s) - _dice(loaded, 0)
     bounds = {"J": J, "beams_per_ball": math.expm1(-J), "period_s": period_s}
-    return {"status": "found", "motion": motion, "standard_J": 0.0, "families": [], "bounds": bounds}
+    return {"status": "found", "motion": motion, "reference_J": 0.0, "families": [], "bounds": bounds}
 
 
 def invented_judge(loaded: LoadedTask, found: Result, seconds: float = 0.0, ledger: str = "") -> Result:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from scanwright.design.angles import standard_settings
 from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes, planes_of
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.score import Score, score, score_on
 from scanwright.design.search.limits import blind_cones_deg, line_gaps_deg
+from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import Setting
@@ -37,7 +37,7 @@ class Facts:
         blind_weight: share of the weight that is never seen.
         period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
         density: beams per ball that the period is for.
-        standard: J of rolling and pitching for the same task.
+        mounts: J of the reference mounts for the same task, the best one first.
         planes: each plane of the task in words, and what a full scan leaves on it in metres; None while not known.
     """
 
@@ -50,7 +50,7 @@ class Facts:
     blind_weight: float
     period_s: float
     density: int
-    standard: dict[str, float]
+    mounts: dict[str, float]
     planes: tuple[tuple[str, PlaneFigures | None], ...]
 
     @property
@@ -61,21 +61,22 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """A task ready to judge settings: its numbers, and J of the standard alignments."""
+    """A task ready to judge settings: its numbers, and J of the reference mounts."""
 
     loaded: LoadedTask
     problem: Problem
-    standard: dict[str, float]
+    mounts: dict[str, float]
 
     @classmethod
     def for_task(cls, loaded: LoadedTask) -> Judge:
-        """Judge the standard alignments once; they stay while the task does.
+        """Tune the reference mounts once; they stay while the task does.
 
         Raises:
             TaskError: no direction of the task has a weight.
         """
         problem = problem_of(loaded)
-        return cls(loaded, problem, {name: score(problem, angles).J for name, angles in standard_settings().items()})
+        mounts = sorted(reference_mounts(problem, loaded.task), key=lambda mount: mount.score.J)
+        return cls(loaded, problem, {mount.name: mount.score.J for mount in mounts})
 
     def quick(self, setting: Setting) -> Facts:
         """While the hand moves."""
@@ -105,7 +106,7 @@ class Judge:
             blind_weight=found.blind_weight,
             period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
             density=self._least,
-            standard=self.standard,
+            mounts=self.mounts,
             planes=tuple((region.words(), None) for region in planes_of(self.loaded)),
         )
 

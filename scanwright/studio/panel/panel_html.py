@@ -22,7 +22,7 @@ def facts_html(facts: Facts, log: bool) -> str:
     state = "exact" if facts.exact else "dragging"
     rows = [
         ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}, without parts"),
-        *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.standard.items()),
+        *((name, f"{J:.5f}", _against(facts.J, J, log)) for name, J in facts.mounts.items()),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),
         ("never seen", percent(facts.blind_weight), "of the weight, without parts"),

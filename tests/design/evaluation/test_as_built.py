@@ -11,6 +11,7 @@ from scanwright.design.evaluation.coverage import coverage, mean_density_at
 from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.with_parts import score_with
 from scanwright.design.shadow import AXIS_STEPS, Shadow
 from scanwright.design.sphere.directions import spiral
@@ -61,9 +62,10 @@ def test_density_and_coverage_are_those_of_the_beams_that_leave_the_scanner(moti
 
 @pytest.mark.parametrize("motion", [SPIN, SWEEP], ids=["spin", "sweep"])
 def test_the_record_is_of_the_scanner_with_its_parts_and_of_mounts_without(motion):
-    problem = problem_of(task(motion))
+    loaded = task(motion)
+    problem = problem_of(loaded)
     shadow = shadow_for(problem)
-    found, bare = as_built(problem, SETTING, shadow), as_built(problem, SETTING, None)
+    found, bare = (as_built(problem, loaded.task, SETTING, each) for each in (shadow, None))
     judged = score_with(problem, SETTING, shadow)
     assert found.own == seen_of(problem, SETTING, judged, shadow)
     assert found.own.blind_weight == judged.blind_weight > bare.own.blind_weight
@@ -76,17 +78,11 @@ def test_the_record_is_of_the_scanner_with_its_parts_and_of_mounts_without(motio
     worth = np.exp(score(problem, SETTING).J - judged.J)
     for mount in found.mounts:
         assert mount.factor == pytest.approx(worth * before[mount.name])
-    again = as_built(problem, SETTING, shadow, judged, {m.name: score(problem, s) for m, s in _settings(found)})
+    again = as_built(problem, loaded.task, SETTING, shadow, judged, reference_mounts(problem, loaded.task))
     assert again == found
     assert all(line.startswith("with parts") for line in found.lines())
     assert all(line.startswith("without parts") for line in bare.lines())
     assert any("blind behind what stands still" in line for line in found.lines())
-
-
-def _settings(found):
-    from scanwright.design.angles import standard_settings
-
-    return [(mount, standard_settings()[mount.name]) for mount in found.mounts]
 
 
 def test_points_on_a_plane_are_those_that_no_part_blocks():

@@ -33,6 +33,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import homogeneity, log_density
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.search.search import search
 from scanwright.design.sphere.directions import sample_set, spiral
@@ -58,7 +59,7 @@ def ceiling():
 @pytest.fixture(scope="module")
 def rows(ceiling):
     loaded, problem, result = ceiling
-    return compare(loaded, problem, result.best[0])
+    return compare(loaded, problem, result.best[0], reference_mounts(problem, loaded.task))
 
 
 # typed from the makers' tables: see the sources in the files
@@ -148,10 +149,11 @@ def test_the_optimum_is_that_of_optimise_and_the_mounts_are_what_they_are_called
     np.testing.assert_allclose(axis, [0.5**0.5, 0, -(0.5**0.5)], atol=1e-12)
     assert abs(R_rot_laser(*bonn[2:])[2, 2]) < 1e-12, "the scan plane holds the axis"
     assert 0 <= np.degrees(np.arccos(R_rot_laser(*bonn[2:])[2, 0])) <= 45, "the heading is near the axis"
-    pitch = [float(x) for x in by_name["pitch only"].setting.strip("()").split(",")]
-    assert pitch[:3] == [0, 0, 0]
-    at = score(problem, np.radians(pitch)).J
+    tilt = [float(x) for x in by_name["upright, one tilt"].setting.strip("()").split(",")]
+    assert tilt[:3] == [180, 0, 0], "as the task has its axis: down"
+    at = score(problem, np.radians(tilt)).J
     assert all(at - 1e-3 <= score(problem, np.radians([0, 0, 0, beta])).J for beta in np.arange(-90, 91, 10))
+    assert all(at - 1e-3 <= score(problem, np.radians([0, 0, alpha, 0])).J for alpha in np.arange(-90, 91, 10))
     assert loaded.task.motion.period_s == by_name["rolling"].time_s
     assert by_name["rolling"].cost_usd == 5000 + 300 + 130
     assert by_name["rolling"].layers == 1081
@@ -171,7 +173,7 @@ def test_a_period_shorter_than_one_turn_still_has_one_turn(ceiling):
     loaded, problem, result = ceiling
     motion = loaded.task.motion.model_copy(update={"period_s": 0.09})
     short = replace(loaded, task=loaded.task.model_copy(update={"motion": motion}))
-    rows = compare(short, problem, result.best[0])
+    rows = compare(short, problem, result.best[0], ())
     assert [row.turns for row in rows if row.name in FULL] == [1, 1, 1]
 
 
@@ -248,6 +250,7 @@ def test_the_command_end_to_end(command, tmp_path, rows):
     code, out, err = command("compare", "ceiling", "--out", tmp_path)
     assert (code, err) == (0, [])
     assert out.splitlines()[: len(rows) + 1] == table(rows)
+    assert "optimum: beams per ball over the weighted region, against the best simple mount: 1.00 x upright" in out
     assert "not verified of HDL-64E: elevations_deg" in out
     assert "not verified of UH1256-02-0610-06S: price_usd" in out and "not verified of XL430-W250: price_usd" in out
     assert "not verified of UTM-30LX" not in out and "not verified of MX-64R" not in out
@@ -263,7 +266,10 @@ def test_the_command_as_json(command, tmp_path, rows, monkeypatch):
     monkeypatch.setattr("scanwright.pipeline.comparison.compare_picture", lambda *_: None)
     code, out, _ = command("compare", "ceiling", "--json", "--out", tmp_path)
     assert code == 0
-    assert json.loads(out) == {"task": "ceiling", "rows": [asdict(row) for row in rows]}
+    facts = json.loads(out)
+    factors = [gain["factor"] for gain in facts.pop("gains")]
+    assert factors == sorted(factors) and len(factors) == 4
+    assert facts == {"task": "ceiling", "rows": [asdict(row) for row in rows]}
 
 
 def test_a_build_folder_is_left_alone(command, tmp_path):

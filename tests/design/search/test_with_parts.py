@@ -122,6 +122,17 @@ def test_a_family_that_hides_less_wins_and_the_rest_is_not_made():
     assert chosen.built <= len(families) and chosen.open == 0
 
 
+def test_the_simplest_mount_is_built_though_another_one_has_a_lower_J_and_hides_less():
+    p = problem()
+    families = (family(p, 0.0, 85.0, 0.0, 3.0), family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))
+    simple = AngleRanges(prefer="simple", prefer_loss=0.5, holes="allow")
+    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60)), lambda _: None)
+    assert chosen.family.angles_deg == families[0].angles_deg and chosen.built == 1
+    refused = tuple(equivalents(p, families[0].angles_deg, simple))
+    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60), refused), lambda _: None)
+    assert chosen.family.angles_deg in equivalents(p, families[1].angles_deg, simple)
+
+
 def test_what_cannot_be_built_is_refused_with_its_reason():
     p = problem()
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))

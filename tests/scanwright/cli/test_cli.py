@@ -146,7 +146,9 @@ def test_optimise_as_json(command):
     assert answer["best"] == sorted(answer["best"], key=lambda family: family["J"])
     for family in answer["best"]:
         assert (family["alpha_rot_deg"], family["beta_rot_deg"]) == (180, 0)
-    assert answer["best"][0]["J"] < min(other["J"] for other in answer["standard"].values())
+    best, factors = answer["best"][0], [gain["factor"] for gain in answer["gains"]]
+    assert best["J"] - best["J_error"] < min(other["J"] for other in answer["standard"].values())
+    assert len(factors) == 4 and factors == sorted(factors) and factors[0] > 0.999
     assert {entry["unit"] for entry in answer["left_out"]} >= {"settings", "square degrees"}
 
 
@@ -268,3 +270,18 @@ def test_a_folder_for_a_file_is_refused_in_a_line(command, tmp_path, monkeypatch
     assert code == 2
     assert len(complaints) == 1
     assert "folder" in complaints[0] or "known: " in complaints[0]
+
+
+def test_optimise_prefers_a_simple_mount_and_says_what_that_costs(command, tmp_path):
+    task = tmp_path / "simple.toml"
+    shipped = (SHIPPED / "ceiling.toml").read_text(encoding="utf-8")
+    assert shipped.count("[angles]\n") == 1
+    told = 'step_deg = 15.0\nprefer = "simple"\nprefer_loss = 0.02\n'
+    task.write_text(shipped.replace("[angles]\n", f"[angles]\n{told}"), encoding="utf-8")
+    code, out, _ = command("optimise", task)
+    assert code == 0
+    assert "preferred as the simplest mount that costs at most 2% of the beams per ball: (180, 0, 0, -90)" in out
+    assert "it costs 0.17% of the beams per ball against the lowest J, (180, 0, " in out
+    task.write_text(task.read_text(encoding="utf-8").replace('prefer = "simple"\n', ""), encoding="utf-8")
+    code, out, err = command("optimise", task)
+    assert (code, out, len(err)) == (2, "", 1) and "prefer_loss = 0.02 is for prefer = 'simple'" in err[0]

@@ -54,7 +54,9 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     for mount in seen["mounts"]:
         if mount["factor"] is not None:
             assert f"{mount['factor']:.2f} times the beams per direction where it counts, with parts" in report
-            assert f"{mount['factor']:.2f} x {mount['name']} (J = {mount['seen']['J']:g})" in told
+            assert f"{mount['factor']:.2f} x {mount['name']} (" in told and f": J = {mount['J']:.4f}" in told
+    factors = [mount["factor"] for mount in seen["mounts"]]
+    assert factors == sorted(factors) and len(factors) == 4
     for line in stated:
         if "one full scan, " in line:
             figures = line.partition("one full scan, ")[2]

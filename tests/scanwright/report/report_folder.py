@@ -16,6 +16,7 @@ from trimesh.visual.material import PBRMaterial
 from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet
 from scanwright.design.evaluation.picture_files import save_picture
 from scanwright.design.left_out import LeftOut
+from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 from scanwright.design.task.task import load_task
 from scanwright.pipeline import records as writer
@@ -143,7 +144,9 @@ def drawn(folder, angles, hidden):
 
 
 def sphere(loaded, axes):
-    return density_sphere(problem_as_built(loaded, ANGLES), ANGLES, axes, loaded.task.angles.step_deg)
+    problem = problem_as_built(loaded, ANGLES)
+    mounts = reference_mounts(problem, loaded.task)
+    return density_sphere(problem, ANGLES, mounts, axes, loaded.task.angles.step_deg)
 
 
 def picture(data):

@@ -78,9 +78,11 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
         "density of this scanner, without parts",
         "density of rolling, without parts",
         "density of pitching, without parts",
+        "density of upright, one tilt, without parts",
+        "density of Bonn, 45 deg, without parts",
         "J over the direction of the axis",
     ]
-    own, rolling, pitching, axes = (picture(shown.picture) for shown in ball.maps)
+    own, rolling, pitching, _, _, axes = (picture(shown.picture) for shown in ball.maps)
     assert own.tobytes() == rolling.tobytes() != pitching.tobytes()
     shades = {tuple((np.array(colormaps["cividis"](i / (SHADES - 1))[:3]) * 255).round()) for i in range(SHADES)}
     bright = max(shades, key=sum)
@@ -104,7 +106,7 @@ def test_axes_that_nobody_searched_stay_white():
     axes = picture(sphere(loaded, few).maps[-1].picture)
     assert axes.getpixel(cell(R_world_rot(np.radians(60), 0.0)[:, 2])) != (255, 255, 255)
     assert axes.getpixel(cell(R_world_rot(np.radians(-60), 0.0)[:, 2])) == (255, 255, 255)
-    assert len(sphere(loaded, AXES[:1]).maps) == 3
+    assert len(sphere(loaded, AXES[:1]).maps) == 5
 
 
 def test_a_check_knows_its_bodies():

@@ -28,17 +28,19 @@ def found():
 
 
 def test_what_it_is_what_it_sees_and_what_that_is_worth(found):
-    is_, sees, worth = sentences(ANGLES, found, 0.07, ())
+    is_, sees, worth, verdict = sentences(ANGLES, found, 0.07, ())
     assert is_.endswith("once around in 18 s, sends 778,320 beams: 720 lines of 1,081.")
     own, mounts = found.as_built.own, found.as_built.mounts
     assert sees.startswith("Wherever it counts, a disc 21 cm wide, 3 m away") and f"gets {own.least}" in sees
     factor, name = min((each.factor, each.name) for each in mounts)
-    assert f"{factor:.2f} times as many beams, without parts, as with {name}, the better" in worth
+    assert f"{factor:.2f} times as many beams, without parts, as with the best simple mount, {name}" in worth
+    assert all(f"{each.factor:.2f} times as with {each.name}" in worth for each in mounts[1:])
+    assert verdict == f"{name} (180, 45, 90, -59.4) is better ({1 / factor:.2f} times the beams)."
 
 
 def test_a_hole_is_told_instead_of_a_count_and_nothing_is_compared_that_has_no_ratio(found):
     own = replace(found.as_built.own, blind=("blind ahead", "blind behind"))
-    mounts = tuple(replace(each, factor=None) for each in found.as_built.mounts)
+    mounts = tuple(replace(each, gain=replace(each.gain, factor=None)) for each in found.as_built.mounts)
     built = replace(found.as_built, blocked=0.25, own=own, mounts=mounts)
     said = sentences(ANGLES, replace(found, as_built=built), 0.07, ())
     assert said[0].endswith("720 lines of 1,081. Its own parts block 25.0% of them.")

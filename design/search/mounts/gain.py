@@ -1,0 +1,119 @@
+"""What an answer is worth against the reference mounts, the best of them first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.stated_error import error_words
+from scanwright.design.search.mounts.reference import TunedMount, angles_used
+
+AS_GOOD = 1.02  # a factor up to this is not worth a mount that is harder to build
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """An answer against one reference mount, which is without parts.
+
+    Attributes:
+        mount: the reference mount.
+        factor: beams per direction of the answer over those of the mount, in the geometric mean; None if J is no
+            logarithm.
+        J_less: J of the mount less J of the answer: what the answer gains.
+        same: whether the answer is this mount.
+        simpler: whether the mount has fewer angles that are not 0 than the answer.
+    """
+
+    mount: TunedMount
+    factor: float | None
+    J_less: float
+    same: bool
+    simpler: bool
+
+    @property
+    def value(self) -> str:
+        """The gain in words: a factor, or a difference of J."""
+        return f"{self.J_less:+.4f} in J" if self.factor is None else f"{self.factor:.2f} x"
+
+    @property
+    def flaws(self) -> str:
+        """What the mount does not do that the task may ask for; nothing if there is nothing."""
+        flaws = [] if self.mount.keeps_limits else ["breaks the limits"]
+        blind = self.mount.score.blind_weight
+        return ", ".join(flaws + ([f"blind to {percent(blind)} of the weight"] if blind > NO_BLIND_WEIGHT else []))
+
+    def words(self) -> str:
+        """The gain, the mount, its angles and its J, in a line."""
+        J = f"J = {self.mount.score.J:.4f}"
+        if self.factor is None:
+            J += f" +- {error_words(self.mount.score.J, self.mount.score.J_error)}"
+        inside = "; ".join(filter(None, [J, self.flaws]))
+        return f"{self.value} {self.mount.name} {_four(self.mount.angles_deg)}: {inside}"
+
+    def facts(self) -> dict[str, Any]:
+        """Names with units and values, for JSON."""
+        return {
+            "name": self.mount.name,
+            "angles_deg": list(self.mount.angles_deg),
+            "factor": self.factor,
+            "J_less": self.J_less,
+            **{key: value for key, value in asdict(self.mount.score).items() if key != "J_lower"},
+            "keeps_limits": self.mount.keeps_limits,
+            "in_ranges": self.mount.in_ranges,
+        }
+
+
+def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Iterable[TunedMount]) -> tuple[Gain, ...]:
+    """Compare an answer, a setting and its J, with reference mounts: the best of them, the smallest gain, first."""
+    logarithmic = problem.objective.name == "log"  # the one objective whose differences are ratios of densities
+    found = []
+    for mount in mounts:
+        less = mount.score.J - J
+        factor = float(np.exp(less)) if logarithmic else None
+        same = np.allclose(angles_deg, mount.angles_deg, atol=1e-6)
+        found.append(Gain(mount, factor, less, same, angles_used(mount.angles_deg) < angles_used(angles_deg)))
+    return tuple(sorted(found, key=lambda gain: gain.J_less))
+
+
+def gain_lines(found: tuple[Gain, ...]) -> list[str]:
+    """The gains in words, a line each, the smallest first; and whether it is worth a mount that is not simple."""
+    unit = "J, against" if found[0].factor is None else "beams per ball over the weighted region, against"
+    lines = [f"{unit} the best simple mount: {found[0].words()}"]
+    lines += [f"{unit} another simple mount: {gain.words()}" for gain in found[1:]]
+    return lines + verdict(found)
+
+
+def verdict(found: tuple[Gain, ...]) -> list[str]:
+    """A sentence about a simple mount that is as good or better; of several the one that nothing speaks against."""
+    good = [gain for gain in found if gain.factor is not None and gain.factor <= AS_GOOD]
+    if not good:
+        return []
+    free = [gain for gain in good if not _against(gain)] or good
+    better = _better(free[0])  # the best one first
+    best = free[0] if better else min(free, key=lambda gain: (not gain.same, not gain.simpler))
+    if best.same:
+        return [f"the answer is itself a simple mount: {best.mount.name}"]
+    assert best.factor is not None
+    how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
+    rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
+    return [f"{best.mount.name} {_four(best.mount.angles_deg)} is {how}{rest}"]
+
+
+def _better(gain: Gain) -> bool:
+    """Whether the mount is better than the answer by more than makes it as good."""
+    return gain.factor is not None and gain.factor < 2 - AS_GOOD
+
+
+def _against(gain: Gain) -> str:
+    """What speaks against a mount."""
+    flaws = gain.flaws if not gain.flaws or gain.flaws.startswith("breaks") else f"is {gain.flaws}"
+    return ", ".join(filter(None, [flaws, "" if gain.mount.in_ranges else "the angles of the task exclude it"]))
+
+
+def _four(angles_deg: tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"

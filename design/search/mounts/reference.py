@@ -1,0 +1,144 @@
+"""The four mounts that anybody would build without a search, each tuned to a task: what a gain is stated against.
+
+- rolling and pitching, the standard alignments (Schubert 2016, section 4), have nothing to tune;
+- upright, one tilt: the axis stands upright and the scan plane is tilted to it by one angle, by pitching or by rolling
+  the lidar (pitched as in Malaga: Mandow; Morales 2018). The better of both, at the best tilt;
+- Bonn, 45 deg: axis 45 deg down ahead, scan plane along the axis, heading twisted away from it "slightly" (the
+  UTM-30LX-EW on an MX-28 that their MAV carries). How far was not found: the best twist up to 45 deg.
+
+Their builders are bound by the limits of the task, not by its ranges of angles: whoever builds one of these chooses its
+angles. An angle is tuned in steps down to `STEPS_DEG[-1]`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.arrays import Setting
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.grid_classes import mirrors_of
+from scanwright.design.search.with_parts import equivalents
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.task import Task
+
+STEPS_DEG = (5.0, 1.0, 0.2)  # of an angle: over all of its range, then about the best one so far
+AROUND = 4  # steps to either side of it
+QUICK_NODES = 243  # of a score that only tunes an angle
+LOOKS = 5  # settings scored exactly, before a mount is taken that breaks what the task asks
+
+Four = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class OneFreeAngle:
+    """Settings (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg] of which one angle is free, between two ends."""
+
+    angles_deg: Four
+    free: int
+    low_deg: float
+    high_deg: float
+
+    def at(self, angle_deg: float) -> Four:
+        """The setting with the free angle at a value."""
+        angles = list(self.angles_deg)
+        angles[self.free] = angle_deg
+        return angles[0], angles[1], angles[2], angles[3]
+
+
+PITCHED = OneFreeAngle((0.0, 0.0, 0.0, 0.0), 3, -90.0, 90.0)
+ROLLED = OneFreeAngle((0.0, 0.0, 0.0, 0.0), 2, -90.0, 90.0)
+TWISTED = OneFreeAngle((180.0, 45.0, 90.0, -90.0), 3, -90.0, -45.0)
+TUNED = {"upright, one tilt": (PITCHED, ROLLED), "Bonn, 45 deg": (TWISTED,)}
+
+
+@dataclass(frozen=True, slots=True)
+class TunedMount:
+    """A reference mount, tuned to a task.
+
+    Attributes:
+        name: of the mount.
+        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        score: its exact J, and what it leaves blind.
+        keeps_limits: whether it keeps the limits of the task; a blind spot breaks none of them.
+        in_ranges: whether the task allows its angles, or others of the same J, which are then `angles_deg`.
+    """
+
+    name: str
+    angles_deg: Four
+    score: Score
+    keeps_limits: bool
+    in_ranges: bool
+
+    @property
+    def angles_rad(self) -> Setting:
+        """The four angles in radians, shape (4,)."""
+        return np.radians(self.angles_deg)
+
+
+def angles_used(angles_deg: Iterable[float]) -> int:
+    """How many mounting angles are not 0: the fewer, the simpler the mount."""
+    return sum(abs(angle) > 1e-9 for angle in angles_deg)
+
+
+def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
+    """The four reference mounts of a task: rolling, pitching, upright with one tilt, 45 deg.
+
+    Each has the lowest J of its settings that keep the limits and, if the task avoids holes, have none; if there is no
+    such setting, the lowest J of all.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    limits = Requirements(problem, task.limits, avoid_holes=False)
+    required = Requirements(problem, task.limits, task.angles.holes == "avoid")
+    found = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
+    found += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
+    out = []
+    for name, angles_deg, judged in found:
+        keeps_limits = limits.keeps(judged, np.array(angles_deg))
+        allowed = [same for same in _same(problem, angles_deg) if task.angles.hold(same)]
+        out.append(TunedMount(name, (allowed or [angles_deg])[0], judged, keeps_limits, bool(allowed)))
+    return tuple(out)
+
+
+def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, Score]:
+    """The best setting of some lines, found by quick scores, and its exact score."""
+    known: dict[Four, tuple[bool, float]] = {}
+    places: list[tuple[OneFreeAngle, float]] = []
+
+    def look(line: OneFreeAngle, angles_deg: Setting) -> None:
+        for angle_deg in np.unique(np.clip(angles_deg, line.low_deg, line.high_deg).round(6) + 0.0).tolist():
+            setting = line.at(angle_deg)
+            if setting not in known:
+                quick = score_on(required.problem, np.radians(setting), QUICK_NODES, stated=False)
+                known[setting] = (not required.keeps(quick, np.array(setting)), quick.J)
+                places.append((line, angle_deg))
+
+    for line in lines:
+        low_deg = 0.0 if line is ROLLED and _rolls_alike(required.problem) else line.low_deg
+        look(line, np.arange(low_deg, line.high_deg + STEPS_DEG[0] / 2, STEPS_DEG[0]))
+    for step_deg in STEPS_DEG[1:]:
+        line, angle_deg = min(places, key=lambda place: known[place[0].at(place[1])])
+        look(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
+    ordered = sorted(known, key=known.__getitem__)
+    for setting in [each for each in ordered if not known[each][0]][:LOOKS]:
+        if (found := required.score(np.array(setting))) is not None:
+            return setting, found
+    return ordered[0], score(required.problem, np.radians(ordered[0]))
+
+
+def _same(problem: Problem, angles_deg: Four) -> list[Four]:
+    """Settings of the same J, itself first; an axis that is turned over may be turned either way."""
+    found = equivalents(problem, angles_deg, AngleRanges())
+    return [*found, *((180.0, b, c, d) for a, b, c, d in found if a == -180)]
+
+
+def _rolls_alike(problem: Problem) -> bool:
+    """Whether a lidar rolled to the left sees what one rolled to the right sees."""
+    return problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1
