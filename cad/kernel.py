@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import sys
 
-from design.errors import InstallError, require
+from scanwright.design.errors import InstallError, require
 
 _PACKAGES = ("cadquery", "OCP", "ezdxf", "jinja2", "manifold3d", "reportlab", "shapely")
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 
 def diamond(half: float, y: float) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from design.catalogue.products import Printer
+from scanwright.design.catalogue.products import Printer
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from design.arrays import Array
-from design.errors import BuildError
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 
 
 @contextmanager

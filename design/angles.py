@@ -24,11 +24,11 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError
 
-from design import frames
-from design.arrays import Pose, Rotation, Setting, Vector
-from design.errors import TaskError
-from design.motion import Motion
-from design.record import A_FILE_FOR_A_FOLDER, Record, explain, read_text
+from scanwright.design import frames
+from scanwright.design.arrays import Pose, Rotation, Setting, Vector
+from scanwright.design.errors import TaskError
+from scanwright.design.motion import Motion
+from scanwright.design.record import A_FILE_FOR_A_FOLDER, Record, explain, read_text
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from design.errors import ScanwrightError
+from scanwright.design.errors import ScanwrightError
 
 
 def check_place(path: Path, refusal: type[ScanwrightError]) -> None:

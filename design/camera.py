@@ -20,9 +20,9 @@ from jaxtyping import Float
 from numpy import ndarray
 from pydantic import Field, model_validator
 
-from design import frames
-from design.arrays import Pose
-from design.record import Record
+from scanwright.design import frames
+from scanwright.design.arrays import Pose
+from scanwright.design.record import Record
 
 Pixels = Annotated[int, Field(strict=True, ge=1, le=100_000)]
 Focal = Annotated[float, Field(gt=0)]

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
-from design.arrays import Array, Pose, Rotation
+from scanwright.design.arrays import Array, Pose, Rotation
 
 
 def Rx(angle_rad: ArrayLike) -> Float[ndarray, "*k 3 3"]:

@@ -16,7 +16,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from design.errors import ScanwrightError, TaskError, suggest
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
 _NUMBERS = "biuf"
 MOST_TOLD = 20  # faults of one file

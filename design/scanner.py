@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
-from design.angles import AngleSet
-from design.catalogue.catalogue import Catalogue
-from design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing, SlotSwitch
-from design.deck_holes import Circle, Rectangle
-from design.record import Record
+from scanwright.design.angles import AngleSet
+from scanwright.design.catalogue.catalogue import Catalogue
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing, SlotSwitch
+from scanwright.design.deck_holes import Circle, Rectangle
+from scanwright.design.record import Record
 
 
 class Modules(Record):

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.errors import BuildError
-from design.record import read_npz
+from scanwright.design.errors import BuildError
+from scanwright.design.record import read_npz
 
 AXIS_STEPS = 720  # equal steps of the axis angle, from 0, in [0, 2 pi)
 

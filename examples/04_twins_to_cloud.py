@@ -7,7 +7,7 @@ servo="/dev/serial/by-id/...")`. The folder needs no more than an `angles.json`.
 from pathlib import Path
 
 import scanwright as sw
-from firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
 
 TASK = {
     "name": "twins",

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 import scanwright as sw
-from firmware_io.recording.arrays import RecordingArrays
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import Scan
+from scanwright.firmware_io.recording.arrays import RecordingArrays
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import Scan
 
 TASK = {
     "name": "own_device",

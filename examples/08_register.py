@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 import scanwright as sw
-from design.frames import Rz, apply, rigid
-from design.scene.ray_caster import build_scene
-from firmware_io.twins.simulated import simulated_recording
-from firmware_io.twins.world import furnished_room
+from scanwright.design.frames import Rz, apply, rigid
+from scanwright.design.scene.ray_caster import build_scene
+from scanwright.firmware_io.twins.simulated import simulated_recording
+from scanwright.firmware_io.twins.world import furnished_room
 
 TASK = {
     "name": "stands",

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from design.errors import RecordingError
+from scanwright.design.errors import RecordingError
 
 P = ParamSpec("P")
 T = TypeVar("T")

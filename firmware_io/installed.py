@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from importlib.metadata import entry_points
 from typing import Protocol, TypeVar
 
-from design.errors import DeviceError
+from scanwright.design.errors import DeviceError
 
 
 class Named(Protocol):

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
-from design.errors import RecordingError
+from scanwright.design.errors import RecordingError
 
 _TURNS_RAD = 1000.0
 _SCAN_BOUNDS = (

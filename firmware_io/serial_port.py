@@ -9,7 +9,7 @@ from pathlib import Path
 import serial
 from serial.tools.list_ports import comports
 
-from design.errors import DeviceError
+from scanwright.design.errors import DeviceError
 
 _WRITE_S = 10.0  # only a port that nobody serves any more takes longer; a busy computer can take seconds
 _ADAPTERS = Path("/sys/bus/usb-serial/devices")

@@ -235,7 +235,7 @@ def once(tmp_path_factory):
 @pytest.fixture(scope="session")
 def parts_of(once):
     """Of a scanner, all its parts and the bodies around them: made once, for reading only."""
-    from cad.assembly.make import make_parts
+    from scanwright.cad.assembly.make import make_parts
 
     return lambda scanner: once(f"parts {scanner}", lambda _: make_parts(scanner))
 
@@ -264,9 +264,9 @@ def made(once):
 
     Its folder, what was made and exported, the scanner, and what the command prints: for reading only.
     """
-    from cad.files import part_files, workshop_files
-    from design.concurrency import processes
     from scanwright.api import build
+    from scanwright.cad.files import part_files, workshop_files
+    from scanwright.design.concurrency import processes
 
     def all_of_it(folder):
         given = {}

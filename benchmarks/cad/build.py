@@ -54,7 +54,7 @@ def on_one_core(task: str, folder: Path) -> None:
     """Build, and print what is done and the seconds of the processor so far."""
     if hasattr(os, "sched_setaffinity"):  # Linux
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    from design.task.task import load_task
+    from scanwright.design.task.task import load_task
     from scanwright.pipeline.build import build_task
 
     build_task(load_task(task), folder / task, say)

@@ -10,12 +10,12 @@ import sys
 from collections import Counter
 
 from benchmarks.cad.parts import COMBINATIONS, scanners_of
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import leads_of, tied_mm
-from cad.layout.cables.standing import standing_leads_of
-from cad.layout.cables.ties import foot_ties_of
-from cad.layout.layout import layout_of
-from design.errors import BuildError
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.leads import leads_of, tied_mm
+from scanwright.cad.layout.cables.standing import standing_leads_of
+from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.layout import layout_of
+from scanwright.design.errors import BuildError
 
 
 def main(count: int = 300) -> None:

@@ -12,14 +12,14 @@ import re
 import sys
 from collections import Counter, defaultdict
 
-from cad.layout.all_joints import joints_of
-from cad.layout.layout import layout_of
-from cad.parts.all_parts import parts_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import Catalogue, load_catalogue
-from design.catalogue.products import Lidar, Servo, SlipRing
-from design.errors import BuildError
-from design.scanner import scanner_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.all_parts import parts_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import scanner_of
 
 TILTED = (0.0, 31.0, 6.0, 15.0)
 

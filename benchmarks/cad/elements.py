@@ -22,23 +22,23 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.make import make_parts
-from cad.assembly.masses import link_bodies, rotor_of
-from cad.checks.deflection import LEAST_ERROR
-from cad.checks.mount import carried
-from cad.geometry.inertia import of_solid
-from cad.layout.loads import STANDARD_GRAVITY
-from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
-from cad.parts.base_mount import FOOT_RADIUS
-from cad.screws import passing_hole
-from cad.statics.mount_sag import mount_sag
-from cad.statics.sag import POISSON, linkage_sag
-from design.angles import load_angles
-from design.arrays import Array, Mask
-from design.frames import Rz
-from design.scanner import Scanner
-from design.task.task import load_task
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.masses import link_bodies, rotor_of
+from scanwright.cad.checks.deflection import LEAST_ERROR
+from scanwright.cad.checks.mount import carried
+from scanwright.cad.geometry.inertia import of_solid
+from scanwright.cad.layout.loads import STANDARD_GRAVITY
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
+from scanwright.cad.parts.base_mount import FOOT_RADIUS
+from scanwright.cad.screws import passing_hole
+from scanwright.cad.statics.mount_sag import mount_sag
+from scanwright.cad.statics.sag import POISSON, linkage_sag
+from scanwright.design.angles import load_angles
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.frames import Rz
+from scanwright.design.scanner import Scanner
+from scanwright.design.task.task import load_task
 
 EDGE_MM = 5.0  # of the tetrahedra
 CALCULIX = (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)  # where a tetrahedron of Gmsh has its nodes

@@ -27,19 +27,19 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cad import slicer
-from cad.assembly.assembly import Assembly
-from cad.assembly.make import make_parts
-from cad.assembly.masses import link_bodies
-from cad.assembly.print_settings import slicer_settings
-from cad.checks.check import Check
-from cad.checks.run import run_checks
-from cad.files.threemf import threemf_bytes
-from cad.geometry.inertia import of_solid
-from cad.geometry.print_pose import on_bed
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.errors import BuildError
-from design.scanner import Scanner, scanner_of
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.masses import link_bodies
+from scanwright.cad.assembly.print_settings import slicer_settings
+from scanwright.cad.checks.check import Check
+from scanwright.cad.checks.run import run_checks
+from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.geometry.inertia import of_solid
+from scanwright.cad.geometry.print_pose import on_bed
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner, scanner_of
 
 Products = tuple[str, str, str]
 BORE, BORE_TOO, CAPSULE = "UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"

@@ -24,19 +24,19 @@ import numpy as np
 from pydantic import ValidationError
 from scipy.optimize import differential_evolution
 
-from design.arrays import Array
-from design.catalogue.catalogue import load_catalogue
-from design.errors import TaskError
-from design.objective.counted import Counted, counted_J
-from design.objective.problem import Problem, problem_of
-from design.objective.score import Score, score
-from design.objective.stated_error import error_words
-from design.scene.surface import Surface, cell_directions
-from design.search.constraints import Requirements
-from design.search.families import EQUAL, Family
-from design.search.search import search
-from design.task.angle_ranges import NAMES, AngleRanges
-from design.task.task import Limits, LoadedTask, Task, load_task, shipped_tasks
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.counted import Counted, counted_J
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.score import Score, score
+from scanwright.design.objective.stated_error import error_words
+from scanwright.design.scene.surface import Surface, cell_directions
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.families import EQUAL, Family
+from scanwright.design.search.search import search
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.task.task import Limits, LoadedTask, Task, load_task, shipped_tasks
 
 SMALL_ERROR = 1e-3  # what most scores state at the default
 SENSORS = ("UTM-30LX", "URG-04LX", "UST-20LX", "LMS 200")

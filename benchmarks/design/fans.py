@@ -17,16 +17,16 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from design.angles import Angles, AngleSet
-from design.arrays import Array
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.evaluation.coverage import mean_density_at
-from design.motion import Spin
-from design.objective.problem import problem_of
-from design.scene.ray_caster import build_scene
-from design.task.task import LoadedTask, Task
-from firmware_io.twins.simulated import simulated_recording
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.motion import Spin
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.scene.ray_caster import build_scene
+from scanwright.design.task.task import LoadedTask, Task
+from scanwright.firmware_io.twins.simulated import simulated_recording
 
 PERIOD_S, BALL_DEG, BOX_M, TENTHS = 20.0, 2.0, 3.0, 10
 SERVO = "MX-64R"

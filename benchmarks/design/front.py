@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from design.accuracy.reference import smooth_reference
-from design.density.beams import scan_lines
-from design.objective.problem import FRONT, Problem, problem_of
-from design.objective.score import quick_J
-from design.task.task import load_task, shipped_tasks
+from scanwright.design.accuracy.reference import smooth_reference
+from scanwright.design.density.beams import scan_lines
+from scanwright.design.objective.problem import FRONT, Problem, problem_of
+from scanwright.design.objective.score import quick_J
+from scanwright.design.task.task import load_task, shipped_tasks
 
 NODES = (243, 729, 2187, 6561, 19683, 59049, 177147)
 SETTINGS = 12

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.angles import STANDARD_DEG
-from design.evaluation.density_picture import INK
-from design.evaluation.poles import Pole, PoleChances, pole_chances
-from design.objective.problem import Problem, problem_of
-from design.task.task import Task, load_task
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.evaluation.density_picture import INK
+from scanwright.design.evaluation.poles import Pole, PoleChances, pole_chances
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.task.task import Task, load_task
 
 PICTURE = Path(__file__).parents[2] / "docs/pictures/poles.png"
 PERIOD_S = 2.0

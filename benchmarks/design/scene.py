@@ -14,7 +14,7 @@ from statistics import median
 import numpy as np
 import trimesh
 
-from design.scene.ray_caster import build_scene, cast, load_triangles
+from scanwright.design.scene.ray_caster import build_scene, cast, load_triangles
 
 RAYS = 1_000_000
 HALF_M = np.array([5.0, 4.0, 1.5])

@@ -20,15 +20,15 @@ from unittest.mock import patch
 
 import numpy as np
 
-from design.arrays import Array
-from design.objective.ball_search import scan_tree
-from design.objective.named_objectives import Moment, log_density
-from design.objective.problem import Problem, problem_of
-from design.objective.score import score
-from design.search.plane_axis_product import BothWays, both_ways
-from design.search.search import search
-from design.sphere.directions import equal_angle_grid, weighted_samples
-from design.task.task import load_task
+from scanwright.design.arrays import Array
+from scanwright.design.objective.ball_search import scan_tree
+from scanwright.design.objective.named_objectives import Moment, log_density
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.plane_axis_product import BothWays, both_ways
+from scanwright.design.search.search import search
+from scanwright.design.sphere.directions import equal_angle_grid, weighted_samples
+from scanwright.design.task.task import load_task
 
 MATMUL_S = 3.0
 SETTING_DEG = (0.0, -55.0, -80.0, 75.0)
@@ -84,7 +84,7 @@ def main() -> None:
     mapped = planes * (build + whole) + covered * per_sum
 
     products = Products()
-    with patch("design.search.coarse.both_ways", products.counting):
+    with patch("scanwright.design.search.coarse.both_ways", products.counting):
         counted = search(problem, ranges).seconds
     machine = plain_matmul(products.largest)
     reached = products.flops / products.seconds

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from benchmarks.firmware_io.rooms import FURNISHED, NAMES, Floats, Setup, Truth, bound, faces, simulate, write
-from design.angles import Angles, AngleSet
-from design.errors import ScanwrightError
-from firmware_io.calibration.estimate import Estimate, estimate
-from firmware_io.calibration.model import PARAMETERS, Mount, gather, start_vector
-from firmware_io.recording.recording import open_recording
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import ScanwrightError
+from scanwright.firmware_io.calibration.estimate import Estimate, estimate
+from scanwright.firmware_io.calibration.model import PARAMETERS, Mount, gather, start_vector
+from scanwright.firmware_io.recording.recording import open_recording
 
 MOUNT = 4
 

@@ -34,8 +34,8 @@ from benchmarks.firmware_io.rooms import (
     walked,
     write,
 )
-from design.errors import ScanwrightError
-from firmware_io.calibration.calibrate import calibrate_recordings
+from scanwright.design.errors import ScanwrightError
+from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 
 WRONG = 18.5
 BEAMS = 180

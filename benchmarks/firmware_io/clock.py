@@ -11,8 +11,8 @@ import sys
 
 import numpy as np
 
-from design.arrays import Times
-from firmware_io.lidar.device_clock import DeviceClock
+from scanwright.design.arrays import Times
+from scanwright.firmware_io.lidar.device_clock import DeviceClock
 
 DELAY_NS = 21_000_000
 LATE_MS, PPM, SEEDS = 20.0, 50.0, 3

@@ -11,11 +11,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 
-from design import frames
-from design.arrays import Floats
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from firmware_io.clouds.ply import read_ply
+from scanwright.design import frames
+from scanwright.design.arrays import Floats
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.ply import read_ply
 
 _WIDTH_IN = 11.0
 _CELLS = 700  # along the widest view; finer than a screen shows

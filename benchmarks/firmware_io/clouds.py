@@ -31,14 +31,14 @@ import numpy as np
 from kiss_icp.preprocess import Preprocessor
 from mcap_ros2.reader import read_ros2_messages
 
-from design.angles import Angles, AngleSet, load_angles
-from design.arrays import Floats
-from firmware_io.assembly.deskew import place
-from firmware_io.assembly.deskew_kernel import place_block
-from firmware_io.clouds.ply import PlyWriter
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
+from scanwright.design.angles import Angles, AngleSet, load_angles
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.assembly.deskew import place
+from scanwright.firmware_io.assembly.deskew_kernel import place_block
+from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
 from scanwright.trials.axis import ways_between
 
 ROUNDS = 7

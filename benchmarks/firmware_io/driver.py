@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks.firmware_io.faults import ANGLES
-from firmware_io.scan import acquire
-from firmware_io.scan.plan import plan_scan
+from scanwright.firmware_io.scan import acquire
+from scanwright.firmware_io.scan.plan import plan_scan
 
 _SETTLED_S = 10.0  # of recording, in which buffers come to their size
 _PAGE = resource.getpagesize()

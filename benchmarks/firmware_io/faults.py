@@ -26,13 +26,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Timer
 
-from design.angles import AngleSet
-from design.errors import ScanwrightError
-from firmware_io.recording.recording import open_recording
-from firmware_io.recording.repair.repair import repair
-from firmware_io.scan import acquire
-from firmware_io.scan.plan import plan_scan
-from firmware_io.twins.scanner import EmulatedScanner, emulated_scanner, room
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import ScanwrightError
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.recording.repair.repair import repair
+from scanwright.firmware_io.scan import acquire
+from scanwright.firmware_io.scan.plan import plan_scan
+from scanwright.firmware_io.twins.scanner import EmulatedScanner, emulated_scanner, room
 
 ANGLES = AngleSet.model_validate(
     {

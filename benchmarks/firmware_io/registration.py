@@ -16,11 +16,11 @@ import numpy as np
 import small_gicp
 from numba import njit
 
-from design import frames
-from design.arrays import Floats
-from firmware_io.registration.pairwise import align
-from firmware_io.registration.register import register
-from firmware_io.registration.sensor_view import THREADS, make_view
+from scanwright.design import frames
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.registration.pairwise import align
+from scanwright.firmware_io.registration.register import register
+from scanwright.firmware_io.registration.sensor_view import THREADS, make_view
 
 ROUNDS = 7
 PAIRS = 12

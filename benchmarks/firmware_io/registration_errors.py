@@ -19,11 +19,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from benchmarks.firmware_io.registration import Boxes, cast, distances, motion, shell
-from design import frames
-from design.angles import Angles, AngleSet
-from design.arrays import Floats
-from firmware_io.registration.pairwise import align
-from firmware_io.registration.sensor_view import SensorView, make_view
+from scanwright.design import frames
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.registration.pairwise import align
+from scanwright.firmware_io.registration.sensor_view import SensorView, make_view
 
 SPACING_M = 0.1
 LINES = {2: 80, 18: 720}

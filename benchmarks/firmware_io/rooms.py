@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import JointLog, Scan
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import JointLog, Scan
 
 Floats = NDArray[np.float64]
 START_NS = 1_700_000_000_000_000_000

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.angles import Angles, AngleSet
-from design.arrays import Floats
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.streaming import LOOK_AHEAD_S, Assembler, ScanPoints
-from firmware_io.samples import JointLog, JointSample, Scan, straight
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.assembly.streaming import LOOK_AHEAD_S, Assembler, ScanPoints
+from scanwright.firmware_io.samples import JointLog, JointSample, Scan, straight
 
 START_NS = 1_700_000_000_000_000_000
 ANGLES = AngleSet(

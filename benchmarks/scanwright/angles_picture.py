@@ -13,8 +13,8 @@ import trimesh
 from matplotlib.figure import Figure
 
 from benchmarks.scanwright.canvas import Canvas
-from design.arrays import Array
-from design.frames import R_rot_laser, R_world_rot, rigid
+from scanwright.design.arrays import Array
+from scanwright.design.frames import R_rot_laser, R_world_rot, rigid
 
 PICTURE = Path(__file__).parents[2] / "docs/pictures/angles.png"
 TURNED_DEG = 35.0

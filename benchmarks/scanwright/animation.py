@@ -33,14 +33,14 @@ from benchmarks.scanwright.robot_picture import (
     scanner_bodies,
     surroundings,
 )
-from design.angles import AngleSet
-from design.arrays import Array
-from design.evaluation.coverage import mean_density_at
-from design.objective.problem import Problem
-from design.objective.score import score
-from design.scene.ray_caster import build_scene
-from design.task.task import load_task
-from firmware_io.twins.simulated import simulated_recording
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import score
+from scanwright.design.scene.ray_caster import build_scene
+from scanwright.design.task.task import load_task
+from scanwright.firmware_io.twins.simulated import simulated_recording
 from scanwright.report.answer import mounting_rad, problem_as_built
 
 MOVIE = Path(__file__).parents[2] / "docs/pictures/from_task_to_cloud.webp"

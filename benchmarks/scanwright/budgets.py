@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.scanwright.screens import CHROMIUM
-from design.task.task import load_task
-from firmware_io.scan.live_feed import CloudGrowth
+from scanwright.design.task.task import load_task
+from scanwright.firmware_io.scan.live_feed import CloudGrowth
 from scanwright.live.cloud_view import CloudView
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio

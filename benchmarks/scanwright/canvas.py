@@ -27,7 +27,7 @@ from vtkmodules.vtkRenderingCore import (
 )
 from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 Rgb = tuple[float, float, float]
 SMOOTH_DEG = 30.0  # edges sharper than this stay sharp

@@ -27,13 +27,13 @@ import scanwright as sw
 from benchmarks.scanwright import gallery_worlds as worlds
 from benchmarks.scanwright.canvas import Canvas
 from benchmarks.scanwright.robot_picture import points_of, scanner_bodies
-from design.angles import AngleSet
-from design.arrays import Array
-from design.evaluation.metres import on_planes
-from design.scene.ray_caster import build_scene
-from design.shadow import load_own_body
-from design.task.task import load_task
-from firmware_io.twins.simulated import simulated_recording
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.scene.ray_caster import build_scene
+from scanwright.design.shadow import load_own_body
+from scanwright.design.task.task import load_task
+from scanwright.firmware_io.twins.simulated import simulated_recording
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.sentences import sentences
 

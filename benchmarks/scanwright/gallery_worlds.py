@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from benchmarks.scanwright.robot_picture import box, surroundings
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 SEED = 7
 

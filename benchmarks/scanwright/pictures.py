@@ -20,7 +20,7 @@ import numpy as np
 import scanwright as sw
 from benchmarks.scanwright.canvas import Canvas
 from benchmarks.scanwright.robot_picture import height_colours, points_of, scanner_bodies
-from design.angles import AngleSet
+from scanwright.design.angles import AngleSet
 
 HERE = Path(__file__).parents[2] / "docs/pictures"
 ROLLING = (0.0, 90.0, 0.0, -90.0)

@@ -37,10 +37,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from design.angles import Angles, AngleSet
-from design.task.task import load_task
-from firmware_io.samples import Scan
-from firmware_io.scan.live_feed import EVERY_S, Feed, Placing, growing
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.task.task import load_task
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.live_feed import EVERY_S, Feed, Placing, growing
 from scanwright.live.cloud_view import CloudView
 from scanwright.serving.gate import Gate
 from scanwright.serving.page_server import guarded_server

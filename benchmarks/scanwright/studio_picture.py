@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 from benchmarks.scanwright.screens import CHROMIUM, COLOURS, HERE, PHONE, beside, on_screen
-from design.angles import load_angles
-from design.task.task import load_task
+from scanwright.design.angles import load_angles
+from scanwright.design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
 from scanwright.studio.state import Setting

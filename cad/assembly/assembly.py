@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import cadquery as cq
 
-from cad.assembly.bought import BodySpec
-from cad.geometry.inertia import Inertial, of_solid
-from cad.geometry.mesh import TriMesh, mesh_of
-from cad.geometry.print_pose import PrintPose, print_pose
-from cad.layout.cables.leads import RotorLead
-from cad.layout.cables.standing import StandingLead
-from cad.layout.layout import Layout
-from cad.parts.part_spec import Colour, PartSpec
+from scanwright.cad.assembly.bought import BodySpec
+from scanwright.cad.geometry.inertia import Inertial, of_solid
+from scanwright.cad.geometry.mesh import TriMesh, mesh_of
+from scanwright.cad.geometry.print_pose import PrintPose, print_pose
+from scanwright.cad.layout.cables.leads import RotorLead
+from scanwright.cad.layout.cables.standing import StandingLead
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.parts.part_spec import Colour, PartSpec
 
 
 @dataclass(frozen=True, slots=True)

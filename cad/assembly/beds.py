@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
-from design.errors import BuildError
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.design.errors import BuildError
 
 SLACK_MM = 0.01  # the noise of meshes
 

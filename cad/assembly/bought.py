@@ -13,19 +13,19 @@ from typing import Literal
 
 import cadquery as cq
 
-from cad import solids
-from cad.assembly import bought_shapes as draw
-from cad.assembly.tube import LEAD_CHORDS, lead_solid, standing_solid
-from cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
-from cad.layout import names
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import RotorLead
-from cad.layout.cables.standing import StandingLead
-from cad.layout.direct.stack import DirectStack
-from cad.layout.layout import Layout
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from cad.parts.part_spec import STEEL, Colour
-from design.catalogue.products import Bearing
+from scanwright.cad import solids
+from scanwright.cad.assembly import bought_shapes as draw
+from scanwright.cad.assembly.tube import LEAD_CHORDS, lead_solid, standing_solid
+from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
+from scanwright.cad.layout import names
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.leads import RotorLead
+from scanwright.cad.layout.cables.standing import StandingLead
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from scanwright.cad.parts.part_spec import STEEL, Colour
+from scanwright.design.catalogue.products import Bearing
 
 CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
 WINDOW = (0.35, 0.05, 0.08)

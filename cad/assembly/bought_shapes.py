@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.belt.stack import BeltStack
-from cad.layout.belt.tower import flange_centres
-from cad.layout.direct.stack import DirectStack
-from cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
-from cad.layout.modules.homing_flag import HomingBracket
-from cad.layout.names import BELT, RING_STATOR
-from cad.screws import SCREWS
-from cad.solids import building
-from design.catalogue.products import Bearing, Lidar, Servo
+from scanwright.cad import solids
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.belt.tower import flange_centres
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
+from scanwright.cad.layout.modules.homing_flag import HomingBracket
+from scanwright.cad.layout.names import BELT, RING_STATOR
+from scanwright.cad.screws import SCREWS
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Bearing, Lidar, Servo
 
 CAP_INSET = 1.5
 CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide

@@ -10,9 +10,9 @@ import cadquery as cq
 import manifold3d
 import numpy as np
 
-from cad.geometry.mesh import TriMesh, mesh_of
-from cad.layout.linkage import AlignmentLinkage
-from cad.parts.alignment_linkage import shapes_of
+from scanwright.cad.geometry.mesh import TriMesh, mesh_of
+from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.cad.parts.alignment_linkage import shapes_of
 
 CHORD_ERROR = 0.2  # mm: not seen on a screen, a third of the triangles of the files
 CHORD_ANGLE = 0.3  # rad

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.beds import refuse_what_no_bed_holds
-from cad.assembly.bought import BodySpec, bought_of
-from cad.assembly.masses import rotor_moment
-from cad.layout.cables.leads import leads_of
-from cad.layout.cables.standing import standing_leads_of
-from cad.layout.layout import layout_of
-from cad.layout.names import COUNTERWEIGHT
-from cad.parts.all_parts import parts_of
-from cad.parts.counterweight import counterweight_spec
-from cad.parts.part_spec import PartSpec
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.beds import refuse_what_no_bed_holds
+from scanwright.cad.assembly.bought import BodySpec, bought_of
+from scanwright.cad.assembly.masses import rotor_moment
+from scanwright.cad.layout.cables.leads import leads_of
+from scanwright.cad.layout.cables.standing import standing_leads_of
+from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.layout.names import COUNTERWEIGHT
+from scanwright.cad.parts.all_parts import parts_of
+from scanwright.cad.parts.counterweight import counterweight_spec
+from scanwright.cad.parts.part_spec import PartSpec
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 Wanted = Callable[[PartSpec | BodySpec], bool]
 

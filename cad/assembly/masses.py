@@ -7,14 +7,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.geometry import inertia
-from cad.geometry.inertia import Inertial
-from cad.layout.cables.leads import SAMPLE
-from cad.layout.drive import Mass, Stack
-from cad.layout.loads import Weight, weight_of
-from design.arrays import Array
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.geometry import inertia
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.cables.leads import SAMPLE
+from scanwright.cad.layout.drive import Mass, Stack
+from scanwright.cad.layout.loads import Weight, weight_of
+from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
 LIDAR_DOUBT_MM = 2.0
 """How far a lidar's centre of mass may be from the middle of its box, in any direction: assumed, no data sheet tells.

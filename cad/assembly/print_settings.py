@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from design.catalogue.products import Printer
+from scanwright.design.catalogue.products import Printer
 
 WALLS = 4  # lines: of 3 to 5 the quickest for the parts of `ground_ahead`
 SOLID = {

@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cad.layout.drive import Stack
-from cad.layout.layout import config_hash, drive_of
-from design.arrays import Array, Mask
-from design.errors import BuildError
-from design.scanner import Scanner
-from design.scene import ray_caster
-from design.search.with_parts import Refused
-from design.shadow import AXIS_STEPS, Shadow
+from scanwright.cad.layout.drive import Stack
+from scanwright.cad.layout.layout import config_hash, drive_of
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
+from scanwright.design.scene import ray_caster
+from scanwright.design.search.with_parts import Refused
+from scanwright.design.shadow import AXIS_STEPS, Shadow
 
 if TYPE_CHECKING:
-    from cad.assembly.assembly import Assembly
+    from scanwright.cad.assembly.assembly import Assembly
 
 APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
 SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
@@ -61,7 +61,7 @@ class PartsWorkshop:
         Raises:
             BuildError: a part cannot be made.
         """
-        from cad.assembly.make import make_parts
+        from scanwright.cad.assembly.make import make_parts
 
         key = f"{config_hash(scanner)} {scanner.angles.t_rot_laser_mm}"
         if key not in self._made:

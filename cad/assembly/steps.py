@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cad.assembly.assembly import Assembly
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import RotorLead
-from cad.layout.cables.words import leads_words, standing_words
-from cad.layout.joints import screws
-from cad.layout.names import (
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.leads import RotorLead
+from scanwright.cad.layout.cables.words import leads_words, standing_words
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import (
     BEARING_TOWER,
     DECK,
     LIDAR,
@@ -21,7 +21,7 @@ from cad.layout.names import (
     SLIP_RING_ADAPTER,
     STANDING_LEADS,
 )
-from cad.parts.part_spec import Step
+from scanwright.cad.parts.part_spec import Step
 
 ON_DECK = Step(
     "Servo on the deck",

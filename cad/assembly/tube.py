@@ -5,15 +5,15 @@ from __future__ import annotations
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from cad.geometry.mesh import mesh_of
-from cad.layout.cables import joint
-from cad.layout.cables.leads import RotorLead
-from cad.layout.cables.path import Path, PathPiece
-from cad.layout.cables.standing import StandingLead
-from cad.layout.names import ROTOR_LEAD
-from cad.solids import building
-from design.errors import BuildError
+from scanwright.cad import solids
+from scanwright.cad.geometry.mesh import mesh_of
+from scanwright.cad.layout.cables import joint
+from scanwright.cad.layout.cables.leads import RotorLead
+from scanwright.cad.layout.cables.path import Path, PathPiece
+from scanwright.cad.layout.cables.standing import StandingLead
+from scanwright.cad.layout.names import ROTOR_LEAD
+from scanwright.cad.solids import building
+from scanwright.design.errors import BuildError
 
 LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not as round as a bore
 

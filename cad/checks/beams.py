@@ -7,13 +7,13 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from cad.assembly.shadow import bundles
-from cad.checks.check import Check, at_most, note
-from cad.layout.names import ALIGNMENT_LINKAGE
-from design.arrays import Array, Mask
-from design.scanner import Scanner
-from design.scene import ray_caster
-from design.shadow import Shadow
+from scanwright.cad.assembly.shadow import bundles
+from scanwright.cad.checks.check import Check, at_most, note
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.scanner import Scanner
+from scanwright.design.scene import ray_caster
+from scanwright.design.shadow import Shadow
 
 OWN_LIMIT_DEG = 2.0  # of the fan that the linkage may hide beyond servo, ring and shaft
 

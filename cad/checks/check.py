@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from cad.layout.loads import RATED_AT_MM, rated_moment_nm
-from cad.layout.names import SERVO
-from design.arrays import Array
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
+from scanwright.cad.layout.names import SERVO
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 Severity = Literal["pass", "note", "warning", "error"]
 

@@ -14,10 +14,10 @@ from collections.abc import Container, Mapping
 import numpy as np
 import shapely
 
-from cad.assembly.assembly import Assembly
-from cad.checks.check import Check, at_least, at_most
-from cad.geometry.mesh import TriMesh
-from design.arrays import Array
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.checks.check import Check, at_least, at_most
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.design.arrays import Array
 
 CHORD = 0.01  # error of an image's edges
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)

@@ -14,20 +14,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.masses import rotor_of
-from cad.checks.check import Check, Severity, tidy
-from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import TriMesh
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from cad.layout.direct.loads import shaft_modulus_pa
-from cad.layout.loads import FAR_MM, noise_deg
-from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.statics.sag import Sag, linkage_sag, with_shaft
-from cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
-from design.arrays import Array
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.masses import rotor_of
+from scanwright.cad.checks.check import Check, Severity, tidy
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.cage import cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.loads import shaft_modulus_pa
+from scanwright.cad.layout.loads import FAR_MM, noise_deg
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.cad.statics.sag import Sag, linkage_sag, with_shaft
+from scanwright.cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
+from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
 POSITIONS = 72  # of the servo, around a turn
 LEAST_ERROR = 0.25  # of the bend: what a grid of 4.8 or 4 mm still moved, 22 % at worst and mostly 3, on seven settings

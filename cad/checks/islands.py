@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.checks.check import Check, spot, tidy
-from cad.geometry.mesh import TriMesh
-from cad.geometry.print_pose import PrintPose, on_bed
+from scanwright.cad.checks.check import Check, spot, tidy
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.print_pose import PrintPose, on_bed
 
 LAYER = 0.4  # what starts in the air and is gone after one layer of this is a burr
 SMALL_MM2 = 0.2  # outlines below it are less than a line of a nozzle

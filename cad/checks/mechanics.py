@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from cad.assembly.masses import LIDAR_DOUBT_MM, off_axis_doubt_m, rotor_of, rotor_weight
-from cad.checks.check import Check, Severity, at_most, doubted, note, tidy
-from cad.checks.loads.belt import belt_loads
-from cad.checks.loads.direct import direct_loads
-from cad.geometry.inertia import Inertial
-from cad.layout.balance.counterweight import RUBS_NM
-from cad.layout.balance.imbalance import keeps_flank, play_matters
-from cad.layout.belt.stack import BeltStack
-from cad.layout.drive import Stack
-from cad.layout.loads import FAR_MM, Weight
-from cad.layout.names import SERVO
-from design.scanner import Scanner
+from scanwright.cad.assembly.masses import LIDAR_DOUBT_MM, off_axis_doubt_m, rotor_of, rotor_weight
+from scanwright.cad.checks.check import Check, Severity, at_most, doubted, note, tidy
+from scanwright.cad.checks.loads.belt import belt_loads
+from scanwright.cad.checks.loads.direct import direct_loads
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.balance.counterweight import RUBS_NM
+from scanwright.cad.layout.balance.imbalance import keeps_flank, play_matters
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.drive import Stack
+from scanwright.cad.layout.loads import FAR_MM, Weight
+from scanwright.cad.layout.names import SERVO
+from scanwright.design.scanner import Scanner
 
 SPIN_UP_S = 0.2
 SLOWEST_PERIOD_S = 1.0  # where the angle set names no motion

@@ -11,16 +11,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.masses import rotor_of
-from cad.checks.check import Check, Severity, tidy
-from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import TriMesh
-from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
-from cad.parts.base_mount import FOOT_RADIUS
-from cad.screws import passing_hole
-from cad.statics.mount_sag import Carried, mount_sag
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.masses import rotor_of
+from scanwright.cad.checks.check import Check, Severity, tidy
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.parts.base_mount import FOOT_RADIUS
+from scanwright.cad.screws import passing_hole
+from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.design.scanner import Scanner
 
 WASHER_MM = 4.0  # of a deck screw's washer beyond its hole
 LEAST_ERROR = 0.25  # of the lean: what CalculiX finds is off by less (`benchmarks.cad.elements`)

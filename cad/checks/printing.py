@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 import cadquery as cq
 import numpy as np
 
-from cad.checks.check import Check, at_least, at_most, note, spot, tidy
-from cad.checks.islands import islands_check
-from cad.geometry.holes import Round, rounds_of
-from cad.geometry.mesh import TriMesh
-from cad.geometry.print_pose import PrintPose
-from design.arrays import Array
-from design.catalogue.products import Printer
-from design.scene import ray_caster
+from scanwright.cad.checks.check import Check, at_least, at_most, note, spot, tidy
+from scanwright.cad.checks.islands import islands_check
+from scanwright.cad.geometry.holes import Round, rounds_of
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.print_pose import PrintPose
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.scene import ray_caster
 
 POINTS = 6000  # per part
 THIN_SHARE = 0.01

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.masses import rotor_weight
-from cad.checks.mechanics import load_checks
-from cad.findings import PartFinding
-from cad.geometry.inertia import Inertial
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.ties import hub_tie_of, plate_ties_of
-from cad.layout.direct.cage import share_weight
-from cad.layout.direct.misalignment import SHARE, worst_moment_nm
-from cad.layout.direct.stack import DirectStack
-from cad.layout.drive import DriveLayout, Mounted
-from cad.layout.joints import Joint
-from cad.layout.loads import RATED_AT_MM, rated_moment_nm
-from cad.layout.modules.homing_flag import bracket_of
-from cad.layout.modules.ring_cover import cover_of
-from cad.layout.modules.unasked import unasked
-from cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
-from cad.screws import passing_hole
-from design.catalogue.products import Printer, Product
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.masses import rotor_weight
+from scanwright.cad.checks.mechanics import load_checks
+from scanwright.cad.findings import PartFinding
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
+from scanwright.cad.layout.direct.cage import share_weight
+from scanwright.cad.layout.direct.misalignment import SHARE, worst_moment_nm
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import DriveLayout, Mounted
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
+from scanwright.cad.layout.modules.homing_flag import bracket_of
+from scanwright.cad.layout.modules.ring_cover import cover_of
+from scanwright.cad.layout.modules.unasked import unasked
+from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.screws import passing_hole
+from scanwright.design.catalogue.products import Printer, Product
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 # Values of a product that shape no part alone.
 SHAPING = {

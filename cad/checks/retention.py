@@ -14,18 +14,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.checks.check import Check, at_least, tidy
-from cad.geometry import inertia
-from cad.geometry.inertia import Inertial
-from cad.layout.all_joints import joints_of
-from cad.layout.joints import Joint
-from cad.layout.loads import STANDARD_GRAVITY
-from cad.layout.names import DECK, LIDAR, TRIPOD
-from cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
-from design.arrays import Array
-from design.frames import cross_matrix
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.checks.check import Check, at_least, tidy
+from scanwright.cad.geometry import inertia
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.loads import STANDARD_GRAVITY
+from scanwright.cad.layout.names import DECK, LIDAR, TRIPOD
+from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.design.arrays import Array
+from scanwright.design.frames import cross_matrix
+from scanwright.design.scanner import Scanner
 
 SHOCK_G = 5.0
 LEAST_MARGIN = 2.0

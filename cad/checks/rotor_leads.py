@@ -5,12 +5,12 @@ What they touch, and the beams that they hide, is checked with all other bodies:
 
 from __future__ import annotations
 
-from cad.assembly.assembly import Assembly
-from cad.checks.check import Check, at_least, note, tidy
-from cad.layout.cables import joint
-from cad.layout.cables.leads import RotorLead, tied_mm
-from cad.layout.cables.tie_seat import TieSeat
-from cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.checks.check import Check, at_least, note, tidy
+from scanwright.cad.layout.cables import joint
+from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
+from scanwright.cad.layout.cables.tie_seat import TieSeat
+from scanwright.cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 
 
 def standing_checks(assembly: Assembly) -> list[Check]:

@@ -7,26 +7,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.make import make_parts
-from cad.assembly.masses import link_bodies
-from cad.assembly.shadow import shadow_of, triangles_of
-from cad.checks.beams import beam_checks
-from cad.checks.check import Check, checks_text
-from cad.checks.clearance import clearance_checks
-from cad.checks.deflection import deflection_checks
-from cad.checks.mechanics import mechanics_checks
-from cad.checks.mount import mount_checks
-from cad.checks.printing import printing_checks
-from cad.checks.remarks import left_out_of, products_of, unverified
-from cad.checks.retention import retention_checks
-from cad.checks.rotor_leads import lead_checks, standing_checks
-from design.catalogue.products import Product, SlotSwitch
-from design.electrics.rules import broken_rules
-from design.electrics.wiring import network_of
-from design.left_out import LeftOut
-from design.scanner import Scanner
-from design.shadow import Shadow, own_body_bytes
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.masses import link_bodies
+from scanwright.cad.assembly.shadow import shadow_of, triangles_of
+from scanwright.cad.checks.beams import beam_checks
+from scanwright.cad.checks.check import Check, checks_text
+from scanwright.cad.checks.clearance import clearance_checks
+from scanwright.cad.checks.deflection import deflection_checks
+from scanwright.cad.checks.mechanics import mechanics_checks
+from scanwright.cad.checks.mount import mount_checks
+from scanwright.cad.checks.printing import printing_checks
+from scanwright.cad.checks.remarks import left_out_of, products_of, unverified
+from scanwright.cad.checks.retention import retention_checks
+from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
+from scanwright.design.catalogue.products import Product, SlotSwitch
+from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
+from scanwright.design.shadow import Shadow, own_body_bytes
 
 Say = Callable[[str], None]
 

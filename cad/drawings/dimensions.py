@@ -11,8 +11,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from cad.drawings.patterns import number
-from cad.drawings.pen import ANCHORS, ANGLE, ARROW, DIAMETER, ORDINATE_X, ORDINATE_Y, TEXT, Pen, Point, width_of
+from scanwright.cad.drawings.patterns import number
+from scanwright.cad.drawings.pen import (
+    ANCHORS,
+    ANGLE,
+    ARROW,
+    DIAMETER,
+    ORDINATE_X,
+    ORDINATE_Y,
+    TEXT,
+    Pen,
+    Point,
+    width_of,
+)
 
 GAP = 1.5  # between an edge and the line that starts at it
 REACH = 6.0  # from the view to the bend of an ordinate

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cad.assembly.assembly import Assembly
-from cad.drawings.part import Part, azimuth_deg, part_of, planes_across
-from cad.drawings.patterns import number
-from cad.drawings.sheet import Sheet, Title, sheet_of
-from cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
-from cad.layout.all_joints import joints_of
-from cad.layout.fits import OnSheet
-from cad.parts.part_spec import Process
-from design.catalogue.products import Printer
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.drawings.part import Part, azimuth_deg, part_of, planes_across
+from scanwright.cad.drawings.patterns import number
+from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
+from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.parts.part_spec import Process
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.scanner import Scanner
 
 MADE: dict[Process, str] = {"printed": "as printed, sanded or reamed to it", "turned": "turned", "sawn": "drilled"}
 AT_M = 10.0  # distance at which a wrong angle is judged

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import cadquery as cq
 import numpy as np
 
-from cad.drawings.patterns import Pattern, on_axis, patterns_of, slots_of, with_threads
-from cad.geometry.holes import Round, rounds_of
-from cad.layout.fits import OnSheet, ToleratedDiameter
-from cad.layout.joints import Joint
-from design.arrays import Array
+from scanwright.cad.drawings.patterns import Pattern, on_axis, patterns_of, slots_of, with_threads
+from scanwright.cad.geometry.holes import Round, rounds_of
+from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.layout.joints import Joint
+from scanwright.design.arrays import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel
 PLANE_MM2 = 3.0  # smaller faces get no ordinate

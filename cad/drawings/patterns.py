@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.geometry.holes import Round, triple
-from cad.layout.joints import Joint
-from design.arrays import Array
+from scanwright.cad.geometry.holes import Round, triple
+from scanwright.cad.layout.joints import Joint
+from scanwright.design.arrays import Array
 
 IN_LINE = 0.01  # mm between the axes of two holes, or of a hole and its screw
 

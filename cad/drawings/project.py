@@ -21,7 +21,7 @@ from OCP.HLRAlgo import HLRAlgo_Projector
 from OCP.HLRBRep import HLRBRep_Algo, HLRBRep_HLRToShape
 from OCP.TopoDS import TopoDS_Shape
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 SKEW = (1.0e-4, 0.6e-4)  # rad, about the two axes of the view
 TOLERANCE = 0.03  # mm

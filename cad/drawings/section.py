@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from design.arrays import Array, Vector
+from scanwright.cad import solids
+from scanwright.design.arrays import Array, Vector
 
 HATCH_MM = 2.5  # between two lines
 SLOPE_RAD = math.radians(45.0)

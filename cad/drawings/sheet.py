@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from ezdxf.document import Drawing
 from reportlab.lib.utils import simpleSplit
 
-from cad.drawings.part import Part
-from cad.drawings.pen import CAPITAL, GLYPH_WIDTH, Pen, Point, document_at
-from cad.drawings.sizes import draw, sizes_of
-from cad.drawings.views import views_of
+from scanwright.cad.drawings.part import Part
+from scanwright.cad.drawings.pen import CAPITAL, GLYPH_WIDTH, Pen, Point, document_at
+from scanwright.cad.drawings.sizes import draw, sizes_of
+from scanwright.cad.drawings.views import views_of
 
 A3, A2 = (420.0, 297.0), (594.0, 420.0)
 LEFT, EDGE = 20.0, 10.0  # margins of the frame (ISO 5457)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad import solids
-from cad.drawings.dimensions import (
+from scanwright.cad import solids
+from scanwright.cad.drawings.dimensions import (
     Callout,
     angle_between,
     callouts_right,
@@ -18,11 +18,11 @@ from cad.drawings.dimensions import (
     ordinates,
     text_box,
 )
-from cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from cad.drawings.patterns import Pattern, number
-from cad.drawings.pen import TEXT, Layer, Pen, Point
-from cad.drawings.project import Arc, Curve
-from cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
+from scanwright.cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
+from scanwright.cad.drawings.patterns import Pattern, number
+from scanwright.cad.drawings.pen import TEXT, Layer, Pen, Point
+from scanwright.cad.drawings.project import Arc, Curve
+from scanwright.cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
 NEARLY = 0.2  # an extent that differs less from a radius is that radius, notched
 OVER = 3.0  # of a centre line beyond the part

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from cad.drawings.patterns import Pattern, along_pattern, number
-from cad.drawings.pen import Point
-from cad.drawings.project import Curve, project
-from cad.drawings.section import Line, cut_along_axis, hatching
-from design.arrays import Array
+from scanwright.cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_across
+from scanwright.cad.drawings.patterns import Pattern, along_pattern, number
+from scanwright.cad.drawings.pen import Point
+from scanwright.cad.drawings.project import Curve, project
+from scanwright.cad.drawings.section import Line, cut_along_axis, hatching
+from scanwright.design.arrays import Array
 
 Z = np.array([0.0, 0.0, 1.0])
 

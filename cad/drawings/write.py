@@ -20,8 +20,8 @@ from ezdxf.path import Path, make_path
 from ezdxf.path.commands import Curve4To
 from reportlab.pdfgen.canvas import Canvas
 
-from cad.drawings.pen import ANCHORS, CAPITAL, DASHES, WIDTHS, Layer, Point
-from cad.drawings.sheet import Sheet
+from scanwright.cad.drawings.pen import ANCHORS, CAPITAL, DASHES, WIDTHS, Layer, Point
+from scanwright.cad.drawings.sheet import Sheet
 
 POINTS = 72 / 25.4
 ALIGNED = {alignment: anchor for anchor, (alignment, _) in ANCHORS.items()}

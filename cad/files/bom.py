@@ -12,19 +12,19 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.print_settings import print_words
-from cad.checks.remarks import products_of
-from cad.drawings.files import drawing_number
-from cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.words import tied_at
-from cad.layout.drive import DriveLayout
-from cad.layout.joints import Joint
-from cad.screws import INSERT_LENGTH, SCREWS
-from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
-from design.electrics.wiring import network_of
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.checks.remarks import products_of
+from scanwright.cad.drawings.files import drawing_number
+from scanwright.cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.words import tied_at
+from scanwright.cad.layout.drive import DriveLayout
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.screws import INSERT_LENGTH, SCREWS
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"

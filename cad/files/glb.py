@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cad.geometry.mesh import TriMesh
-from design.arrays import Array
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.design.arrays import Array
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963

@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.files.glb import Node, glb_bytes, shaded
-from cad.geometry.mesh import TriMesh
-from cad.layout.balance.counterweight import Counterweight
-from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, LIDAR, ROTOR_LEADS, STANDING_LEADS
-from design.arrays import Array
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.files.glb import Node, glb_bytes, shaded
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.balance.counterweight import Counterweight
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, LIDAR, ROTOR_LEADS, STANDING_LEADS
+from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
 GAP_MM = 15.0  # between the products of the exploded view
 

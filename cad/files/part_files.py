@@ -10,17 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cad.findings import PartFinding
-from cad.kernel import require_kernel
-from cad.layout.layout import config_hash, mount_offset_mm
-from cad.layout.names import BASE_MOUNT
-from design.errors import BuildError
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.findings import PartFinding
+from scanwright.cad.kernel import require_kernel
+from scanwright.cad.layout.layout import config_hash, mount_offset_mm
+from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 if TYPE_CHECKING:
-    from cad.assembly.assembly import Assembly
-    from cad.geometry.mesh import TriMesh
+    from scanwright.cad.assembly.assembly import Assembly
+    from scanwright.cad.geometry.mesh import TriMesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +80,14 @@ def build_parts(
     _check_offset(scanner, offset)
     progress("loading the CAD kernel")
     require_kernel("the making of parts")
-    from cad.assembly.assembly import alone, as_tree
-    from cad.assembly.make import make_parts
-    from cad.assembly.masses import link_bodies
-    from cad.checks.remarks import findings_of, left_out_of
-    from cad.files.step import step_text
-    from cad.files.urdf import urdf_text
-    from cad.geometry.mesh import checked, stl_bytes
-    from cad.labels.label import labelled_parts
+    from scanwright.cad.assembly.assembly import alone, as_tree
+    from scanwright.cad.assembly.make import make_parts
+    from scanwright.cad.assembly.masses import link_bodies
+    from scanwright.cad.checks.remarks import findings_of, left_out_of
+    from scanwright.cad.files.step import step_text
+    from scanwright.cad.files.urdf import urdf_text
+    from scanwright.cad.geometry.mesh import checked, stl_bytes
+    from scanwright.cad.labels.label import labelled_parts
 
     progress("making the parts")
     assembly = (make or make_parts)(scanner)

@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from PIL import ImageDraw, ImageFont
 
-from cad.files.manual.painter import Piece, painted, png_bytes
-from cad.files.threemf import threemf_bytes
-from cad.geometry.mesh import TriMesh
-from design.scene.parallel_view import view_of
-from design.scene.ray_caster import build_scene
+from scanwright.cad.files.manual.painter import Piece, painted, png_bytes
+from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.design.scene.parallel_view import view_of
+from scanwright.design.scene.ray_caster import build_scene
 
 Plate = dict[str, TriMesh]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from cad.layout.names import JOURNAL_SLEEVE
+from scanwright.cad.layout.names import JOURNAL_SLEEVE
 
 ESTIMATED = "estimate of 2026 of what shops usually ask, none was asked"
 FILAMENT_USD_PER_KG = (15.0, 35.0)

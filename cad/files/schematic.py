@@ -12,8 +12,8 @@ import textwrap
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
-from design.electrics.network import Box, Network, Wire
-from design.electrics.rules import broken_rules
+from scanwright.design.electrics.network import Box, Network, Wire
+from scanwright.design.electrics.rules import broken_rules
 
 ROW = 22.0  # from pin to pin
 LINE = 15.0  # from line to line of text in a box

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import cadquery as cq
 
-from design.errors import BuildError
+from scanwright.design.errors import BuildError
 
 TIME_STAMP = "2000-01-01T00:00:00"
 # Entities whose list of references the kernel fills in the order of memory addresses.

@@ -12,7 +12,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from xml.sax.saxutils import escape, quoteattr
 
-from cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.mesh import TriMesh
 
 FIRST_DATE = (1980, 1, 1, 0, 0, 0)
 

@@ -14,12 +14,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cad.geometry.inertia import Inertial
-from cad.layout.drive import Cuboid, DriveLayout, Rod
-from design.arrays import Array
-from design.frames import roll_pitch_yaw
-from design.motion import Sweep
-from design.scanner import Scanner
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Rod
+from scanwright.design.arrays import Array
+from scanwright.design.frames import roll_pitch_yaw
+from scanwright.design.motion import Sweep
+from scanwright.design.scanner import Scanner
 
 
 def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from cad.files.schematic import schematic_svg
-from design.catalogue.products import SlotSwitch
-from design.electrics.loads import COMPUTER_W, LEADS_M
-from design.electrics.network import Network
-from design.electrics.rules import broken_rules
-from design.electrics.sizing import OVER_PEAK
-from design.electrics.wiring import network_of
-from design.scanner import Scanner
+from scanwright.cad.files.schematic import schematic_svg
+from scanwright.design.catalogue.products import SlotSwitch
+from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
+from scanwright.design.electrics.network import Network
+from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.sizing import OVER_PEAK
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.scanner import Scanner
 
 GROUND = (
     "One ground: every - comes back to the - bar of the distribution, the case of the supply to the protective earth "

@@ -6,24 +6,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cad.assembly.print_settings import slicer_settings
-from cad.checks.remarks import without_traps
-from cad.files.bom import bom_text, items_of
-from cad.files.glb_scenes import scene_files
-from cad.files.manual.instructions import step_files
-from cad.files.part_files import PartsResult, write_files
-from cad.files.plates import plate_files, plates_of
-from cad.files.threemf import threemf_bytes
-from cad.files.wiring import wiring_files
-from cad.findings import PartFinding
-from cad.geometry.mesh import checked_mesh
-from cad.geometry.print_pose import on_bed, print_pose
-from cad.labels.fit_coupon import fit_coupon
-from cad.layout.all_joints import joints_of
-from cad.layout.layout import config_hash
-from cad.layout.names import FIT_COUPON
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.assembly.print_settings import slicer_settings
+from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.files.bom import bom_text, items_of
+from scanwright.cad.files.glb_scenes import scene_files
+from scanwright.cad.files.manual.instructions import step_files
+from scanwright.cad.files.part_files import PartsResult, write_files
+from scanwright.cad.files.plates import plate_files, plates_of
+from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.wiring import wiring_files
+from scanwright.cad.findings import PartFinding
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.geometry.print_pose import on_bed, print_pose
+from scanwright.cad.labels.fit_coupon import fit_coupon
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.layout import config_hash
+from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from OCP.gp import gp_Dir, gp_Lin, gp_Pnt
 from OCP.IntCurvesFace import IntCurvesFace_ShapeIntersector
 from OCP.TopAbs import TopAbs_REVERSED
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 LEAST_TURN = math.pi * 1.02  # an arc of less than about half a turn holds no screw and has no diameter to measure
 SAME = 1e-3  # mm, and for directions

@@ -10,7 +10,7 @@ import numpy as np
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

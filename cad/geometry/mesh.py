@@ -17,8 +17,8 @@ from OCP.BRep import BRep_Tool
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 
-from design.arrays import Array
-from design.errors import BuildError
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 
 CHORD_ERROR = 0.01  # mm, of the longest edge's share: volume within 1e-4 on the parts (measured)
 CHORD_ANGLE = 0.1  # rad: 63 sides to a hole

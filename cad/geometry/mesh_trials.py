@@ -13,8 +13,8 @@ from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
 from OCP.gp import gp_Pnt
 from OCP.TopLoc import TopLoc_Location
 
-from cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
-from design.accuracy.trials import Trial, timed
+from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
+from scanwright.design.accuracy.trials import Trial, timed
 
 CHORDS = 0.1, CHORD_ERROR, 0.001  # mm
 ANGLES = 0.5, 0.2, CHORD_ANGLE, 0.05  # rad

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from cad.geometry.mesh import TriMesh
-from design.arrays import Array
-from design.frames import rigid
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.design.arrays import Array
+from scanwright.design.frames import rigid
 
 OVERHANG_RAD = math.radians(45.0)
 CONTACT_SHARE = 0.25  # of the largest flat on the hull: what is smaller holds badly

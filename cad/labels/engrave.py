@@ -18,10 +18,10 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
 from OCP.gp import gp_Vec
 from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Wire
 
-from cad import solids
-from cad.labels.flats import Flat
-from design.arrays import Array
-from design.catalogue.products import Printer
+from scanwright.cad import solids
+from scanwright.cad.labels.flats import Flat
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Printer
 
 WIDTHS = (0.4, 0.9)  # of grooves, least and most
 DEPTHS = (0.3, 0.6)

@@ -16,16 +16,16 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from cad import outlines, solids
-from cad.labels.engrave import engrave, groove_of
-from cad.labels.flats import Flat, flat_at
-from cad.labels.glyphs import letters, text_width
-from cad.layout.hub import Hub
-from cad.layout.names import FIT_COUPON
-from cad.screws import SCREWS, trap_of
-from cad.solids import building
-from design.arrays import Array
-from design.scanner import Scanner
+from scanwright.cad import outlines, solids
+from scanwright.cad.labels.engrave import engrave, groove_of
+from scanwright.cad.labels.flats import Flat, flat_at
+from scanwright.cad.labels.glyphs import letters, text_width
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.cad.screws import SCREWS, trap_of
+from scanwright.cad.solids import building
+from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
 NUT = SCREWS["M3"]  # that the parts trap
 THICKNESS = 1.8  # least: the height that a fit is tried over

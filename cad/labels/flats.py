@@ -8,7 +8,7 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 HAIRLINE = 2e-3  # between the triangles of a face
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 ADVANCE = 6.0  # grid units from glyph to glyph
 

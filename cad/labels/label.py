@@ -22,20 +22,20 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from cad import solids
-from cad.assembly.assembly import Assembly
-from cad.findings import PartFinding
-from cad.geometry.holes import Piercing
-from cad.geometry.mesh import TriMesh, checked_mesh
-from cad.labels.engrave import Groove, engrave, groove_of
-from cad.labels.flats import Flat, flat_at, flats_of
-from cad.labels.lettering import Lettering, Place
-from cad.labels.sight import Sight
-from cad.parts.part_spec import PartSpec
-from design.arrays import Array
-from design.errors import BuildError
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.findings import PartFinding
+from scanwright.cad.geometry.holes import Piercing
+from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
+from scanwright.cad.labels.engrave import Groove, engrave, groove_of
+from scanwright.cad.labels.flats import Flat, flat_at, flats_of
+from scanwright.cad.labels.lettering import Lettering, Place
+from scanwright.cad.labels.sight import Sight
+from scanwright.cad.parts.part_spec import PartSpec
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 MARGIN = 1.5  # of a face around its label

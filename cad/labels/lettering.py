@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 import shapely.affinity
 
-from cad.labels.flats import Flat
-from cad.labels.glyphs import letters, text_width
-from design.arrays import Array
+from scanwright.cad.labels.flats import Flat
+from scanwright.cad.labels.glyphs import letters, text_width
+from scanwright.design.arrays import Array
 
 LEADING = 1.65  # from line to line, of the height
 

@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from cad.assembly.assembly import Assembly
-from cad.labels.flats import Flat
-from design.arrays import Array
-from design.scene import ray_caster
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.labels.flats import Flat
+from scanwright.design.arrays import Array
+from scanwright.design.scene import ray_caster
 
 READING = 200.0  # from a face to the eye: what stands farther off leaves room for a head
 TOUCH = 1.0  # a body nearer to a face than this lies on it

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from cad.layout import names
-from cad.layout.balance.counterweight import SCREW as BAR_SCREW
-from cad.layout.balance.counterweight import Counterweight
-from cad.layout.belt.joints import belt_joints
-from cad.layout.belt.stack import FOOT, BeltStack
-from cad.layout.belt.tower import UNDER_FOOT_NUT, tower_of
-from cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD, Deck
-from cad.layout.direct.joints import direct_joints
-from cad.layout.envelope import EAR_SCREW, PLATE_THICKNESS, SUB_PLATE_THICKNESS
-from cad.layout.joints import (
+from scanwright.cad.layout import names
+from scanwright.cad.layout.balance.counterweight import SCREW as BAR_SCREW
+from scanwright.cad.layout.balance.counterweight import Counterweight
+from scanwright.cad.layout.belt.joints import belt_joints
+from scanwright.cad.layout.belt.stack import FOOT, BeltStack
+from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, tower_of
+from scanwright.cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD, Deck
+from scanwright.cad.layout.direct.joints import direct_joints
+from scanwright.cad.layout.envelope import EAR_SCREW, PLATE_THICKNESS, SUB_PLATE_THICKNESS
+from scanwright.cad.layout.joints import (
     CASE_EAR,
     DECK_MM,
     Joint,
@@ -24,12 +24,12 @@ from cad.layout.joints import (
     placed_axes,
     upright_axes,
 )
-from cad.layout.layout import Layout
-from cad.layout.linkage import CROSS_SCREW, cross_floor_mm, cross_seat_mm, cross_thread_mm
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of, homing_joints
-from cad.layout.modules.ring_cover import RingCover, cover_joint, cover_of
-from cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, STANDS_OUT, TripodFoot
-from cad.screws import TRIPOD_SCREW
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import CROSS_SCREW, cross_floor_mm, cross_seat_mm, cross_thread_mm
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of, homing_joints
+from scanwright.cad.layout.modules.ring_cover import RingCover, cover_joint, cover_of
+from scanwright.cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, STANDS_OUT, TripodFoot
+from scanwright.cad.screws import TRIPOD_SCREW
 
 
 def joints_of(layout: Layout) -> list[Joint]:

@@ -13,19 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad import outlines
-from cad.layout.drive import DriveLayout, Mounted
-from cad.layout.envelope import rotor_radius
-from cad.layout.hub import Hub
-from cad.layout.joints import triple
-from cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
-from cad.layout.names import BASE_MOUNT
-from cad.screws import SCREWS, Screw
-from design.arrays import Array
-from design.catalogue.products import Printer
-from design.deck_holes import Circle, Rectangle
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad import outlines
+from scanwright.cad.layout.drive import DriveLayout, Mounted
+from scanwright.cad.layout.envelope import rotor_radius
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.joints import triple
+from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
+from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.screws import SCREWS, Screw
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.deck_holes import Circle, Rectangle
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 FOOT_THICKNESS = 6.0
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.stack import DirectStack
-from cad.screws import Screw
-from design.arrays import Array
-from design.catalogue.products import Bearing, Belt, SlotSwitch
-from design.left_out import LeftOut
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.screws import Screw
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Bearing, Belt, SlotSwitch
+from scanwright.design.left_out import LeftOut
 
 Stack = DirectStack | BeltStack
 Point = tuple[float, float, float]

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
-from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.screws import SCREWS
-from design.arrays import Array
-from design.catalogue.products import Lidar
-from design.errors import BuildError
-from design.scanner import Scanner
-from design.task.equivalent_settings import BOUNDS, advice
+from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
+from scanwright.design.task.equivalent_settings import BOUNDS, advice
 
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from design.catalogue.products import Bearing
+from scanwright.design.catalogue.products import Bearing
 
 
 @dataclass(frozen=True, slots=True)

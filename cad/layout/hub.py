@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from design.arrays import Array
-from design.catalogue.products import Bearing
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Bearing
 
 HUB_HEIGHT = 14.0
 HUB_WALL = 11.0  # around the spigot: between the heads of the cross screws and the shaft

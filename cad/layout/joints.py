@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
-from cad.outlines import polygon
-from cad.screws import SCREWS, Screw, Thread
-from design.arrays import Array
-from design.catalogue.products import Lidar, Servo
+from scanwright.cad.outlines import polygon
+from scanwright.cad.screws import SCREWS, Screw, Thread
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Lidar, Servo
 
 # ISO 4762 and ISO 4026
 LENGTHS = {

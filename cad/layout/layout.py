@@ -7,18 +7,18 @@ import json
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cad.layout.balance.counterweight import Counterweight, counterweight_of
-from cad.layout.belt.drive import belt_drive
-from cad.layout.cables.ties import hub_tie_of, plate_ties_of
-from cad.layout.deck import Deck, deck_of
-from cad.layout.direct.drive import direct_drive
-from cad.layout.drive import DriveLayout, Stack
-from cad.layout.envelope import screw_travel_mm
-from cad.layout.linkage import AlignmentLinkage, linkage_of
-from cad.layout.modules.homing_flag import bracket_of, flag_of
-from design.left_out import LeftOut
-from design.motion import Sweep
-from design.scanner import NO_MODULES, Scanner
+from scanwright.cad.layout.balance.counterweight import Counterweight, counterweight_of
+from scanwright.cad.layout.belt.drive import belt_drive
+from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
+from scanwright.cad.layout.deck import Deck, deck_of
+from scanwright.cad.layout.direct.drive import direct_drive
+from scanwright.cad.layout.drive import DriveLayout, Stack
+from scanwright.cad.layout.envelope import screw_travel_mm
+from scanwright.cad.layout.linkage import AlignmentLinkage, linkage_of
+from scanwright.cad.layout.modules.homing_flag import bracket_of, flag_of
+from scanwright.design.left_out import LeftOut
+from scanwright.design.motion import Sweep
+from scanwright.design.scanner import NO_MODULES, Scanner
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad import outlines
-from cad.layout.cables.tie_seat import TieSeat
-from cad.layout.drive import Stack
-from cad.layout.envelope import (
+from scanwright.cad import outlines
+from scanwright.cad.layout.cables.tie_seat import TieSeat
+from scanwright.cad.layout.drive import Stack
+from scanwright.cad.layout.envelope import (
     BODY_GAP,
     EAR_SCREW,
     PLATE_THICKNESS,
@@ -22,13 +22,13 @@ from cad.layout.envelope import (
     screw_travel_mm,
     slot_ends,
 )
-from cad.layout.joints import round_wall_mm
-from cad.layout.modules.homing_flag import Flag
-from cad.layout.names import ALIGNMENT_LINKAGE
-from cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
-from design.arrays import Array
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.joints import round_wall_mm
+from scanwright.cad.layout.modules.homing_flag import Flag
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one

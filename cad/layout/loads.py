@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from design.scanner import Scanner
+from scanwright.design.scanner import Scanner
 
 STANDARD_GRAVITY = 9.80665
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn

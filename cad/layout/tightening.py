@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout.joints import Joint
-from cad.screws import INSERT_LENGTH, Screw
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.screws import INSERT_LENGTH, Screw
 
 PROOF_MPA = 450.0  # 0.2 % proof stress of A2-70, ISO 3506-1
 SHEARED = 0.577  # of a tension, von Mises

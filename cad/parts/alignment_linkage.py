@@ -19,23 +19,23 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.geometry.mesh import checked_mesh
-from cad.layout.balance.free_space import in_hull
-from cad.layout.belt.stack import BeltStack
-from cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, slot_ends
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.linkage import AlignmentLinkage, neck_corners
-from cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAFT
-from cad.parts.fins import FAR, fins_beside
-from cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
-from cad.parts.part_spec import PartSpec, Step
-from cad.parts.sub_plate import front_mark
-from cad.screws import Trap
-from cad.solids import building
-from design.arrays import Array
-from design.errors import BuildError
+from scanwright.cad import outlines, solids
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.layout.balance.free_space import in_hull
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, slot_ends
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAFT
+from scanwright.cad.parts.fins import FAR, fins_beside
+from scanwright.cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.parts.sub_plate import front_mark
+from scanwright.cad.screws import Trap
+from scanwright.cad.solids import building
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 
 OF_LIDAR = (
     "lidar.body_mm",

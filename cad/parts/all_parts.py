@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.layout import Layout
-from cad.parts.alignment_linkage import linkage_spec
-from cad.parts.base_mount import mount_spec
-from cad.parts.bearing_cage import base_spec, bell_spec
-from cad.parts.bearing_tower import tower_spec
-from cad.parts.capsule_holder import holder_spec
-from cad.parts.counterweight import counterweight_spec
-from cad.parts.drive_plate import plate_spec
-from cad.parts.homing_bracket import bracket_spec
-from cad.parts.horn_cup import cup_spec
-from cad.parts.journal_sleeve import sleeve_spec
-from cad.parts.main_shaft import main_shaft_spec
-from cad.parts.part_spec import PartSpec
-from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
-from cad.parts.ring_cover import ring_cover_spec
-from cad.parts.servo_shaft import servo_shaft_spec
-from cad.parts.shaft_ring import shaft_ring_spec
-from cad.parts.slip_ring_adapter import adapter_spec
-from cad.parts.sub_plate import sub_plate_spec
-from cad.parts.tripod_foot import tripod_foot_spec
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.parts.alignment_linkage import linkage_spec
+from scanwright.cad.parts.base_mount import mount_spec
+from scanwright.cad.parts.bearing_cage import base_spec, bell_spec
+from scanwright.cad.parts.bearing_tower import tower_spec
+from scanwright.cad.parts.capsule_holder import holder_spec
+from scanwright.cad.parts.counterweight import counterweight_spec
+from scanwright.cad.parts.drive_plate import plate_spec
+from scanwright.cad.parts.homing_bracket import bracket_spec
+from scanwright.cad.parts.horn_cup import cup_spec
+from scanwright.cad.parts.journal_sleeve import sleeve_spec
+from scanwright.cad.parts.main_shaft import main_shaft_spec
+from scanwright.cad.parts.part_spec import PartSpec
+from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from scanwright.cad.parts.ring_cover import ring_cover_spec
+from scanwright.cad.parts.servo_shaft import servo_shaft_spec
+from scanwright.cad.parts.shaft_ring import shaft_ring_spec
+from scanwright.cad.parts.slip_ring_adapter import adapter_spec
+from scanwright.cad.parts.sub_plate import sub_plate_spec
+from scanwright.cad.parts.tripod_foot import tripod_foot_spec
 
 OF_DIRECT = (servo_shaft_spec, adapter_spec, base_spec, bell_spec)
 OF_BELT = (

@@ -13,10 +13,10 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import outlines, solids
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.ties import foot_ties_of
-from cad.layout.deck import (
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.deck import (
     BACK_THICKNESS,
     FOOT_THICKNESS,
     PLUG_GAP,
@@ -27,15 +27,15 @@ from cad.layout.deck import (
     rail_wall,
     strut_corners,
 )
-from cad.layout.drive import Mounted
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
-from cad.parts.linkage_hub import tie_slots
-from cad.parts.part_spec import PartSpec, Step
-from cad.screws import passing_hole
-from cad.solids import building
-from design.catalogue.products import Printer
+from scanwright.cad.layout.drive import Mounted
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
+from scanwright.cad.parts.linkage_hub import tie_slots
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import passing_hole
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer
 
 OF_SERVO = (
     "servo.case_min_mm",

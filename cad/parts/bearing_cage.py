@@ -20,8 +20,8 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.layout.direct.cage import (
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.direct.cage import (
     CAGE_SCREW,
     FOOT_RADIUS,
     SCREW_DEPTH,
@@ -32,19 +32,19 @@ from cad.layout.direct.cage import (
     BearingCage,
     cage_of,
 )
-from cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
-from cad.layout.fits import OnSheet, printed_seat
-from cad.layout.joints import ALL_SCREWS, screws
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from cad.layout.modules.ring_cover import RingCover, cover_of
-from cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE
-from cad.parts.homing_bracket import bracket_threads
-from cad.parts.part_spec import ON_CASE, PartSpec, Step
-from cad.parts.ring_cover import cover_threads
-from cad.screws import Trap
-from cad.solids import building
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
+from scanwright.cad.layout.fits import OnSheet, printed_seat
+from scanwright.cad.layout.joints import ALL_SCREWS, screws
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
+from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE
+from scanwright.cad.parts.homing_bracket import bracket_threads
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
+from scanwright.cad.parts.ring_cover import cover_threads
+from scanwright.cad.screws import Trap
+from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
 

@@ -16,8 +16,8 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.layout.belt.stack import (
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.belt.stack import (
     BOSS,
     CASE_ROOM,
     DISC,
@@ -32,13 +32,20 @@ from cad.layout.belt.stack import (
     TRAVEL,
     BeltStack,
 )
-from cad.layout.belt.tower import DISC_SCREW, UNDER_FOOT_NUT, UNDER_HEAD, BearingTower, disc_azimuths, tower_of
-from cad.layout.fits import OnSheet, printed_seat
-from cad.layout.names import BEARING, BEARING_TOWER
-from cad.parts.part_spec import PartSpec, Step
-from cad.screws import Trap
-from cad.solids import building
-from design.scanner import Scanner
+from scanwright.cad.layout.belt.tower import (
+    DISC_SCREW,
+    UNDER_FOOT_NUT,
+    UNDER_HEAD,
+    BearingTower,
+    disc_azimuths,
+    tower_of,
+)
+from scanwright.cad.layout.fits import OnSheet, printed_seat
+from scanwright.cad.layout.names import BEARING, BEARING_TOWER
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import Trap
+from scanwright.cad.solids import building
+from scanwright.design.scanner import Scanner
 
 BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
 WINDOW = 10.0  # diameter

@@ -12,16 +12,16 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.belt.stack import DISC, BeltStack
-from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
-from cad.layout.joints import screws
-from cad.layout.names import RING_STATOR, SLIP_RING_ADAPTER
-from cad.parts.part_spec import PartSpec, Step
-from cad.screws import SCREWS, passing_hole, thread_in_part
-from cad.solids import building
-from design.catalogue.products import Printer
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.layout.belt.stack import DISC, BeltStack
+from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import RING_STATOR, SLIP_RING_ADAPTER
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.scanner import Scanner
 
 BODY_ROOM = 0.5  # around the capsule's body
 

@@ -9,14 +9,14 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.balance.counterweight import SCREW, Counterweight
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
-from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building
-from design.left_out import LeftOut
+from scanwright.cad import solids
+from scanwright.cad.layout.balance.counterweight import SCREW, Counterweight
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
 
 
 def counterweight_spec(layout: Layout) -> PartSpec | None:

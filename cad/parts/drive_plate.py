@@ -11,15 +11,15 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import outlines, solids
-from cad.layout.belt.plate import UNDER_HEAD, DrivePlate, plate_of
-from cad.layout.belt.stack import PLATE, TRAVEL, BeltStack
-from cad.layout.fits import OnSheet
-from cad.layout.joints import screws
-from cad.layout.names import DRIVE_PLATE, SERVO, SERVO_CASE
-from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building
-from design.scanner import Scanner
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.belt.plate import UNDER_HEAD, DrivePlate, plate_of
+from scanwright.cad.layout.belt.stack import PLATE, TRAVEL, BeltStack
+from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import DRIVE_PLATE, SERVO, SERVO_CASE
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.solids import building
+from scanwright.design.scanner import Scanner
 
 OF_SERVO = (
     "servo.case_max_mm",

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from cad import solids
-from cad.layout.envelope import Box
-from design.arrays import Array
+from scanwright.cad import solids
+from scanwright.cad.layout.envelope import Box
+from scanwright.design.arrays import Array
 
 FAR = 200.0  # beyond any linkage
 THIN = 3.0  # beside the lidar, what would stand thinner than this is cut off

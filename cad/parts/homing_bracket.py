@@ -10,11 +10,11 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.linkage import AlignmentLinkage
-from cad.layout.modules.homing_flag import (
+from scanwright.cad import solids
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.cad.layout.modules.homing_flag import (
     ARM_HALF,
     ARM_HIGH,
     BESIDE,
@@ -30,10 +30,10 @@ from cad.layout.modules.homing_flag import (
     passes_at_deg,
     vane_half_deg,
 )
-from cad.layout.names import HOMING_BRACKET, SWITCH, SWITCH_BODY
-from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building
-from design.left_out import LeftOut
+from scanwright.cad.layout.names import HOMING_BRACKET, SWITCH, SWITCH_BODY
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
 
 BEYOND = 1.0
 

@@ -12,18 +12,18 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import outlines, solids
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.stack import DirectStack
-from cad.layout.fits import OnSheet, spigot_in_hub
-from cad.layout.joints import horn_centres, screws
-from cad.layout.layout import Layout
-from cad.layout.linkage import BEFORE_NUT, AlignmentLinkage
-from cad.layout.names import HORN_CUP, SERVO_HORN
-from cad.parts.part_spec import HORN, PartSpec, Step
-from cad.screws import SCREWS, Trap, passing_hole
-from cad.solids import building
-from design.catalogue.products import Printer, Servo
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.fits import OnSheet, spigot_in_hub
+from scanwright.cad.layout.joints import horn_centres, screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import BEFORE_NUT, AlignmentLinkage
+from scanwright.cad.layout.names import HORN_CUP, SERVO_HORN
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
+from scanwright.cad.screws import SCREWS, Trap, passing_hole
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer, Servo
 
 AROUND_BOSS = 0.2  # of the horn
 

@@ -12,17 +12,17 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.direct.loads import JOURNAL_WALL
-from cad.layout.direct.misalignment import TRUED_MM
-from cad.layout.direct.stack import DirectStack
-from cad.layout.fits import OnSheet, ToleratedDiameter
-from cad.layout.hub import BEARING_STEP
-from cad.layout.layout import Layout
-from cad.layout.linkage import AlignmentLinkage
-from cad.layout.names import JOURNAL_SLEEVE
-from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
-from cad.solids import building
+from scanwright.cad import solids
+from scanwright.cad.layout.direct.loads import JOURNAL_WALL
+from scanwright.cad.layout.direct.misalignment import TRUED_MM
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.layout.hub import BEARING_STEP
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.cad.layout.names import JOURNAL_SLEEVE
+from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6
 BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills

@@ -12,14 +12,14 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltStack
-from cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
-from cad.layout.names import MAIN_SHAFT
-from cad.parts.part_spec import TURNED_FROM, PartSpec, Step
-from cad.parts.servo_shaft import cross_holes, cross_words
-from cad.solids import building
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltStack
+from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
+from scanwright.cad.layout.names import MAIN_SHAFT
+from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from scanwright.cad.parts.servo_shaft import cross_holes, cross_words
+from scanwright.cad.solids import building
+from scanwright.design.scanner import Scanner
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot

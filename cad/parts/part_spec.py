@@ -8,9 +8,9 @@ from typing import Literal
 
 import cadquery as cq
 
-from cad.layout.fits import OnSheet
-from cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
-from design.catalogue.products import Printer
+from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
+from scanwright.design.catalogue.products import Printer
 
 Process = Literal["printed", "turned", "sawn"]
 Colour = tuple[float, float, float]

@@ -16,18 +16,26 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import solids
-from cad.layout.belt.loads import PRELOAD_N, press_newton
-from cad.layout.belt.plate import pulley_foot_radius
-from cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
-from cad.layout.fits import OnSheet, no_wider
-from cad.layout.joints import horn_centres, screws
-from cad.layout.names import BEARING_TOWER, BELT, DRIVE_PLATE, DRIVE_PULLEY, MAIN_SHAFT, SERVO_OUTPUT, SHAFT_PULLEY
-from cad.parts.part_spec import HORN, PartSpec, Step
-from cad.screws import SCREWS, passing_hole, thread_in_part
-from cad.solids import building
-from design.catalogue.products import Printer
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
+from scanwright.cad.layout.belt.plate import pulley_foot_radius
+from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.fits import OnSheet, no_wider
+from scanwright.cad.layout.joints import horn_centres, screws
+from scanwright.cad.layout.names import (
+    BEARING_TOWER,
+    BELT,
+    DRIVE_PLATE,
+    DRIVE_PULLEY,
+    MAIN_SHAFT,
+    SERVO_OUTPUT,
+    SHAFT_PULLEY,
+)
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
+from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.scanner import Scanner
 
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side

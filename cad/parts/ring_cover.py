@@ -11,14 +11,14 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.modules.ring_cover import BESIDE, NOTCH_HALF, PAD_HALF, SCREW, RingCover, cover_of
-from cad.layout.names import RING_COVER
-from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building
-from design.left_out import LeftOut
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.modules.ring_cover import BESIDE, NOTCH_HALF, PAD_HALF, SCREW, RingCover, cover_of
+from scanwright.cad.layout.names import RING_COVER
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
 
 OUT_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # an outline's axes: along x, along z
 

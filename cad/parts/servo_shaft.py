@@ -13,19 +13,19 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import outlines, solids
-from cad.layout.direct.loads import ALUMINIUM, STEEL
-from cad.layout.direct.stack import GROOVES, DirectStack
-from cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
-from cad.layout.hub import Hub
-from cad.layout.joints import horn_centres, screws
-from cad.layout.linkage import CROSS_AT, CROSS_SCREW
-from cad.layout.names import SERVO_HORN, SERVO_SHAFT
-from cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
-from cad.screws import SCREWS, passing_hole
-from cad.solids import building
-from design.catalogue.products import Printer, Servo
-from design.scanner import Scanner
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL
+from scanwright.cad.layout.direct.stack import GROOVES, DirectStack
+from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.joints import horn_centres, screws
+from scanwright.cad.layout.linkage import CROSS_AT, CROSS_SCREW
+from scanwright.cad.layout.names import SERVO_HORN, SERVO_SHAFT
+from scanwright.cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
+from scanwright.cad.screws import SCREWS, passing_hole
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer, Servo
+from scanwright.design.scanner import Scanner
 
 
 def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:

@@ -11,16 +11,16 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.belt.stack import BOSS, RING_SCREW, RING_SCREWS_DEG, BeltStack
-from cad.layout.hub import BEARING_STEP
-from cad.layout.joints import screws
-from cad.layout.names import MAIN_SHAFT, SHAFT_RING
-from cad.parts.part_spec import PartSpec, Step
-from cad.screws import passing_hole
-from cad.solids import building
-from design.catalogue.products import Printer
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.layout.belt.stack import BOSS, RING_SCREW, RING_SCREWS_DEG, BeltStack
+from scanwright.cad.layout.hub import BEARING_STEP
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import MAIN_SHAFT, SHAFT_RING
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import passing_hole
+from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.scanner import Scanner
 
 
 def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:

@@ -15,21 +15,21 @@ from functools import partial
 
 import cadquery as cq
 
-from cad import solids
-from cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, SlipRingAdapter, adapter_of, arm_top
-from cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
-from cad.layout.direct.stack import DirectStack
-from cad.layout.joints import screws
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from cad.layout.modules.ring_cover import RingCover, cover_of
-from cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
-from cad.parts.bearing_cage import cage_base
-from cad.parts.homing_bracket import bracket_threads
-from cad.parts.part_spec import ON_CASE, PartSpec, Step
-from cad.parts.ring_cover import cover_threads
-from cad.solids import building
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad import solids
+from scanwright.cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, SlipRingAdapter, adapter_of, arm_top
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
+from scanwright.cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
+from scanwright.cad.parts.bearing_cage import cage_base
+from scanwright.cad.parts.homing_bracket import bracket_threads
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
+from scanwright.cad.parts.ring_cover import cover_threads
+from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
 

@@ -12,9 +12,9 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.layout.drive import Stack
-from cad.layout.envelope import (
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.drive import Stack
+from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
     SUB_PLATE_THICKNESS,
@@ -23,15 +23,15 @@ from cad.layout.envelope import (
     screw_travel_mm,
     slot_ends,
 )
-from cad.layout.hub import Axis
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
-from cad.parts.part_spec import PartSpec, Step
-from cad.screws import SCREWS, passing_hole
-from cad.solids import building
-from design.arrays import Array
-from design.scanner import Scanner
+from scanwright.cad.layout.hub import Axis
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import SCREWS, passing_hole
+from scanwright.cad.solids import building
+from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
 CHAMFER = 3.0
 

@@ -12,13 +12,13 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from cad import outlines, solids
-from cad.layout.joints import screws
-from cad.layout.layout import Layout
-from cad.layout.modules.tripod_foot import OVER_NUTS, TripodFoot, corner_turn
-from cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
-from cad.parts.part_spec import PartSpec, Step
-from cad.solids import building
+from scanwright.cad import outlines, solids
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.modules.tripod_foot import OVER_NUTS, TripodFoot, corner_turn
+from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
+from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.solids import building
 
 
 def tripod_foot_spec(layout: Layout) -> PartSpec | None:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from cad.statics.voxels import Grid
-from design.arrays import Array, Mask
+from scanwright.cad.statics.voxels import Grid
+from scanwright.design.arrays import Array, Mask
 
 OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
 HOLD = 20.0  # stiffness per area of what holds a surface, of modulus by edge: softens by some 1e-3

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.geometry.mesh import TriMesh
-from cad.layout.deck import Deck
-from cad.layout.drive import Mounted
-from cad.layout.loads import STANDARD_GRAVITY
-from cad.statics import elastic
-from cad.statics.rigid import rigid, shared
-from cad.statics.sag import POISSON
-from cad.statics.voxels import Grid, filled
-from design.arrays import Array
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.deck import Deck
+from scanwright.cad.layout.drive import Mounted
+from scanwright.cad.layout.loads import STANDARD_GRAVITY
+from scanwright.cad.statics import elastic
+from scanwright.cad.statics.rigid import rigid, shared
+from scanwright.cad.statics.sag import POISSON
+from scanwright.cad.statics.voxels import Grid, filled
+from scanwright.design.arrays import Array
 
 EDGES = (12.0, 8.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell

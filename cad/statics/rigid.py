@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 
 def shared(points: Array, force: Array, at: Array) -> Array:

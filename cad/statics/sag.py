@@ -13,15 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import TriMesh
-from cad.layout.hub import Hub
-from cad.layout.loads import STANDARD_GRAVITY
-from cad.statics import elastic
-from cad.statics.rigid import rigid, shared
-from cad.statics.shaft import ShaftBend
-from cad.statics.voxels import Grid, filled
-from design.arrays import Array
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.loads import STANDARD_GRAVITY
+from scanwright.cad.statics import elastic
+from scanwright.cad.statics.rigid import rigid, shared
+from scanwright.cad.statics.shaft import ShaftBend
+from scanwright.cad.statics.voxels import Grid, filled
+from scanwright.design.arrays import Array
 
 EDGES = (8.0, 6.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.belt.loads import belt_nm_per_rad
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import ALUMINIUM_PA
-from design.arrays import Array
+from scanwright.cad.layout.belt.loads import belt_nm_per_rad
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.loads import ALUMINIUM_PA
+from scanwright.design.arrays import Array
 
 POISSON = 0.33
 SHEAR_SHARE = 0.9  # of a round section that carries shear

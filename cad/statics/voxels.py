@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Array
-from design.scene import ray_caster
+from scanwright.design.arrays import Array
+from scanwright.design.scene import ray_caster
 
 RAYS = 2  # through a cube, along x and along y: a wall as thin as a cube keeps its thickness
 SURFACES = 64  # that one column may pass

@@ -13,18 +13,18 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.special import roots_legendre
 
-from design.arrays import Array, Setting
-from design.density.ball_count import ball_count
-from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_at
-from design.density.spin import ball_search, mean_count, zones
-from design.density.sweep import mean_count_swept
-from design.errors import TaskError
-from design.frames import R_world_rot
-from design.objective.named_objectives import Moment
-from design.objective.problem import Problem
-from design.objective.quadrature import polar_rule
-from design.objective.score import quick_J
-from design.sphere.directions import equal_angle_grid, sample_set
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_at
+from scanwright.design.density.spin import ball_search, mean_count, zones
+from scanwright.design.density.sweep import mean_count_swept
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.named_objectives import Moment
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.objective.score import quick_J
+from scanwright.design.sphere.directions import equal_angle_grid, sample_set
 
 Method = Callable[[Problem, Setting, int], float]
 

@@ -18,11 +18,11 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 from scipy.special import roots_legendre
 
-from design.arrays import Array, Setting
-from design.objective.counted import counted_J
-from design.objective.problem import Problem
-from design.sphere.polar_rule import breaks_of
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.objective.counted import counted_J
+from scanwright.design.objective.problem import Problem
+from scanwright.design.sphere.polar_rule import breaks_of
+from scanwright.design.task.task import LoadedTask
 
 ORDERS = 12, 20, 40, 80, 160  # of the Gauss-Legendre pieces, as many as it takes
 ENOUGH = 1e-8  # difference of two orders

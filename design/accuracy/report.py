@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.machine import this_machine
-from design.accuracy.search_trials import search_trials
-from design.accuracy.stress import StressRow, as_turning, stress_rows
-from design.accuracy.trials import GREYS, MARKS, RING, report_trials, write_table
-from design.accuracy.work_precision import MethodsMeasured, best_points, measure_methods
-from design.evaluation.picture_files import save_picture
-from design.motion import Shortest
-from design.objective.problem import problem_of
-from design.objective.stated_error import error_words
-from design.search.optimum import find_optimum
-from design.task.task import LoadedTask
+from scanwright.design.accuracy.machine import this_machine
+from scanwright.design.accuracy.search_trials import search_trials
+from scanwright.design.accuracy.stress import StressRow, as_turning, stress_rows
+from scanwright.design.accuracy.trials import GREYS, MARKS, RING, report_trials, write_table
+from scanwright.design.accuracy.work_precision import MethodsMeasured, best_points, measure_methods
+from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.motion import Shortest
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.stated_error import error_words
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.task.task import LoadedTask
 
 
 def write_method_points(path: Path, measured: MethodsMeasured) -> None:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.accuracy.trials import Trial
-from design.motion import Sweep
-from design.objective.problem import problem_of
-from design.search.coarse import MARGIN, USUAL, Effort
-from design.search.search import search
-from design.task.angle_ranges import AngleRanges
-from design.task.shapes import BandRegion, ConeRegion, Region
-from design.task.task import LoadedTask
+from scanwright.design.accuracy.trials import Trial
+from scanwright.design.motion import Sweep
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.search.coarse import MARGIN, USUAL, Effort
+from scanwright.design.search.search import search
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.shapes import BandRegion, ConeRegion, Region
+from scanwright.design.task.task import LoadedTask
 
 TASKS = 5
 SEED = 1

@@ -11,19 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.accuracy.reference import smooth_pieces
-from design.arrays import Array
-from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
-from design.density.spin import mean_count, zones
-from design.errors import TaskError
-from design.motion import Spin, Sweep
-from design.objective.named_objectives import log
-from design.objective.problem import Problem
-from design.objective.score import quick_J, score
-from design.sphere.directions import EMPTY
-from design.sphere.regions import field_of
-from design.task.shapes import AllRegion
-from design.task.task import LoadedTask, Task
+from scanwright.design.accuracy.reference import smooth_pieces
+from scanwright.design.arrays import Array
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
+from scanwright.design.density.spin import mean_count, zones
+from scanwright.design.errors import TaskError
+from scanwright.design.motion import Spin, Sweep
+from scanwright.design.objective.named_objectives import log
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import quick_J, score
+from scanwright.design.sphere.directions import EMPTY
+from scanwright.design.sphere.regions import field_of
+from scanwright.design.task.shapes import AllRegion
+from scanwright.design.task.task import LoadedTask, Task
 
 PIECE_NODES = 8
 HALF_TURN = np.pi

@@ -17,11 +17,11 @@ from typing import Any, TypeVar
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.accuracy.front import dominators
-from design.accuracy.machine import this_machine
-from design.atomic_file import whole_file
-from design.errors import BuildError
-from design.evaluation.picture_files import save_picture
+from scanwright.design.accuracy.front import dominators
+from scanwright.design.accuracy.machine import this_machine
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import BuildError
+from scanwright.design.evaluation.picture_files import save_picture
 
 T = TypeVar("T")
 REPEATS = 3

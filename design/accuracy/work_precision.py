@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.accuracy.front import undominated
-from design.accuracy.methods import Method, methods_for
-from design.accuracy.reference import Reference, is_smooth, reference
-from design.arrays import Array, Setting
-from design.errors import ScanwrightError
-from design.objective.problem import Problem
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.design.accuracy.front import undominated
+from scanwright.design.accuracy.methods import Method, methods_for
+from scanwright.design.accuracy.reference import Reference, is_smooth, reference
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.errors import ScanwrightError
+from scanwright.design.objective.problem import Problem
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 
 REPEATS = 5
 SLOW_S = 2.0  # a point slower than this is timed once

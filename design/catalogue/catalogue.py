@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from design.catalogue.products import (
+from scanwright.design.catalogue.products import (
     Bearing,
     Belt,
     Lidar,
@@ -33,8 +33,8 @@ from design.catalogue.products import (
     SlipRing,
     SlotSwitch,
 )
-from design.errors import TaskError, suggest
-from design.record import Fault, faults_of, read_toml, tell
+from scanwright.design.errors import TaskError, suggest
+from scanwright.design.record import Fault, faults_of, read_toml, tell
 
 SHIPPED = Path(__file__).parent
 LIDAR_GROUP, SERVO_GROUP = "scanwright.lidars", "scanwright.servos"

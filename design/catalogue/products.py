@@ -14,8 +14,8 @@ from numpy import ndarray
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import to_jsonable_python
 
-from design.catalogue.known_error import KnownError
-from design.record import Record
+from scanwright.design.catalogue.known_error import KnownError
+from scanwright.design.record import Record
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]

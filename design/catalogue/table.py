@@ -6,8 +6,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from design.catalogue.catalogue import KINDS
-from design.catalogue.products import Bearing, Belt, Lidar, Multibeam, Printer, Product, Servo, SlipRing, SlotSwitch
+from scanwright.design.catalogue.catalogue import KINDS
+from scanwright.design.catalogue.products import (
+    Bearing,
+    Belt,
+    Lidar,
+    Multibeam,
+    Printer,
+    Product,
+    Servo,
+    SlipRing,
+    SlotSwitch,
+)
 
 DOUBT = "?"
 FOOTNOTE = f"{DOUBT} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."

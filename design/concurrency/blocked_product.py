@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 ROWS = 16
 ALONE = 1 << 18  # multiplications: OpenBLAS shares larger products out among threads of its own

@@ -18,7 +18,7 @@ from multiprocessing import forkserver, resource_tracker
 from types import FrameType
 from typing import Any, Generic, ParamSpec, Protocol, TypeVar
 
-from design.errors import BuildError
+from scanwright.design.errors import BuildError
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # as Dask sets for its own workers
 

@@ -11,8 +11,8 @@ from jaxtyping import Float, Int, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array
-from design.concurrency.parallel import in_chunks
+from scanwright.design.arrays import Array
+from scanwright.design.concurrency.parallel import in_chunks
 
 MOST_ROWS = 1440
 CELLS_PER_BALL = 3  # rows and cells across a ball radius: fewer test too many beams, more jump too often

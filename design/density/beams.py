@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
-from design import frames
+from scanwright.design import frames
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints
+from scanwright.design.arrays import Array, Ints
 
 TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
 CROWD = 32  # places in one bucket, above which sorting within it would cost more than sorting all

@@ -19,11 +19,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from design.arrays import Array, Counts, Ints
-from design.concurrency.parallel import in_chunks
-from design.density.beams import ScanLines
-from design.density.phase_walk import even_zones, mean_counts, meetings, seam_zones
-from design.density.value_table import walked
+from scanwright.design.arrays import Array, Counts, Ints
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.density.beams import ScanLines
+from scanwright.design.density.phase_walk import even_zones, mean_counts, meetings, seam_zones
+from scanwright.design.density.value_table import walked
 
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
 

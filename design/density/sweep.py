@@ -16,13 +16,13 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Counts, Ints
-from design.concurrency.parallel import in_chunks
-from design.density.beams import polar_and_azimuth
-from design.density.phase_walk import TIE, half_width, meetings, sort_by_buckets
-from design.density.spin import Zones
-from design.density.value_table import walked
-from design.motion import Sweep
+from scanwright.design.arrays import Array, Counts, Ints
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.density.beams import polar_and_azimuth
+from scanwright.design.density.phase_walk import TIE, half_width, meetings, sort_by_buckets
+from scanwright.design.density.spin import Zones
+from scanwright.design.density.value_table import walked
+from scanwright.design.motion import Sweep
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from design.arrays import Array, Counts, Ints
-from design.concurrency.parallel import in_chunks
+from scanwright.design.arrays import Array, Counts, Ints
+from scanwright.design.concurrency.parallel import in_chunks
 
 FIRST = 1 << 14  # entries of the table that all directions are tried with
 

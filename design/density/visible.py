@@ -14,11 +14,11 @@ from jaxtyping import Bool, Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints
-from design.concurrency.parallel import in_chunks
-from design.density.beams import ScanLines, polar_and_azimuth
-from design.density.phase_walk import half_width, meetings
-from design.density.sweep import SweepLines
+from scanwright.design.arrays import Array, Ints
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.density.beams import ScanLines, polar_and_azimuth
+from scanwright.design.density.phase_walk import half_width, meetings
+from scanwright.design.density.sweep import SweepLines
 
 
 @dataclass(frozen=True, slots=True)

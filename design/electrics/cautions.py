@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from design.catalogue.products import Lidar
-from design.electrics.loads import SUPPLY_V, ElectricLoad
-from design.electrics.network import Wire
-from design.scanner import Scanner
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.electrics.loads import SUPPLY_V, ElectricLoad
+from scanwright.design.electrics.network import Wire
+from scanwright.design.scanner import Scanner
 
 MEASURE = "measure first"  # marks a wire whose colour no verified source names, and that carries power
 NARROW_V = 0.5  # of room above 12 V: a supply that is trimmed higher than this can destroy the device

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from design.catalogue.products import Lidar, Servo
-from design.electrics.network import Branch, Drop
-from design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
-from design.scanner import Scanner
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.electrics.network import Branch, Drop
+from scanwright.design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
+from scanwright.design.scanner import Scanner
 
 SUPPLY_V = 12.0
 COMPUTER_W = 15.0  # of a small computer and what hangs on its USB: assumed

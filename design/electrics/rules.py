@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from design.electrics.network import Network, Pin
-from design.electrics.sizing import OVER_PEAK, wire_a
+from scanwright.design.electrics.network import Network, Pin
+from scanwright.design.electrics.sizing import OVER_PEAK, wire_a
 
 
 @dataclass(frozen=True, slots=True)

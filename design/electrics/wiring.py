@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
-from design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
-from design.electrics.cautions import MEASURE, RISKS, cautions_of
-from design.electrics.loads import (
+from scanwright.design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
+from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
+from scanwright.design.electrics.loads import (
     CHANGER,
     SUPPLY_V,
     UNKNOWN_A,
@@ -16,9 +16,9 @@ from design.electrics.loads import (
     loads_of,
     most_a,
 )
-from design.electrics.network import Box, Branch, Circuit, Network, Pin, Wire
-from design.electrics.sizing import fuse_for, supply_for, wire_for
-from design.scanner import Scanner
+from scanwright.design.electrics.network import Box, Branch, Circuit, Network, Pin, Wire
+from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_for
+from scanwright.design.scanner import Scanner
 
 USB_A = 0.5  # that a port gives
 LINE_CHARS = 36  # of a line of text in a box

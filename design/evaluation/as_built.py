@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from design.angles import standard_settings
-from design.arrays import Setting
-from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps
-from design.objective.holes import NO_BLIND_WEIGHT, holes, percent
-from design.objective.problem import Problem
-from design.objective.score import Score, score
-from design.objective.stated_error import rounded_to_error
-from design.search.with_parts import score_with
-from design.shadow import Shadow
+from scanwright.design.angles import standard_settings
+from scanwright.design.arrays import Setting
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.gaps import gaps
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT, holes, percent
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score, score
+from scanwright.design.objective.stated_error import rounded_to_error
+from scanwright.design.search.with_parts import score_with
+from scanwright.design.shadow import Shadow
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,25 +32,25 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.angles import STANDARD_DEG
-from design.arrays import Array, Counts, Setting
-from design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
-from design.density.ball_count import ball_count
-from design.density.beams import ScanLines
-from design.evaluation.as_built import seen_of
-from design.evaluation.coverage import coverage
-from design.objective.ball_search import SETS
-from design.objective.named_objectives import beams_per_ball
-from design.objective.problem import NODES, Problem, with_scanner
-from design.objective.score import Score, blind_share, score, score_on
-from design.search.coarse import Progress
-from design.search.families import Family
-from design.search.search import search
-from design.search.with_parts import score_with
-from design.shadow import Shadow
-from design.sphere.directions import sample_set, spiral
-from design.task.angle_ranges import AngleRanges
-from design.task.task import LoadedTask, load_task
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.arrays import Array, Counts, Setting
+from scanwright.design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import ScanLines
+from scanwright.design.evaluation.as_built import seen_of
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.objective.ball_search import SETS
+from scanwright.design.objective.named_objectives import beams_per_ball
+from scanwright.design.objective.problem import NODES, Problem, with_scanner
+from scanwright.design.objective.score import Score, blind_share, score, score_on
+from scanwright.design.search.coarse import Progress
+from scanwright.design.search.families import Family
+from scanwright.design.search.search import search
+from scanwright.design.search.with_parts import score_with
+from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.directions import sample_set, spiral
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.task import LoadedTask, load_task
 
 LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from design.evaluation.comparison import ComparisonRow
-from design.evaluation.density_picture import INK
-from design.evaluation.picture_files import save_picture
-from design.objective.holes import percent
+from scanwright.design.evaluation.comparison import ComparisonRow
+from scanwright.design.evaluation.density_picture import INK
+from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.objective.holes import percent
 
 LONG = {"color": "#555555"}
 SHORT = {"facecolor": "#dddddd", "hatch": "////", "edgecolor": "#777777", "linewidth": 0.0}

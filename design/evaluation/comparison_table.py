@@ -6,13 +6,13 @@ import csv
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from design.atomic_file import whole_file
-from design.catalogue.products import Multibeam, Product
-from design.errors import BuildError
-from design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
-from design.objective.holes import percent
-from design.objective.stated_error import error_words
-from design.task.task import LoadedTask, load_task
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.catalogue.products import Multibeam, Product
+from scanwright.design.errors import BuildError
+from scanwright.design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
+from scanwright.design.objective.holes import percent
+from scanwright.design.objective.stated_error import error_words
+from scanwright.design.task.task import LoadedTask, load_task
 
 IN_THE_TABLE = ("scan_rate_hz", "range_max_mm", "range_practical_mm", "range_sigma_mm", "price_usd")
 

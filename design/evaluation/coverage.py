@@ -8,16 +8,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Setting, Vector
-from design.density.beams import blind_zones, polar_and_azimuth
-from design.density.spin import mean_count
-from design.density.sweep import mean_count_swept
-from design.density.visible import free_lines, mean_count_free
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.scene.surface import Surface
-from design.shadow import Shadow
-from design.sphere.directions import spiral
+from scanwright.design.arrays import Setting, Vector
+from scanwright.design.density.beams import blind_zones, polar_and_azimuth
+from scanwright.design.density.spin import mean_count
+from scanwright.design.density.sweep import mean_count_swept
+from scanwright.design.density.visible import free_lines, mean_count_free
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.scene.surface import Surface
+from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.directions import spiral
 
 CIRCLES = 10_000
 TABLE = 3601  # polar angles

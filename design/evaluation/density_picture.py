@@ -12,11 +12,11 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from design.arrays import Array, Setting
-from design.evaluation.coverage import mean_density_at
-from design.evaluation.picture_files import save_picture
-from design.objective.problem import Problem
-from design.shadow import Shadow
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.objective.problem import Problem
+from scanwright.design.shadow import Shadow
 
 STEP_DEG = 0.5
 INK = "#111111"

@@ -10,23 +10,23 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Setting
-from design.density.beams import scan_at
-from design.errors import TaskError
-from design.evaluation.as_built import AsBuilt, as_built
-from design.evaluation.coverage import Coverage, coverage, on_surfaces
-from design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
-from design.evaluation.metres import PlaneFigures, on_planes
-from design.evaluation.poles import PoleChances, parse_pole, pole_chances
-from design.objective.ball_search import BallScore, ball_score
-from design.objective.holes import Hole, holes, percent
-from design.objective.problem import Problem, problem_of
-from design.objective.score import Score, score
-from design.objective.stated_error import error_words, rounded_to_error
-from design.objective.tolerance import rise_words, sensitivity
-from design.shadow import Shadow
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Setting
+from scanwright.design.density.beams import scan_at
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.as_built import AsBuilt, as_built
+from scanwright.design.evaluation.coverage import Coverage, coverage, on_surfaces
+from scanwright.design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
+from scanwright.design.evaluation.metres import PlaneFigures, on_planes
+from scanwright.design.evaluation.poles import PoleChances, parse_pole, pole_chances
+from scanwright.design.objective.ball_search import BallScore, ball_score
+from scanwright.design.objective.holes import Hole, holes, percent
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.score import Score, score
+from scanwright.design.objective.stated_error import error_words, rounded_to_error
+from scanwright.design.objective.tolerance import rise_words, sensitivity
+from scanwright.design.shadow import Shadow
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,12 +14,12 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.spatial import ConvexHull
 
-from design.arrays import Array, Plane, Setting, Vector
-from design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
-from design.frames import R_rot_laser, R_world_rot
-from design.objective.problem import NODES, Problem
-from design.objective.quadrature import polar_rule
-from design.sphere.directions import weighted_samples
+from scanwright.design.arrays import Array, Plane, Setting, Vector
+from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
+from scanwright.design.frames import R_rot_laser, R_world_rot
+from scanwright.design.objective.problem import NODES, Problem
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.sphere.directions import weighted_samples
 
 SWEPT_DIRECTIONS = 20_000
 

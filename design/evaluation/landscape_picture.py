@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from design.angles import STANDARD_DEG
-from design.arrays import Array
-from design.errors import BuildError, TaskError
-from design.evaluation.density_picture import INK
-from design.search.search import SearchResult
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.evaluation.density_picture import INK
+from scanwright.design.search.search import SearchResult
 
 OPTIMUM: dict[str, Any] = {"marker": "*", "ms": 15, "color": "white", "mec": INK, "mew": 1.2}
 STANDARD: dict[str, dict[str, Any]] = {"rolling": {"marker": "s"}, "pitching": {"marker": "D"}}

@@ -14,15 +14,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.arrays import Array, Ints, Setting, Vector
-from design.density.beams import polar_and_azimuth, scan_at
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.shadow import Shadow
-from design.sphere.rectangle import edge_normals
-from design.sphere.regions import Field
-from design.task.shapes import LITTLE, PlaneRegion, beyond_words
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array, Ints, Setting, Vector
+from scanwright.design.density.beams import polar_and_azimuth, scan_at
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.rectangle import edge_normals
+from scanwright.design.sphere.regions import Field
+from scanwright.design.task.shapes import LITTLE, PlaneRegion, beyond_words
+from scanwright.design.task.task import LoadedTask
 
 AT_M = 3.0  # from the optical centre, where a gap is told
 RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Array, Setting
-from design.catalogue.products import Lidar
-from design.density.beams import scan_at
-from design.errors import TaskError
-from design.objective.problem import Problem
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import scan_at
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.problem import Problem
 
 BEAMS = 1, 3  # that a pole is asked for: to be seen at all, and to be more than a stray point
 PHASES = 24

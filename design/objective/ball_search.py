@@ -9,11 +9,11 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from design.arrays import Array, Rotation, Setting
-from design.density.beams import scan_at
-from design.frames import R_world_rot, rotvec_to_matrix
-from design.objective.problem import Problem
-from design.sphere.directions import sample_set
+from scanwright.design.arrays import Array, Rotation, Setting
+from scanwright.design.density.beams import scan_at
+from scanwright.design.frames import R_world_rot, rotvec_to_matrix
+from scanwright.design.objective.problem import Problem
+from scanwright.design.sphere.directions import sample_set
 
 PHASES = 8
 SETS = 4  # of directions for every phase: 32 estimates of J, so that their spread is known well enough

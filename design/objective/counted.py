@@ -14,10 +14,10 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
-from design.arrays import Array, Ints, Setting
-from design.motion import Spin, StopAndGo, Sweep
-from design.objective.drawn_regions import Layer, drawn_in, layers_of
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array, Ints, Setting
+from scanwright.design.motion import Spin, StopAndGo, Sweep
+from scanwright.design.objective.drawn_regions import Layer, drawn_in, layers_of
+from scanwright.design.task.task import LoadedTask
 
 SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from design.arrays import Array, Mask
-from design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
+from scanwright.design.task.task import LoadedTask
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Setting, Vector
-from design.frames import R_world_rot
-from design.objective.problem import NODES, Problem
-from design.objective.quadrature import polar_rule
-from design.objective.score import blind_share, blind_to_sweep
-from design.sphere.directions import weighted_samples
+from scanwright.design.arrays import Setting, Vector
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import NODES, Problem
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.objective.score import blind_share, blind_to_sweep
+from scanwright.design.sphere.directions import weighted_samples
 
 NO_BLIND_WEIGHT = 1e-9  # share of the weight: what a fan and a region reach is rounded
 DIRECTIONS = 20_000  # of the region, for a sweep

@@ -15,13 +15,13 @@ from typing import Literal
 
 import numpy as np
 
-from design.arrays import Array, Counts
-from design.errors import TaskError
-from design.sphere.painting import MAP, VALUE
-from design.sphere.regions import Field, field_of
-from design.sphere.total_weight import total_weight
-from design.task.shapes import Region
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array, Counts
+from scanwright.design.errors import TaskError
+from scanwright.design.sphere.painting import MAP, VALUE
+from scanwright.design.sphere.regions import Field, field_of
+from scanwright.design.sphere.total_weight import total_weight
+from scanwright.design.task.shapes import Region
+from scanwright.design.task.task import LoadedTask
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,17 +9,17 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Plane
-from design.catalogue.products import Lidar
-from design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
-from design.density.sweep import SweepLines
-from design.errors import BuildError, TaskError
-from design.motion import Motion, Shortest, StopAndGo, Sweep
-from design.objective.named_objectives import Objective, objective_of
-from design.shadow import Shadow
-from design.sphere.directions import EMPTY, equal_angle_grid, require_weight
-from design.sphere.regions import Field, field_of
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Plane
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
+from scanwright.design.density.sweep import SweepLines
+from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.motion import Motion, Shortest, StopAndGo, Sweep
+from scanwright.design.objective.named_objectives import Objective, objective_of
+from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.directions import EMPTY, equal_angle_grid, require_weight
+from scanwright.design.sphere.regions import Field, field_of
+from scanwright.design.task.task import LoadedTask
 
 FRONT = Path(__file__).parent / "front.csv"
 MANY_LINES = 100  # of a turn: one more or less is less than what their number decides

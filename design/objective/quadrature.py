@@ -6,14 +6,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Setting, Vector
-from design.density.beams import is_closed, polar_and_azimuth
-from design.errors import TaskError
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.sphere.directions import EMPTY, equal_angle_grid
-from design.sphere.polar_rule import PolarRule, circle_rule
-from design.sphere.regions import Field
+from scanwright.design.arrays import Setting, Vector
+from scanwright.design.density.beams import is_closed, polar_and_azimuth
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.sphere.directions import EMPTY, equal_angle_grid
+from scanwright.design.sphere.polar_rule import PolarRule, circle_rule
+from scanwright.design.sphere.regions import Field
 
 
 def polar_rule(

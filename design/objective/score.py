@@ -15,14 +15,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.arrays import Setting
-from design.density.spin import Zones, zones
-from design.density.sweep import mean_count_swept, zones_swept
-from design.frames import R_world_rot
-from design.objective.named_objectives import Moment
-from design.objective.problem import Problem
-from design.objective.quadrature import polar_rule
-from design.sphere.directions import sample_sets
+from scanwright.design.arrays import Setting
+from scanwright.design.density.spin import Zones, zones
+from scanwright.design.density.sweep import mean_count_swept, zones_swept
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.named_objectives import Moment
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.sphere.directions import sample_sets
 
 MOST_NODES = 200_000
 ROUNDING = 1e-6  # floor of the stated error

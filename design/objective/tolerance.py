@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.arrays import Setting
-from design.objective.problem import NODES, Problem
-from design.objective.score import quick_J
-from design.task.angle_ranges import NAMES
+from scanwright.design.arrays import Setting
+from scanwright.design.objective.problem import NODES, Problem
+from scanwright.design.objective.score import quick_J
+from scanwright.design.task.angle_ranges import NAMES
 
 
 def sensitivity(problem: Problem, angles_rad: Setting, off_rad: float, nodes: int = NODES) -> dict[str, float]:

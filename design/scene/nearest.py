@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Array, Ints
+from scanwright.design.arrays import Array, Ints
 
 Nearest: TypeAlias = Callable[[Array, Array], tuple[NDArray[np.int32], Array]]
 """Origins and unit directions, both (n, 3), to the row of the triangle that each ray hits first and its range, both

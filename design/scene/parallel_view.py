@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Array, Rotation, Vector
-from design.scene.ray_caster import Scene, cast
+from scanwright.design.arrays import Array, Rotation, Vector
+from scanwright.design.scene.ray_caster import Scene, cast
 
 DARKEST = 0.35  # of a surface that is seen edge on
 

@@ -18,10 +18,10 @@ from jaxtyping import Float, Int32
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
-from design import frames
-from design.arrays import Array, Vector
-from design.errors import SceneError
-from design.scene.nearest import Nearest, nearest_search
+from scanwright.design import frames
+from scanwright.design.arrays import Array, Vector
+from scanwright.design.errors import SceneError
+from scanwright.design.scene.nearest import Nearest, nearest_search
 
 SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
 

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.errors import TaskError
-from design.frames import Rx, Ry, Rz
-from design.scene.ray_caster import cast, load_scene
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import Rx, Ry, Rz
+from scanwright.design.scene.ray_caster import cast, load_scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)

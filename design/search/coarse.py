@@ -15,19 +15,19 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.arrays import Array, Ints, Mask
-from design.concurrency.parallel import in_chunks
-from design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
-from design.density.spin import mean_count, zones
-from design.objective.named_objectives import Objective
-from design.objective.problem import Problem
-from design.search.constraints import AtMost, Constraint, NoHole, fan_reach
-from design.search.grid_classes import Folded
-from design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
-from design.sphere.outline import reach_about
-from design.sphere.polar_weights import weights_over_polar
-from design.sphere.regions import Field
-from design.task.task import Limits
+from scanwright.design.arrays import Array, Ints, Mask
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
+from scanwright.design.density.spin import mean_count, zones
+from scanwright.design.objective.named_objectives import Objective
+from scanwright.design.objective.problem import Problem
+from scanwright.design.search.constraints import AtMost, Constraint, NoHole, fan_reach
+from scanwright.design.search.grid_classes import Folded
+from scanwright.design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.sphere.polar_weights import weights_over_polar
+from scanwright.design.sphere.regions import Field
+from scanwright.design.task.task import Limits
 
 FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
 MOST_NODES = 1441  # for balls below half a degree

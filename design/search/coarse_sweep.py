@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.arrays import Array, Ints
-from design.concurrency.parallel import in_chunks
-from design.density.beams import beam_directions_rot
-from design.density.sweep import mean_count_swept, zones_swept
-from design.errors import TaskError
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.objective.score import blind_to_sweep
-from design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, settled
-from design.search.constraints import AtMost, Constraint
-from design.search.grid_classes import Folded
-from design.search.plane_axis_product import Lowest, lowest, one_way
-from design.sphere.directions import EMPTY, spiral, weighted_samples
-from design.sphere.regions import Field
-from design.task.task import Limits
+from scanwright.design.arrays import Array, Ints
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.density.beams import beam_directions_rot
+from scanwright.design.density.sweep import mean_count_swept, zones_swept
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import blind_to_sweep
+from scanwright.design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, settled
+from scanwright.design.search.constraints import AtMost, Constraint
+from scanwright.design.search.grid_classes import Folded
+from scanwright.design.search.plane_axis_product import Lowest, lowest, one_way
+from scanwright.design.sphere.directions import EMPTY, spiral, weighted_samples
+from scanwright.design.sphere.regions import Field
+from scanwright.design.task.task import Limits
 
 DIRECTIONS = 3000  # of the rotation frame, at least: one every 3.7 deg
 MOST_DIRECTIONS = 20_000

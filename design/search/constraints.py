@@ -14,15 +14,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Array, Ints, Mask, Setting
-from design.concurrency.blocked_product import product
-from design.concurrency.parallel import in_chunks
-from design.frames import R_rot_laser
-from design.objective.holes import NO_BLIND_WEIGHT
-from design.objective.problem import Problem
-from design.objective.score import Score, score, score_on
-from design.search.limits import planes_keep
-from design.task.task import Limits
+from scanwright.design.arrays import Array, Ints, Mask, Setting
+from scanwright.design.concurrency.blocked_product import product
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.frames import R_rot_laser
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.search.limits import planes_keep
+from scanwright.design.task.task import Limits
 
 TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
 PIECE = 512  # planes, at least, whose beams are looked at together

@@ -9,17 +9,17 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Array, Setting
-from design.concurrency.parallel import in_chunks
-from design.frames import R_world_rot
-from design.objective.problem import NODES, Problem
-from design.objective.score import Score
-from design.objective.tolerance import worst_within
-from design.search.coarse import Landscape
-from design.search.constraints import Requirements
-from design.search.grid_classes import Folded
-from design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
-from design.task.angle_ranges import AngleRanges
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import NODES, Problem
+from scanwright.design.objective.score import Score
+from scanwright.design.objective.tolerance import worst_within
+from scanwright.design.search.coarse import Landscape
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.grid_classes import Folded
+from scanwright.design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
+from scanwright.design.task.angle_ranges import AngleRanges
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only

@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
-from design.frames import R_world_rot
-from design.task.angle_ranges import AngleRanges
+from scanwright.design.frames import R_world_rot
+from scanwright.design.task.angle_ranges import AngleRanges
 
 
 @dataclass(frozen=True, slots=True)

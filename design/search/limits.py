@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
-from design.errors import TaskError
-from design.objective.problem import Problem
-from design.search.grid_classes import Folded
-from design.task.task import Limits
+from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.problem import Problem
+from scanwright.design.search.grid_classes import Folded
+from scanwright.design.task.task import Limits
 
 
 def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:

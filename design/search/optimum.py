@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from design.angles import AngleSet, standard_settings
-from design.arrays import Array
-from design.left_out import LeftOut
-from design.motion import Shortest
-from design.objective.holes import holes, percent
-from design.objective.problem import Problem, problem_of
-from design.objective.score import Score, score
-from design.objective.stated_error import error_words, rounded_to_error
-from design.search.coarse import Progress
-from design.search.families import Family
-from design.search.search import SearchResult, search
-from design.search.shortest_period import fastest
-from design.sphere.directions import spiral
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.arrays import Array
+from scanwright.design.left_out import LeftOut
+from scanwright.design.motion import Shortest
+from scanwright.design.objective.holes import holes, percent
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.score import Score, score
+from scanwright.design.objective.stated_error import error_words, rounded_to_error
+from scanwright.design.search.coarse import Progress
+from scanwright.design.search.families import Family
+from scanwright.design.search.search import SearchResult, search
+from scanwright.design.search.shortest_period import fastest
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 
 SQUARE_DEGREES = 41_253  # on the whole sphere
 

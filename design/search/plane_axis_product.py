@@ -11,11 +11,11 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Ints, Mask
-from design.concurrency.blocked_product import blocked_product, product
-from design.concurrency.parallel import in_chunks
-from design.objective.named_objectives import Moment, Objective
-from design.search.constraints import Constraint
+from scanwright.design.arrays import Array, Ints, Mask
+from scanwright.design.concurrency.blocked_product import blocked_product, product
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.objective.named_objectives import Moment, Objective
+from scanwright.design.search.constraints import Constraint
 
 PIECE, PART = 128, 4096  # planes and axes per tile of the product: the cache holds it until it is looked through
 

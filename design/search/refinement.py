@@ -17,12 +17,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.arrays import Array, Rotation, Setting, Vector
-from design.objective.score import Score
-from design.objective.tolerance import worst_off
-from design.search.constraints import Requirements
-from design.sphere.regions import frames_about
-from design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.arrays import Array, Rotation, Setting, Vector
+from scanwright.design.objective.score import Score
+from scanwright.design.objective.tolerance import worst_off
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.sphere.regions import frames_about
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
 STEP = 2  # values that one step takes
 REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes

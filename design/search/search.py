@@ -9,20 +9,20 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.errors import TaskError
-from design.left_out import LeftOut
-from design.objective.holes import NO_BLIND_WEIGHT
-from design.objective.named_objectives import Moment, Objective
-from design.objective.problem import Problem
-from design.search.coarse import USUAL, Effort, Landscape, Progress, coarse_landscape
-from design.search.coarse_sweep import swept_landscape
-from design.search.constraints import Requirements
-from design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
-from design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
-from design.search.limits import allowed_planes
-from design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
-from design.task.angle_ranges import NAMES, AngleRanges
-from design.task.task import Limits
+from scanwright.design.errors import TaskError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.objective.named_objectives import Moment, Objective
+from scanwright.design.objective.problem import Problem
+from scanwright.design.search.coarse import USUAL, Effort, Landscape, Progress, coarse_landscape
+from scanwright.design.search.coarse_sweep import swept_landscape
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
+from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
+from scanwright.design.search.limits import allowed_planes
+from scanwright.design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.task.task import Limits
 
 LEADERS_STEP_DEG = 5.0
 NONE = Limits()

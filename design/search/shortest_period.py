@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.arrays import Setting
-from design.density.beams import ScanLines
-from design.density.spin import zones
-from design.errors import TaskError
-from design.motion import Shortest, Spin
-from design.objective.problem import NODES, Problem, problem_of
-from design.objective.quadrature import polar_rule
-from design.objective.score import score
-from design.search.coarse import Progress
-from design.search.families import Family
-from design.search.limits import line_gaps_deg
-from design.search.search import SearchResult, search
-from design.task.named_products import fastest_rpm
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Setting
+from scanwright.design.density.beams import ScanLines
+from scanwright.design.density.spin import zones
+from scanwright.design.errors import TaskError
+from scanwright.design.motion import Shortest, Spin
+from scanwright.design.objective.problem import NODES, Problem, problem_of
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.objective.score import score
+from scanwright.design.search.coarse import Progress
+from scanwright.design.search.families import Family
+from scanwright.design.search.limits import line_gaps_deg
+from scanwright.design.search.search import SearchResult, search
+from scanwright.design.task.named_products import fastest_rpm
+from scanwright.design.task.task import LoadedTask
 
 MOST_LINES = 200_000
 ROUNDS = 6  # the best settings of a slow turn are seldom those of a fast one: search again at the period found

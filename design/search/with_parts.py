@@ -14,21 +14,21 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Setting
-from design.density.ball_count import ball_count
-from design.density.beams import scan_at
-from design.errors import BuildError
-from design.objective.ball_search import start_phases
-from design.objective.holes import NO_BLIND_WEIGHT
-from design.objective.problem import Problem
-from design.objective.score import Score, score
-from design.search.coarse import Progress
-from design.search.families import Family
-from design.search.grid_classes import mirrors_of
-from design.shadow import Shadow
-from design.sphere.directions import sample_set
-from design.task.angle_ranges import NAMES, AngleRanges
-from design.task.task import Limits
+from scanwright.design.arrays import Setting
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import scan_at
+from scanwright.design.errors import BuildError
+from scanwright.design.objective.ball_search import start_phases
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score, score
+from scanwright.design.search.coarse import Progress
+from scanwright.design.search.families import Family
+from scanwright.design.search.grid_classes import mirrors_of
+from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.directions import sample_set
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.task.task import Limits
 
 SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
 MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told

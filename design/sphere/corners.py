@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Vector
-from design.sphere.regions import Field, cross, frames_about
+from scanwright.design.arrays import Vector
+from scanwright.design.sphere.regions import Field, cross, frames_about
 
 LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.errors import TaskError
-from design.sphere.painting import ALL, BAND, CONE, POLYGON, VALUE
-from design.sphere.rectangle import seen_rectangle
-from design.sphere.regions import Field, frames_about
+from scanwright.design.errors import TaskError
+from scanwright.design.sphere.painting import ALL, BAND, CONE, POLYGON, VALUE
+from scanwright.design.sphere.rectangle import seen_rectangle
+from scanwright.design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
 MOST_LOOKS = 1_000_000  # directions looked at in one patch

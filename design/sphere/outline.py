@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from design.concurrency.blocked_product import product
-from design.concurrency.parallel import in_chunks
-from design.sphere.corners import around, edge_corners
-from design.sphere.painting import MAP
-from design.sphere.regions import Field, frames_about
+from scanwright.design.concurrency.blocked_product import product
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.sphere.corners import around, edge_corners
+from scanwright.design.sphere.painting import MAP
+from scanwright.design.sphere.regions import Field, frames_about
 
 AROUND = 3600  # points of each edge: what an arc reaches further between two of them is below 4e-7 rad
 PIECE = 1024  # points that axes are compared with at a time

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from design.arrays import Array, Ints, Mask
+from scanwright.design.arrays import Array, Ints, Mask
 
 ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""

@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float, Int64
 from numpy import ndarray
 
-from design.arrays import Vector
-from design.errors import NumericalError
-from design.sphere.corners import (
+from scanwright.design.arrays import Vector
+from scanwright.design.errors import NumericalError
+from scanwright.design.sphere.corners import (
     LOOK_RAD,
     MANY_EDGES,
     MOST_CORNERED,
@@ -25,10 +25,10 @@ from design.sphere.corners import (
     polar_about,
     touched_points,
 )
-from design.sphere.painting import BAND, CONE, MAP, POLYGON, VALUE
-from design.sphere.rectangle import seen_rectangle
-from design.sphere.regions import Field
-from design.sphere.total_weight import total_weight
+from scanwright.design.sphere.painting import BAND, CONE, MAP, POLYGON, VALUE
+from scanwright.design.sphere.rectangle import seen_rectangle
+from scanwright.design.sphere.regions import Field
+from scanwright.design.sphere.total_weight import total_weight
 
 GRID = 180  # segments of that grid
 MANY_CORNERS = 64  # above this the corners are no breaks: segments between them would cost more nodes than the bends

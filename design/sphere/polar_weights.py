@@ -7,12 +7,12 @@ from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array
-from design.concurrency.parallel import in_chunks
-from design.errors import TaskError
-from design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
-from design.sphere.outline import reach_about
-from design.sphere.regions import Field
+from scanwright.design.arrays import Array
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.errors import TaskError
+from scanwright.design.sphere.directions import EMPTY, Samples, equal_angle_grid, weighted_samples
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.sphere.regions import Field
 
 FEW_EDGES = 16  # above this (maps) directions stand for the field: circles would be slower
 DIRECTIONS = 20_000  # that do so

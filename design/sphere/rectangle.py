@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Vector
+from scanwright.design.arrays import Vector
 
 STRIPS = 2048  # of the solid angle's sum: an even number
 

@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from design.arrays import Array, Vector
-from design.concurrency.parallel import in_chunks
-from design.scene.surface import Surface
-from design.sphere.painting import (
+from scanwright.design.arrays import Array, Vector
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.scene.surface import Surface
+from scanwright.design.sphere.painting import (
     ALL,
     BAND,
     COLUMNS,
@@ -32,8 +32,8 @@ from design.sphere.painting import (
     masked_at,
     values_at,
 )
-from design.sphere.rectangle import edge_normals
-from design.task.shapes import (
+from scanwright.design.sphere.rectangle import edge_normals
+from scanwright.design.task.shapes import (
     AllRegion,
     BandRegion,
     BoxRegion,
@@ -43,7 +43,7 @@ from design.task.shapes import (
     PlaneRegion,
     Region,
 )
-from design.task.task import LoadedTask
+from scanwright.design.task.task import LoadedTask
 
 FEW_CIRCLES = 1024  # up to here one thread is done before others have begun
 EVERYWHERE = np.array([[-np.inf, np.inf]])

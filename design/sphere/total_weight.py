@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.errors import NumericalError
-from design.sphere.corners import edge_corners, polar_about, touched_points
-from design.sphere.regions import Field
+from scanwright.design.errors import NumericalError
+from scanwright.design.sphere.corners import edge_corners, polar_about, touched_points
+from scanwright.design.sphere.regions import Field
 
 UP = np.array([0.0, 0.0, 1.0])
 RELATIVE_ERROR = 1e-5  # a hundredth of what a quadrature may be off by

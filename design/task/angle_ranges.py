@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from design.arrays import Array
-from design.record import Record
-from design.task.equivalent_settings import BOUNDS, advice
-from design.task.shapes import Number, Span
+from scanwright.design.arrays import Array
+from scanwright.design.record import Record
+from scanwright.design.task.equivalent_settings import BOUNDS, advice
+from scanwright.design.task.shapes import Number, Span
 
 Angle = Number | Span
 """One value fixes the angle; two are the range to search, in degrees."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from design.arrays import Array
-from design.errors import TaskError
-from design.record import read_npy, read_text
+from scanwright.design.arrays import Array
+from scanwright.design.errors import TaskError
+from scanwright.design.record import read_npy, read_text
 
 _MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg a pixel
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from design.errors import TaskError, suggest
-from design.record import read_toml
+from scanwright.design.errors import TaskError, suggest
+from scanwright.design.record import read_toml
 
 
 def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:

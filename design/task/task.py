@@ -16,22 +16,22 @@ from typing import Annotated, Any, Literal, TypeVar
 import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from design.angles import Angles, AngleSet
-from design.arrays import Array
-from design.camera import Camera
-from design.catalogue.catalogue import Catalogue, load_catalogue
-from design.catalogue.products import Lidar, Servo
-from design.deck_holes import DeckHoles
-from design.errors import ScanwrightError, TaskError
-from design.motion import Motion, Shortest, Sweep
-from design.record import Fault, Record, faults_of, tell
-from design.scanner import NO_MODULES, Modules, Scanner, scanner_of
-from design.scene.surface import Surface, cast_surface
-from design.task.angle_ranges import NAMES, AngleRanges
-from design.task.map_file import read_map
-from design.task.named_products import NAMED, motion_faults
-from design.task.named_record import named_table, names_in
-from design.task.shapes import (
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.camera import Camera
+from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.deck_holes import DeckHoles
+from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.motion import Motion, Shortest, Sweep
+from scanwright.design.record import Fault, Record, faults_of, tell
+from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
+from scanwright.design.scene.surface import Surface, cast_surface
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
+from scanwright.design.task.map_file import read_map
+from scanwright.design.task.named_products import NAMED, motion_faults
+from scanwright.design.task.named_record import named_table, names_in
+from scanwright.design.task.shapes import (
     LITTLE,
     BoxRegion,
     GridStep,

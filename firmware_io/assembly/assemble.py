@@ -19,23 +19,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from design.angles import AngleSet
-from design.atomic_file import check_place
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.concurrency.ahead import ahead
-from design.errors import RecordingError, suggest
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.beam_outcome import Verdict, between_surfaces
-from firmware_io.assembly.cloud_rows import COLUMNS, cloud_fields, cloud_rows
-from firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.turns import turn_starts
-from firmware_io.clouds.cloud import COLUMN_TYPES
-from firmware_io.clouds.ply import PlyWriter
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.recording import Recording, open_recording
-from firmware_io.samples import Block, straight
+from scanwright.design.angles import AngleSet
+from scanwright.design.atomic_file import check_place
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.concurrency.ahead import ahead
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.assembly.beam_outcome import Verdict, between_surfaces
+from scanwright.firmware_io.assembly.cloud_rows import COLUMNS, cloud_fields, cloud_rows
+from scanwright.firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.turns import turn_starts
+from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
+from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.recording import Recording, open_recording
+from scanwright.firmware_io.samples import Block, straight
 
 Per = Literal["recording", "turn", "half"]
 _WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}

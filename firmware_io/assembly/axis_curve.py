@@ -19,8 +19,8 @@ from jaxtyping import Float64
 from numpy import ndarray
 from scipy.linalg import solveh_banded
 
-from design.arrays import Floats, Ints
-from firmware_io.samples import AxisCurve, JointLog, straight
+from scanwright.design.arrays import Floats, Ints
+from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
 _LEAST = 32  # samples; with fewer there is nothing to average
 _FINEST = 4  # samples to a knot

@@ -13,8 +13,8 @@ from bisect import bisect_left, bisect_right
 
 import numpy as np
 
-from firmware_io.assembly.axis_curve import smooth
-from firmware_io.samples import AxisCurve, JointLog, JointSample, straight
+from scanwright.firmware_io.assembly.axis_curve import smooth
+from scanwright.firmware_io.samples import AxisCurve, JointLog, JointSample, straight
 
 HISTORY_NS = 4_000_000_000  # of samples are fitted: a dozen knots, so that cross-validation has something to judge
 _MOST_SAMPLES = 20_000  # 5 kHz for that long

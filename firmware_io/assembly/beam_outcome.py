@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 from numpy import ndarray
 
-from design.arrays import Floats
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.samples import Block, Scan
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.samples import Block, Scan
 
 
 class Verdict(IntEnum):

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_io.assembly.deskew_kernel import PlacedBlock
-from firmware_io.clouds.cloud import COLUMN_TYPES
-from firmware_io.samples import Block
+from scanwright.firmware_io.assembly.deskew_kernel import PlacedBlock
+from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
+from scanwright.firmware_io.samples import Block
 
 COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
 """What a cloud can tell of each point beside x y z."""

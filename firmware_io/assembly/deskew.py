@@ -18,12 +18,12 @@ import numpy as np
 from jaxtyping import Float64, Int64, UInt8
 from numpy import ndarray
 
-from design import frames
-from design.angles import AngleSet
-from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.samples import AxisCurve, JointLog, Scan
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.samples import AxisCurve, JointLog, Scan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,13 +20,13 @@ from jaxtyping import Float32, Float64, UInt8
 from numba import njit
 from numpy import ndarray
 
-from design.angles import AngleSet
-from design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
-from design.concurrency.parallel import in_chunks
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.poses.trajectory import PosePieces, Trajectory, at_rest
-from firmware_io.samples import AxisCurve, Block, JointLog, Scan, straight
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array, Bytes, Float32s, Floats, Mask, Times
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.poses.trajectory import PosePieces, Trajectory, at_rest
+from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)

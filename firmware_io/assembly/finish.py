@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.angles import AngleSet
-from design.arrays import Floats
-from design.errors import RecordingError
-from firmware_io.assembly.assemble import AssembleSummary
-from firmware_io.clouds import filters
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
-from firmware_io.poses.trajectory import Trajectory
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.assemble import AssembleSummary
+from scanwright.firmware_io.clouds import filters
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.firmware_io.poses.trajectory import Trajectory
 
 SeenFrom = Callable[[Cloud], Float64[ndarray, "n 3"]]
 

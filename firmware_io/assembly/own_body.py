@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from design.shadow import load_own_body
+from scanwright.design.shadow import load_own_body
 
 FILE_NAME = "own_body.npz"
 _TURN = 2 * np.pi

@@ -23,13 +23,13 @@ import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 from numpy import ndarray
 
-from design.angles import AngleSet
-from design.errors import RecordingError
-from firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow
-from firmware_io.assembly.deskew_kernel import place_block
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.poses.trajectory import Trajectory, trajectory_of
-from firmware_io.samples import JointSample, PoseSample, Scan, blocks
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow
+from scanwright.firmware_io.assembly.deskew_kernel import place_block
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
+from scanwright.firmware_io.samples import JointSample, PoseSample, Scan, blocks
 
 LOOK_AHEAD_S = 0.35
 MOST_WAITING = 400  # scans; ten seconds of the fastest sensors

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int64
 from numpy import ndarray
 
-from firmware_io.samples import JointLog
+from scanwright.firmware_io.samples import JointLog
 
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
 

@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.calibration.entropy import witness
-from firmware_io.calibration.estimate import Estimate, estimate
-from firmware_io.calibration.lag import find_lag
-from firmware_io.calibration.model import Mount, gather, start_vector
-from firmware_io.calibration.report import calibration_report, lines
-from firmware_io.calibration.tiles import fan_side
-from firmware_io.recording.recording import Recording, open_recording
+from scanwright.design.angles import AngleSet
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.calibration.entropy import witness
+from scanwright.firmware_io.calibration.estimate import Estimate, estimate
+from scanwright.firmware_io.calibration.lag import find_lag
+from scanwright.firmware_io.calibration.model import Mount, gather, start_vector
+from scanwright.firmware_io.calibration.report import calibration_report, lines
+from scanwright.firmware_io.calibration.tiles import fan_side
+from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 
 @dataclass(frozen=True, slots=True)

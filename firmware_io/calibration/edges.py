@@ -13,10 +13,10 @@ from jaxtyping import Bool, Float64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Floats, Ints
-from firmware_io.calibration.model import Mount, beam_rays
-from firmware_io.calibration.solve import Grouping
-from firmware_io.calibration.tiles import FlatTiles
+from scanwright.design.arrays import Floats, Ints
+from scanwright.firmware_io.calibration.model import Mount, beam_rays
+from scanwright.firmware_io.calibration.solve import Grouping
+from scanwright.firmware_io.calibration.tiles import FlatTiles
 
 _APART = 6.0
 _OUT = 4.0  # 2 % of the beams that are 6 off come this near, and 1 of 16,000 that belong go with them

@@ -23,10 +23,10 @@ from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from design.arrays import Floats
-from firmware_io.calibration.model import MOUNT, PARAMETERS, Mount, ReturnedBeams, beam_rays
-from firmware_io.calibration.observable import stood_still
-from firmware_io.calibration.scans import Scans
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.calibration.model import MOUNT, PARAMETERS, Mount, ReturnedBeams, beam_rays
+from scanwright.firmware_io.calibration.observable import stood_still
+from scanwright.firmware_io.calibration.scans import Scans
 
 _SAMPLE = 15_000  # points of each side
 _REACH = 4.0  # widths: pairs farther apart add nothing

@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.arrays import Floats, Ints
-from firmware_io.calibration.edges import clear_of_edges
-from firmware_io.calibration.model import (
+from scanwright.design.arrays import Floats, Ints
+from scanwright.firmware_io.calibration.edges import clear_of_edges
+from scanwright.firmware_io.calibration.model import (
     BACKLASH,
     COUNT,
     LAG,
@@ -20,11 +20,20 @@ from firmware_io.calibration.model import (
     ReturnedBeams,
     beam_rays,
 )
-from firmware_io.calibration.observable import Choice, check_fan, choose_observable, several_speeds, spectrum
-from firmware_io.calibration.solve import Grouping, bulge_m, covariance, misfits, moved_by_last, reduced, step, sums
-from firmware_io.calibration.surfaces import group, without_misfits
-from firmware_io.calibration.tiles import FlatTiles, flat_tiles
-from firmware_io.calibration.unrest.drift import Drift, drifts
+from scanwright.firmware_io.calibration.observable import Choice, check_fan, choose_observable, several_speeds, spectrum
+from scanwright.firmware_io.calibration.solve import (
+    Grouping,
+    bulge_m,
+    covariance,
+    misfits,
+    moved_by_last,
+    reduced,
+    step,
+    sums,
+)
+from scanwright.firmware_io.calibration.surfaces import group, without_misfits
+from scanwright.firmware_io.calibration.tiles import FlatTiles, flat_tiles
+from scanwright.firmware_io.calibration.unrest.drift import Drift, drifts
 
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))

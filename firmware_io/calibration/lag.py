@@ -24,10 +24,10 @@ import numpy as np
 from jaxtyping import Bool, Float64
 from numpy import ndarray
 
-from design.arrays import Floats, Mask
-from design.errors import RecordingError
-from firmware_io.recording.recording import Recording
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.arrays import Floats, Mask
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.recording import Recording
+from scanwright.firmware_io.samples import JointLog, Scan
 
 _CAP_M = 0.05  # a few times the noise of 2D lidars (10 to 30 mm), far below the depth of edges
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash, not the way back

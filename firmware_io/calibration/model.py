@@ -19,17 +19,17 @@ from jaxtyping import Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design import frames
-from design.angles import AngleSet
-from design.arrays import Floats, Rotation
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import RecordingError
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.recording.recording import Recording
-from firmware_io.samples import AxisCurve
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats, Rotation
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.recording.recording import Recording
+from scanwright.firmware_io.samples import AxisCurve
 
 _SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
 STANDING_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step

@@ -12,13 +12,13 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 
-from design.arrays import Floats, Ints
-from design.errors import RecordingError
-from firmware_io.calibration import model
-from firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Mount, ReturnedBeams
-from firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
-from firmware_io.calibration.surfaces import seen_twice
-from firmware_io.calibration.tiles import FlatTiles
+from scanwright.design.arrays import Floats, Ints
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.calibration import model
+from scanwright.firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Mount, ReturnedBeams
+from scanwright.firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
+from scanwright.firmware_io.calibration.surfaces import seen_twice
+from scanwright.firmware_io.calibration.tiles import FlatTiles
 
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
 FLATTEST_FAN_RAD = np.radians(3.0)

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.arrays import Floats
-from firmware_io.calibration.entropy import Witness
-from firmware_io.calibration.estimate import Estimate
-from firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
-from firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
-from firmware_io.calibration.unrest.second_looks import SecondLooks, second_looks
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.calibration.entropy import Witness
+from scanwright.firmware_io.calibration.estimate import Estimate
+from scanwright.firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
+from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
+from scanwright.firmware_io.calibration.unrest.second_looks import SecondLooks, second_looks
 
 _WALLS = 3
 _FEW = 3  # beams that a slim thing may leave where others went through

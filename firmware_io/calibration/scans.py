@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Floats, Ints, Mask
-from firmware_io.calibration.model import ReturnedBeams
+from scanwright.design.arrays import Floats, Ints, Mask
+from scanwright.firmware_io.calibration.model import ReturnedBeams
 
 _ROW_RAD = 4 * np.pi
 

@@ -19,8 +19,8 @@ from jaxtyping import Float64, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Floats, Ints
-from firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
+from scanwright.design.arrays import Array, Floats, Ints
+from scanwright.firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
 
 _Q = COUNT
 _U = COUNT + 3

@@ -13,11 +13,11 @@ from jaxtyping import Float64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Floats, Ints, Mask
-from design.errors import RecordingError
-from firmware_io.calibration.model import Mount, beam_rays
-from firmware_io.calibration.solve import Grouping
-from firmware_io.calibration.tiles import FlatTiles, normals
+from scanwright.design.arrays import Array, Floats, Ints, Mask
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.calibration.model import Mount, beam_rays
+from scanwright.firmware_io.calibration.solve import Grouping
+from scanwright.firmware_io.calibration.tiles import FlatTiles, normals
 
 _SAMPLE = 200  # tiles: so many tell which planes are the largest
 _REFITS = 15  # a plane grows from its seed to the ends of its wall

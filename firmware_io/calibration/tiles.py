@@ -14,10 +14,10 @@ from jaxtyping import Bool, Float64, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Array, Floats, Ints
-from design.errors import RecordingError
-from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
-from firmware_io.samples import AxisCurve
+from scanwright.design.arrays import Array, Floats, Ints
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
+from scanwright.firmware_io.samples import AxisCurve
 
 _WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
 _LEAST = 12  # beams in a tile: three make a plane, the rest say whether it is one

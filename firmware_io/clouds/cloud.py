@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float, Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design import frames
-from design.arrays import Pose
-from design.errors import RecordingError
+from scanwright.design import frames
+from scanwright.design.arrays import Pose
+from scanwright.design.errors import RecordingError
 
 Column = NDArray[Any]
 

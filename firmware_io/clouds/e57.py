@@ -15,9 +15,9 @@ import numpy as np
 import pye57
 from pye57 import libe57
 
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import (
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import (
     COLUMN_TYPES,
     Cloud,
     Column,
@@ -27,8 +27,8 @@ from firmware_io.clouds.cloud import (
     pose_numbers,
     told,
 )
-from firmware_io.clouds.cloud import held as fitting
-from firmware_io.foreign import foreign, of_file
+from scanwright.firmware_io.clouds.cloud import held as fitting
+from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
 _MOST_PACKED = 8  # points to a byte: three axes of a bit each, with nothing else

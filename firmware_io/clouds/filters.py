@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int64
 from numpy import ndarray
 
-from design.arrays import Floats
-from design.errors import RecordingError
+from scanwright.design.arrays import Floats
+from scanwright.design.errors import RecordingError
 
 NEIGHBOURS = 12
 _AT_ONCE = 1 << 16

@@ -9,10 +9,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from design.atomic_file import check_place
-from design.errors import RecordingError, require, suggest
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.foreign import of_file
+from scanwright.design.atomic_file import check_place
+from scanwright.design.errors import RecordingError, require, suggest
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.foreign import of_file
 
 _FORMATS = {  # suffix: module of this folder, and the packages of the extra `clouds` that it needs
     ".ply": ("ply",),
@@ -125,4 +125,4 @@ def _format(path: Path) -> Any:
     if suffix == ".e57" and platform.machine() == "aarch64":
         need += ", which has no wheel for Linux on aarch64: take another format, or on another computer"
     require("clouds", need, *packages)
-    return import_module(f"firmware_io.clouds.{module}")
+    return import_module(f"scanwright.firmware_io.clouds.{module}")

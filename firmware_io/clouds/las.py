@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design import frames
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
-from firmware_io.foreign import foreign
+from scanwright.design import frames
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
+from scanwright.firmware_io.foreign import foreign
 
 _STEPS_M = (1e-4, 1e-3, 1e-2)
 _MOST_STEPS = 2**31 - 1

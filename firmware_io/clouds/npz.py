@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from design.record import read_npz
-from firmware_io.clouds.cloud import Cloud
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_npz
+from scanwright.firmware_io.clouds.cloud import Cloud
 
 _COLUMN = "column."
 

@@ -12,11 +12,11 @@ from numpy.lib import recfunctions
 from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, PointCloud
 
-from design.arrays import Pose
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
-from firmware_io.foreign import foreign
+from scanwright.design.arrays import Pose
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
+from scanwright.firmware_io.foreign import foreign
 
 _LONGEST_HEADER = 1 << 16
 _DIGITS = 16

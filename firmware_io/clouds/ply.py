@@ -18,10 +18,10 @@ from jaxtyping import Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
-from firmware_io.foreign import foreign
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
+from scanwright.firmware_io.foreign import foreign
 
 _WORDS = {
     "|i1": "char",

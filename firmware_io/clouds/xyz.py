@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from design.record import read_text
-from firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
-from firmware_io.foreign import foreign
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_text
+from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
+from scanwright.firmware_io.foreign import foreign
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
 _TYPES = {"|i1", "|u1", *(f"<{kind}{size}" for kind in "iu" for size in (2, 4, 8)), *_DIGITS}

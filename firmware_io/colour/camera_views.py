@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from design.angles import AngleSet
-from design.arrays import Pose
-from design.camera import Camera
-from design.errors import RecordingError
-from design.record import read_text
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.foreign import foreign
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.recording import Recording
-from firmware_io.samples import AxisCurve, straight
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Pose
+from scanwright.design.camera import Camera
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_text
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.recording import Recording
+from scanwright.firmware_io.samples import AxisCurve, straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,16 +21,16 @@ from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design import frames
-from design.angles import AngleSet
-from design.arrays import Floats, Times
-from design.camera import Camera
-from design.errors import TaskError
-from design.task.task import LoadedTask
-from firmware_io.clouds.ply import PlyWriter, read_header, read_ply
-from firmware_io.colour.camera_views import CameraView, load_views, opened
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.recording import Recording, open_recording
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.camera import Camera
+from scanwright.design.errors import TaskError
+from scanwright.design.task.task import LoadedTask
+from scanwright.firmware_io.clouds.ply import PlyWriter, read_header, read_ply
+from scanwright.firmware_io.colour.camera_views import CameraView, load_views, opened
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 COLOURS = ("red", "green", "blue", "alpha")
 """Columns of a coloured cloud, bytes; alpha is 255 where there is a colour and 0 where not."""

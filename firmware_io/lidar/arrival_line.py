@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from firmware_io.lidar.tick_line import half_hull, middle_slope
+from scanwright.firmware_io.lidar.tick_line import half_hull, middle_slope
 
 _BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
 _BUCKETS = 300

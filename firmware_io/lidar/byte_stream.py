@@ -10,8 +10,8 @@ import struct
 import termios
 from typing import Protocol
 
-from design.errors import DeviceError
-from firmware_io.serial_port import open_serial_port
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.serial_port import open_serial_port
 
 FIRST_BAUD = 115_200
 

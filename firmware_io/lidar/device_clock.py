@@ -22,8 +22,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from design.errors import DeviceError
-from firmware_io.lidar.tick_line import StampLine, half_hull, middle_slope
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar.tick_line import StampLine, half_hull, middle_slope
 
 STAMP_WRAP_MS = 1 << 24  # SCIP 2.0, p. 12
 

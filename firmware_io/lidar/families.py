@@ -8,24 +8,26 @@ from __future__ import annotations
 
 from functools import cache
 
-from design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, suggest
-from firmware_io.installed import with_installed
-from firmware_io.lidar.ldrobot.driver import open_ldrobot
-from firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
-from firmware_io.lidar.lms2xx.driver import open_lms2xx
-from firmware_io.lidar.scip.driver import open_scip
-from firmware_io.lidar.sick.driver import open_sick
-from firmware_io.lidar.slamtec.driver import open_slamtec
+from scanwright.design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, suggest
+from scanwright.firmware_io.installed import with_installed
+from scanwright.firmware_io.lidar.ldrobot.driver import open_ldrobot
+from scanwright.firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
+from scanwright.firmware_io.lidar.lms2xx.driver import open_lms2xx
+from scanwright.firmware_io.lidar.scip.driver import open_scip
+from scanwright.firmware_io.lidar.sick.driver import open_sick
+from scanwright.firmware_io.lidar.slamtec.driver import open_slamtec
 
 # where no model is named they are tried in this order: who only listens first
 FAMILIES = (
-    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "firmware_io.twins.ldrobot:ldrobot_twin"),
-    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, "firmware_io.twins.lidar:scip_twin", stamp_choice=True),
-    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "firmware_io.twins.slamtec:slamtec_twin"),
-    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, "firmware_io.twins.sick.cola_twin:sick_twin"),
-    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, "firmware_io.twins.sick.lms_twin:lms_twin"),
+    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "scanwright.firmware_io.twins.ldrobot:ldrobot_twin"),
+    LidarFamily(
+        "scip", "Hokuyo (SCIP 2.0)", open_scip, "scanwright.firmware_io.twins.lidar:scip_twin", stamp_choice=True
+    ),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "scanwright.firmware_io.twins.slamtec:slamtec_twin"),
+    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, "scanwright.firmware_io.twins.sick.cola_twin:sick_twin"),
+    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, "scanwright.firmware_io.twins.sick.lms_twin:lms_twin"),
 )
 
 

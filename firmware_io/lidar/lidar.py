@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from firmware_io.samples import Scan
+from scanwright.firmware_io.samples import Scan
 
 StampAt = Literal["step_0", "rear"]
 

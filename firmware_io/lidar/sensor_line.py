@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
-from firmware_io.lidar.byte_stream import SerialStream, open_stream
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
+from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
 
 _POLL_S = 0.05
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is

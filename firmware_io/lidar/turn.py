@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float32, Float64
 from numpy import ndarray
 
-from design.catalogue.products import Lidar
-from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.lidar import TimedScan
-from firmware_io.samples import Scan
+from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.lidar import TimedScan
+from scanwright.firmware_io.samples import Scan
 
 _BACK_DEG = 10.0  # by which the angle of a point may lie before that of the one before it
 

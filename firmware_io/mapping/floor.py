@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 
-from design.errors import RecordingError
+from scanwright.design.errors import RecordingError
 
 _CELL_M = 0.25
 _THICK_M = 0.1  # of the layer that is taken for one level: three sigmas of the noisiest sensor either way, and a carpet

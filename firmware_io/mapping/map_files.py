@@ -8,17 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from design import frames
-from design.angles import AngleSet
-from design.arrays import Vector
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds
-from firmware_io.mapping.floor import find_floor
-from firmware_io.mapping.map_server import check_map_place, write_map
-from firmware_io.mapping.occupancy import FREE, OCCUPIED, Heights, OccupancyGrid, check_resolution, occupancy_grid
-from firmware_io.mapping.seen_through import Stand, seen_through
-from firmware_io.registration.poses import cloud_names, read_poses
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Vector
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds
+from scanwright.firmware_io.mapping.floor import find_floor
+from scanwright.firmware_io.mapping.map_server import check_map_place, write_map
+from scanwright.firmware_io.mapping.occupancy import (
+    FREE,
+    OCCUPIED,
+    Heights,
+    OccupancyGrid,
+    check_resolution,
+    occupancy_grid,
+)
+from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
+from scanwright.firmware_io.registration.poses import cloud_names, read_poses
 
 _COUNT = "count"  # of points in a voxel, as `merge` of the registration writes it
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError
-from firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 _SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
 # 205 means 0.19608: above the lower threshold it stays unknown. Nav2's own default, 0.25, would make it free.

@@ -11,8 +11,8 @@ from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.arrays import Floats
-from design.errors import RecordingError
+from scanwright.design.arrays import Floats
+from scanwright.design.errors import RecordingError
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 """Values of a cell, as nav_msgs/OccupancyGrid has them."""

@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from design.arrays import Vector
-from design.errors import RecordingError
+from scanwright.design.arrays import Vector
+from scanwright.design.errors import RecordingError
 
 _BEAMS = 10  # fewer lie on one side of a point, or all miss a thin thing: benchmarks/firmware_io/mapping/
 _REACH = 2.0  # times the usual angle to the tenth beam: where they are farther off, nobody looked

@@ -17,9 +17,9 @@ from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from design.arrays import Floats, Times
-from design.errors import RecordingError
-from firmware_io.poses.trajectory import Trajectory
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.poses.trajectory import Trajectory
 
 _LONG_GAP = 5.0  # this many usual gaps between two rates, and nobody knows what the platform did
 _NOISE_RAD = math.radians(0.2)  # what poses may be off without a word about the gyro

@@ -12,12 +12,12 @@ from jaxtyping import Float64
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from design.errors import RecordingError, suggest
-from firmware_io.foreign import foreign
-from firmware_io.poses.gyro import Gyro
-from firmware_io.poses.tables import csv_rows
-from firmware_io.recording import ros_messages
-from firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.poses.gyro import Gyro
+from scanwright.firmware_io.poses.tables import csv_rows
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
 
 IMU = "sensor_msgs/msg/Imu"
 STATIC = "/tf_static"

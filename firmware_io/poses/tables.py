@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from design.errors import RecordingError
-from design.record import read_text
-from firmware_io.foreign import foreign
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_text
+from scanwright.firmware_io.foreign import foreign
 
 Row = tuple[int, Sequence[float]]
 """Time [ns], and the numbers beside it."""

@@ -15,9 +15,9 @@ from jaxtyping import Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design import frames
-from design.arrays import Floats, Pose, Times
-from design.errors import RecordingError
+from scanwright.design import frames
+from scanwright.design.arrays import Floats, Pose, Times
+from scanwright.design.errors import RecordingError
 
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _FARTHEST_M = 1e8  # from 0: maps of the Earth's coordinates are 6.4e6 m from its centre

@@ -17,13 +17,13 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from design.arrays import Floats, Times
-from design.errors import RecordingError, suggest
-from design.record import read_text
-from firmware_io.foreign import foreign
-from firmware_io.recording import ros_messages
-from firmware_io.recording.bags import Source, number_at
-from firmware_io.samples import JointLog
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.design.record import read_text
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.bags import Source, number_at
+from scanwright.firmware_io.samples import JointLog
 
 AngleUnit = Literal["deg", "rad"]
 

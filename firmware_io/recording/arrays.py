@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Floats, Times
-from design.errors import RecordingError
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.samples import JointLog, Scan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 
-from design.arrays import Times
-from firmware_io.samples import JointLog
+from scanwright.design.arrays import Times
+from scanwright.firmware_io.samples import JointLog
 
 _SAME_CLOCK_NS = (
     1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock

@@ -17,11 +17,11 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError
-from firmware_io.foreign import foreign
-from firmware_io.recording.bags import Bag, Message, open_bag
-from firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.recording.bags import Bag, Message, open_bag
+from scanwright.firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
 
 _VERSION: Final = 8  # of the metadata of ROS 2 bags: Humble and later read it
 _FOREVER: Final = QosTime(9223372036, 854775807)

@@ -20,9 +20,9 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from design.errors import RecordingError, suggest
-from firmware_io.foreign import foreign, foreign_items
-from firmware_io.recording import ros_messages
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.foreign import foreign, foreign_items
+from scanwright.firmware_io.recording import ros_messages
 
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _SEQUENCES = (list, tuple, np.ndarray)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
-from firmware_io.recording.bag_export import export_bag
+from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
+from scanwright.firmware_io.recording.bag_export import export_bag
 
 
 def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]:

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Floats, Times
-from design.atomic_file import check_place
-from design.errors import RecordingError
-from firmware_io.recording import ros_messages
-from firmware_io.recording.angle_sources import (
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.atomic_file import check_place
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.angle_sources import (
     AngleUnit,
     FrameSource,
     angles_in,
@@ -30,11 +30,25 @@ from firmware_io.recording.angle_sources import (
     turned_rad,
     unit_doubts,
 )
-from firmware_io.recording.bag_clocks import OneClock, Stamps, gap_warnings, held_log, one_clock, times, unwrapped_log
-from firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
-from firmware_io.recording.metadata import held_by, note_in
-from firmware_io.recording.recording import BEAMS_TOPIC, JOINT_TOPIC, SCAN_TOPIC, MessageWriter, RecordingWriter
-from firmware_io.samples import JointLog
+from scanwright.firmware_io.recording.bag_clocks import (
+    OneClock,
+    Stamps,
+    gap_warnings,
+    held_log,
+    one_clock,
+    times,
+    unwrapped_log,
+)
+from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
+from scanwright.firmware_io.recording.metadata import held_by, note_in
+from scanwright.firmware_io.recording.recording import (
+    BEAMS_TOPIC,
+    JOINT_TOPIC,
+    SCAN_TOPIC,
+    MessageWriter,
+    RecordingWriter,
+)
+from scanwright.firmware_io.samples import JointLog
 
 
 @dataclass(frozen=True, slots=True)

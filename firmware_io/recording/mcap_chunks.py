@@ -23,9 +23,9 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import Writer
 
-from design.concurrency.ahead import ahead
-from design.errors import RecordingError
-from firmware_io.foreign import foreign
+from scanwright.design.concurrency.ahead import ahead
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.foreign import foreign
 
 CHUNK_S = 0.25
 """What damage may cost: a chunk holds no more."""

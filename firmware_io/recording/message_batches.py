@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from design.arrays import Bytes, Floats, Ints, Times
-from firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
-from firmware_io.samples import Block, Scan
+from scanwright.design.arrays import Bytes, Floats, Ints, Times
+from scanwright.firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
+from scanwright.firmware_io.samples import Block, Scan
 
 _STAMP = 4  # seconds and nanoseconds, behind the encapsulation
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Final
 
-from design.errors import RecordingError
-from firmware_io.foreign import foreign
-from firmware_io.recording.mcap_chunks import read_note
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.recording.mcap_chunks import read_note
 
 if TYPE_CHECKING:
-    from firmware_io.recording.bags import Bag
+    from scanwright.firmware_io.recording.bags import Bag
 
 NOTE: Final = "scanwright"
 NOTE_TOPIC: Final = "/scanwright/note"

@@ -26,17 +26,17 @@ from jaxtyping import Int64
 from mcap.writer import Writer
 from numpy import ndarray
 
-from design.arrays import Floats, Times
-from design.atomic_file import whole_file
-from design.errors import RecordingError, suggest
-from firmware_io.foreign import foreign
-from firmware_io.recording import ros_messages
-from firmware_io.recording.arrays import RecordingArrays, arrays_of
-from firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
-from firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
-from firmware_io.recording.metadata import NOTE, held_by
-from firmware_io.recording.ros_messages import Beams
-from firmware_io.samples import Block, JointLog, Scan, blocks
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
+from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
+from scanwright.firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
+from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.ros_messages import Beams
+from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"

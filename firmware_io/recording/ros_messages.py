@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
-from design.arrays import Float32s, Floats, Pose, Times
-from firmware_io.clouds.cloud import pose_numbers
-from firmware_io.samples import Scan
+from scanwright.design.arrays import Float32s, Floats, Pose, Times
+from scanwright.firmware_io.clouds.cloud import pose_numbers
+from scanwright.firmware_io.samples import Scan
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 JOINT_STATE = "sensor_msgs/msg/JointState"

@@ -13,7 +13,7 @@ from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.arrays import Floats
+from scanwright.design.arrays import Floats
 
 
 @njit(cache=True)

@@ -15,8 +15,8 @@ from jaxtyping import Float64
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from design import frames
-from design.arrays import Pose
+from scanwright.design import frames
+from scanwright.design.arrays import Pose
 
 _MAX_STEPS = 30
 _SETTLED = 1e-9

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design import frames
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.registration.thin import joined_means, voxel_means
+from scanwright.design import frames
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.registration.thin import joined_means, voxel_means
 
 _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 

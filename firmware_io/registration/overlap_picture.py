@@ -10,11 +10,11 @@ from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from design import frames
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from firmware_io.registration.register import Registration
-from firmware_io.registration.sensor_view import SensorView
+from scanwright.design import frames
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.registration.register import Registration
+from scanwright.firmware_io.registration.sensor_view import SensorView
 
 _SHOWN = 20_000  # points of one cloud: more only blacken the page
 _KEPT_PERCENT = (0.5, 99.5)

@@ -15,11 +15,11 @@ import small_gicp
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from design import frames
-from design.arrays import Floats, Pose
-from firmware_io.registration.cube_map import cells_of
-from firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
-from firmware_io.registration.surfels.adjust import adjust
+from scanwright.design import frames
+from scanwright.design.arrays import Floats, Pose
+from scanwright.firmware_io.registration.cube_map import cells_of
+from scanwright.firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
+from scanwright.firmware_io.registration.surfels.adjust import adjust
 
 _COARSE_REACH_M = 1.0
 _COARSE_NEAR = 3  # times the spacing

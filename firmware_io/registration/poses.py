@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.arrays import Pose
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from design.record import read_text
-from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
-from firmware_io.foreign import foreign, of_file
+from scanwright.design.arrays import Pose
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_text
+from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
+from scanwright.firmware_io.foreign import foreign, of_file
 
 _AXES = ("rx", "ry", "rz", "x", "y", "z")
 

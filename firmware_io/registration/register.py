@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.arrays import Floats, Pose
-from firmware_io.registration.graph import Edge, Graph, solve_graph
-from firmware_io.registration.pairwise import Pair, align, near_share, refused
-from firmware_io.registration.sensor_view import SensorView
-from firmware_io.registration.start import find_start
+from scanwright.design.arrays import Floats, Pose
+from scanwright.firmware_io.registration.graph import Edge, Graph, solve_graph
+from scanwright.firmware_io.registration.pairwise import Pair, align, near_share, refused
+from scanwright.firmware_io.registration.sensor_view import SensorView
+from scanwright.firmware_io.registration.start import find_start
 
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach

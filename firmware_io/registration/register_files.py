@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.atomic_file import check_place
-from design.errors import RecordingError
-from firmware_io.clouds.formats import check_target, read_clouds, write_clouds
-from firmware_io.registration.merge import merge
-from firmware_io.registration.overlap_picture import overlap_picture
-from firmware_io.registration.pairwise import Pair
-from firmware_io.registration.poses import cloud_names, read_poses, write_covariances, write_poses
-from firmware_io.registration.register import Registration, register
-from firmware_io.registration.sensor_view import make_view
+from scanwright.design.angles import AngleSet
+from scanwright.design.atomic_file import check_place
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
+from scanwright.firmware_io.registration.merge import merge
+from scanwright.firmware_io.registration.overlap_picture import overlap_picture
+from scanwright.firmware_io.registration.pairwise import Pair
+from scanwright.firmware_io.registration.poses import cloud_names, read_poses, write_covariances, write_poses
+from scanwright.firmware_io.registration.register import Registration, register
+from scanwright.firmware_io.registration.sensor_view import make_view
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,11 +10,11 @@ import small_gicp
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 
-from design.angles import AngleSet
-from design.errors import RecordingError
-from firmware_io.registration.cube_map import DepthMap, depth_map
-from firmware_io.registration.surfels.beams import Beams
-from firmware_io.registration.thin import beam_step_rad, thin, voxel_means
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.registration.cube_map import DepthMap, depth_map
+from scanwright.firmware_io.registration.surfels.beams import Beams
+from scanwright.firmware_io.registration.thin import beam_step_rad, thin, voxel_means
 
 THREADS = os.cpu_count() or 1
 _NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py

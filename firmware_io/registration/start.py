@@ -16,10 +16,10 @@ from jaxtyping import Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design import frames
-from design.arrays import Floats, Pose
-from firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
-from firmware_io.registration.sensor_view import SensorView
+from scanwright.design import frames
+from scanwright.design.arrays import Floats, Pose
+from scanwright.firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
+from scanwright.firmware_io.registration.sensor_view import SensorView
 
 _CELL_M = 0.25
 _HEADINGS = 120  # 3 deg apart: within a cell of the truth up to 10 m

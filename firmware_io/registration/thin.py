@@ -17,8 +17,8 @@ from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from design.arrays import Floats
-from firmware_io.registration.cube_map import cells_of, solid_angles_sr
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.registration.cube_map import cells_of, solid_angles_sr
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
 _LEVELS = 3  # voxels grow up to 2**3 times; where lines are still farther apart nothing is known between them

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
-from design.errors import DeviceError
-from design.motion import Motion, Spin
-from firmware_io.scan.acquire import acquire
-from firmware_io.scan.live_feed import NOBODY, Both, Watch
-from firmware_io.scan.plan import ScanPlan
-from firmware_io.servo.fitness import ServoSetupError
+from scanwright.design.errors import DeviceError
+from scanwright.design.motion import Motion, Spin
+from scanwright.firmware_io.scan.acquire import acquire
+from scanwright.firmware_io.scan.live_feed import NOBODY, Both, Watch
+from scanwright.firmware_io.scan.plan import ScanPlan
+from scanwright.firmware_io.servo.fitness import ServoSetupError
 
 AGAIN_S = 3.0
 _ASKED_S = 1.0

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2, PointField
 
-from design.arrays import Pose
-from firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
-from firmware_io.samples import Scan
+from scanwright.design.arrays import Pose
+from scanwright.firmware_io.recording.ros_messages import LASER_FRAME, POINT_FIELD_TYPES, SPIN_JOINT
+from scanwright.firmware_io.samples import Scan
 
 
 def time_of(time_ns: int) -> Any:

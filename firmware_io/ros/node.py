@@ -36,16 +36,16 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import String
 
-from design import frames
-from design.angles import AngleSet
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.streaming import Assembler, ScanPoints
-from firmware_io.ros import messages
-from firmware_io.ros.drive import Interrupted
-from firmware_io.ros.point_rows import in_rot, point_rows, turn_rows
-from firmware_io.ros.robot_frames import fixed_frames
-from firmware_io.ros.turns import Turns
-from firmware_io.samples import JointSample, Scan
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.streaming import Assembler, ScanPoints
+from scanwright.firmware_io.ros import messages
+from scanwright.firmware_io.ros.drive import Interrupted
+from scanwright.firmware_io.ros.point_rows import in_rot, point_rows, turn_rows
+from scanwright.firmware_io.ros.robot_frames import fixed_frames
+from scanwright.firmware_io.ros.turns import Turns
+from scanwright.firmware_io.samples import JointSample, Scan
 
 PointsFrame = Literal["world", "rot"]
 _DIAGNOSED_S = 1.0

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from design.angles import AngleSet
-from firmware_io.assembly.streaming import ScanPoints
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.streaming import ScanPoints
 
 POINT = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("t", "<u4"), ("ring", "<u2")],

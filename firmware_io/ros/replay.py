@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator
 from heapq import merge
 from pathlib import Path
 
-from design.errors import RecordingError
-from firmware_io.recording.recording import open_recording
-from firmware_io.samples import JointSample, Scan
-from firmware_io.scan.live_feed import Watch
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.samples import JointSample, Scan
+from scanwright.firmware_io.scan.live_feed import Watch
 
 
 def replay(

@@ -16,12 +16,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from design import frames
-from design.angles import AngleSet
-from design.arrays import Array, Pose
-from design.atomic_file import whole_file
-from design.errors import RecordingError
-from design.record import read_text
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array, Pose
+from scanwright.design.atomic_file import whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.design.record import read_text
 
 URDF = "scanner.urdf"
 _RANGE_M = 10.0

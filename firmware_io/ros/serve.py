@@ -6,17 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.angles import angles_in_use
-from design.errors import RecordingError
-from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.recording.mcap_chunks import read_note
-from firmware_io.recording.metadata import NOTE, held_by
-from firmware_io.ros.drive import drive
-from firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
-from firmware_io.ros.replay import replay
-from firmware_io.ros.robot_frames import description
-from firmware_io.scan.live_feed import NOBODY, Watch
-from firmware_io.scan.plan import ScanPlan
+from scanwright.design.angles import angles_in_use
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.recording.mcap_chunks import read_note
+from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.ros.drive import drive
+from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
+from scanwright.firmware_io.ros.replay import replay
+from scanwright.firmware_io.ros.robot_frames import description
+from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.plan import ScanPlan
 
 Say = Callable[[str], None]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.assembly.streaming import ScanPoints
+from scanwright.firmware_io.assembly.streaming import ScanPoints
 
 BACK_RAD = math.radians(1.0)  # turning back by less is noise or backlash
 MOST_BEAMS = 10_000_000

@@ -18,21 +18,21 @@ from threading import Event
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.errors import DeviceError
-from design.motion import Motion, Spin, StopAndGo
-from firmware_io.lidar.families import open_lidar
-from firmware_io.lidar.lidar import LidarDriver
-from firmware_io.recording import ros_messages
-from firmware_io.samples import Scan
-from firmware_io.scan.axis_thread import AxisThread, turning_servo
-from firmware_io.scan.lidar_scans import LidarScans, Say, settle_clock
-from firmware_io.scan.live_feed import NOBODY, Watch
-from firmware_io.scan.plan import ScanPlan
-from firmware_io.scan.recorder import recorder_of
-from firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
-from firmware_io.servo.progress import ServoState
-from firmware_io.servo.servo import open_servo
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import DeviceError
+from scanwright.design.motion import Motion, Spin, StopAndGo
+from scanwright.firmware_io.lidar.families import open_lidar
+from scanwright.firmware_io.lidar.lidar import LidarDriver
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
+from scanwright.firmware_io.scan.lidar_scans import LidarScans, Say, settle_clock
+from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.plan import ScanPlan
+from scanwright.firmware_io.scan.recorder import recorder_of
+from scanwright.firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
+from scanwright.firmware_io.servo.progress import ServoState
+from scanwright.firmware_io.servo.servo import open_servo
 
 _STEADY_PATIENCE_S = 15.0
 _MOST_SPEEDS = 3600  # an hour of them, from which the mean is told

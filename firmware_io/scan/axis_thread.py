@@ -18,12 +18,12 @@ from threading import Event, Thread
 
 import numpy as np
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from design.motion import Motion
-from firmware_io.samples import Scan
-from firmware_io.scan.setpoints import Move, course
-from firmware_io.servo.progress import ServoState
-from firmware_io.servo.servo import ServoDriver
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.design.motion import Motion
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.setpoints import Move, course
+from scanwright.firmware_io.servo.progress import ServoState
+from scanwright.firmware_io.servo.servo import ServoDriver
 
 SERVO_HZ = 100.0
 

@@ -16,18 +16,18 @@ from typing import Literal
 
 import numpy as np
 
-from design.angles import AngleSet, load_angles
-from design.errors import DeviceError
-from design.motion import Spin
-from firmware_io.device_ports import emulated, lidar_ports, servo_ports
-from firmware_io.lidar.families import open_lidar
-from firmware_io.scan.acquire import check_model
-from firmware_io.scan.axis_thread import SERVO_HZ
-from firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
-from firmware_io.serial_port import latency_timer
-from firmware_io.servo import settings
-from firmware_io.servo.examine import examine_servo
-from firmware_io.servo.fitness import ServoSetupError
+from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.errors import DeviceError
+from scanwright.design.motion import Spin
+from scanwright.firmware_io.device_ports import emulated, lidar_ports, servo_ports
+from scanwright.firmware_io.lidar.families import open_lidar
+from scanwright.firmware_io.scan.acquire import check_model
+from scanwright.firmware_io.scan.axis_thread import SERVO_HZ
+from scanwright.firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
+from scanwright.firmware_io.serial_port import latency_timer
+from scanwright.firmware_io.servo import settings
+from scanwright.firmware_io.servo.examine import examine_servo
+from scanwright.firmware_io.servo.fitness import ServoSetupError
 
 _LOOK_S = 4.0
 _BOUND_MS = 2.0

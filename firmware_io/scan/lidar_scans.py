@@ -9,10 +9,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from design.errors import DeviceError, DeviceFaultError
-from firmware_io.lidar.lidar import LidarDriver, TimedScan
-from firmware_io.samples import Scan
-from firmware_io.scan.axis_thread import AxisThread
+from scanwright.design.errors import DeviceError, DeviceFaultError
+from scanwright.firmware_io.lidar.lidar import LidarDriver, TimedScan
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.axis_thread import AxisThread
 
 Say = Callable[[str], None]
 CLOCK_GOOD_NS = 500_000

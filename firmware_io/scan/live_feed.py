@@ -18,12 +18,12 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
-from design.angles import AngleSet
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.streaming import Assembler
-from firmware_io.samples import JointSample, Scan
-from firmware_io.scan.scan_end import ScanEnd
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.streaming import Assembler
+from scanwright.firmware_io.samples import JointSample, Scan
+from scanwright.firmware_io.scan.scan_end import ScanEnd
 
 MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
 MOST_ANGLES = 2000

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from design.angles import CALIBRATED, AngleSet, angles_in_use
-from design.atomic_file import check_place, place_in
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import DeviceError, RecordingError
-from design.motion import Motion, Spin
-from firmware_io.device_ports import Ports, find_ports
-from firmware_io.lidar.lidar import StampAt
+from scanwright.design.angles import CALIBRATED, AngleSet, angles_in_use
+from scanwright.design.atomic_file import check_place, place_in
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import DeviceError, RecordingError
+from scanwright.design.motion import Motion, Spin
+from scanwright.firmware_io.device_ports import Ports, find_ports
+from scanwright.firmware_io.lidar.lidar import StampAt
 
 _LONGEST_S = 7 * 24 * 3600.0
 

@@ -20,10 +20,10 @@ from types import TracebackType
 
 from mcap.writer import Writer
 
-from design.errors import RecordingError
-from firmware_io.recording.mcap_chunks import CHUNK_S
-from firmware_io.recording.recording import MessageWriter
-from firmware_io.samples import Scan
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.mcap_chunks import CHUNK_S
+from scanwright.firmware_io.recording.recording import MessageWriter
+from scanwright.firmware_io.samples import Scan
 
 
 class Recorder:

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from design.errors import ScanwrightError, UnsafeError, UnsafeNote, notes_of
-from firmware_io.scan.scan_summary import ScanSummary
+from scanwright.design.errors import ScanwrightError, UnsafeError, UnsafeNote, notes_of
+from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 

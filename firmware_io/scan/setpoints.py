@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import cycle
 
-from design.motion import Motion, Spin, Sweep
+from scanwright.design.motion import Motion, Spin, Sweep
 
 _LEAD_S = 0.5  # to come to rest after the way to the start
 

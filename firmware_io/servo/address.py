@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from design.errors import DeviceError
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.bus.unit import PING_S, ServoUnit
-from firmware_io.servo.find import all_answering, find_servo, listen_first, open_bus
-from firmware_io.servo.settings import changed, check_torque, keep_settings
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.bus.unit import PING_S, ServoUnit
+from scanwright.firmware_io.servo.find import all_answering, find_servo, listen_first, open_bus
+from scanwright.firmware_io.servo.settings import changed, check_torque, keep_settings
 
 _IDS = range(253)
 

@@ -7,8 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass
 from statistics import median
 
-from firmware_io.servo.find import find_servo, listen_first, open_bus
-from firmware_io.servo.fitness import SettingChange, slow_adapter, unfit_settings
+from scanwright.firmware_io.servo.find import find_servo, listen_first, open_bus
+from scanwright.firmware_io.servo.fitness import SettingChange, slow_adapter, unfit_settings
 
 _READS = 100
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from design.catalogue.catalogue import SERVO_GROUP
-from firmware_io.installed import with_installed
-from firmware_io.servo.bus.packet_format import PacketFormat
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.servo.dynamixel.tables import TABLES as DYNAMIXEL_TABLES
-from firmware_io.servo.feetech.tables import TABLES as FEETECH_TABLES
-from firmware_io.servo.tmcl.tables import TABLES as TMCL_TABLES
+from scanwright.design.catalogue.catalogue import SERVO_GROUP
+from scanwright.firmware_io.installed import with_installed
+from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.servo.dynamixel.tables import TABLES as DYNAMIXEL_TABLES
+from scanwright.firmware_io.servo.feetech.tables import TABLES as FEETECH_TABLES
+from scanwright.firmware_io.servo.tmcl.tables import TABLES as TMCL_TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +45,19 @@ FAMILIES = (
         "Dynamixel",
         DYNAMIXEL_TABLES,
         (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000, 500_000, 200_000, 9600),
-        "firmware_io.twins.servo.dynamixel_machine:DynamixelMachine",
+        "scanwright.firmware_io.twins.servo.dynamixel_machine:DynamixelMachine",
     ),
     ServoFamily(
         "Feetech",
         FEETECH_TABLES,
         (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400),
-        "firmware_io.twins.servo.feetech_machine:FeetechMachine",
+        "scanwright.firmware_io.twins.servo.feetech_machine:FeetechMachine",
     ),
     ServoFamily(
         "Trinamic",
         TMCL_TABLES,
         (1_000_000, 9600, 115_200, 57_600, 38_400, 19_200, 500_000, 250_000, 230_400, 76_800, 28_800, 14_400),
-        "firmware_io.twins.servo.tmcl.machine:TmclMachine",
+        "scanwright.firmware_io.twins.servo.tmcl.machine:TmclMachine",
     ),
 )
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Literal
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.bus.packet_format import PacketFormat
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.servo.bus.unit import PING_S, ServoUnit
-from firmware_io.servo.families import all_families, all_tables
-from firmware_io.servo.fitness import mute_servo
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.servo.bus.unit import PING_S, ServoUnit
+from scanwright.firmware_io.servo.families import all_families, all_tables
+from scanwright.firmware_io.servo.fitness import mute_servo
 
 Unmute = Literal["never", "until power-off", "for good"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from design.errors import DeviceError
-from firmware_io.serial_port import latency_timer
-from firmware_io.servo.bus.registers import ControlTable, Register, Setting
-from firmware_io.servo.bus.unit import ServoUnit
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.serial_port import latency_timer
+from scanwright.firmware_io.servo.bus.registers import ControlTable, Register, Setting
+from scanwright.firmware_io.servo.bus.unit import ServoUnit
 
 _READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
 _MUTE = "so that it answers nothing but pings"

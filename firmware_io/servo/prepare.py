@@ -6,10 +6,16 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.servo.bus.unit import PING_S, ServoUnit
-from firmware_io.servo.fitness import ServoSetupError, SettingChange, improvements, needed_changes, slow_adapter
-from firmware_io.servo.settings import write_changes
+from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.firmware_io.servo.bus.unit import PING_S, ServoUnit
+from scanwright.firmware_io.servo.fitness import (
+    ServoSetupError,
+    SettingChange,
+    improvements,
+    needed_changes,
+    slow_adapter,
+)
+from scanwright.firmware_io.servo.settings import write_changes
 
 _REBOOT_S = 3.0
 

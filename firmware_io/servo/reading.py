@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.servo.bus.bus import ServoAnswer
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.servo.progress import ServoState, TurnOrder
+from scanwright.firmware_io.servo.bus.bus import ServoAnswer
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.servo.progress import ServoState, TurnOrder
 
 
 def state_of(

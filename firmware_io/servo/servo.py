@@ -18,18 +18,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import NoReturn, Self
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import DeviceError, DeviceFaultError, UnsafeError, UnsafeNote
-from firmware_io.servo.bus.bus import ServoAnswer
-from firmware_io.servo.bus.registers import RPM
-from firmware_io.servo.bus.unit import ServoUnit
-from firmware_io.servo.find import find_servo, open_bus
-from firmware_io.servo.fitness import mode_changes
-from firmware_io.servo.guard import SILENCE_S, Guard
-from firmware_io.servo.prepare import prepare, set_agreed
-from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
-from firmware_io.servo.reading import state_of
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import DeviceError, DeviceFaultError, UnsafeError, UnsafeNote
+from scanwright.firmware_io.servo.bus.bus import ServoAnswer
+from scanwright.firmware_io.servo.bus.registers import RPM
+from scanwright.firmware_io.servo.bus.unit import ServoUnit
+from scanwright.firmware_io.servo.find import find_servo, open_bus
+from scanwright.firmware_io.servo.fitness import mode_changes
+from scanwright.firmware_io.servo.guard import SILENCE_S, Guard
+from scanwright.firmware_io.servo.prepare import prepare, set_agreed
+from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
+from scanwright.firmware_io.servo.reading import state_of
 
 _GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
 

@@ -11,13 +11,13 @@ from typing import Literal
 
 from pydantic import Field, ValidationError
 
-from design.errors import DeviceError
-from design.record import Record, explain
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.bus.unit import ServoUnit
-from firmware_io.servo.families import all_tables
-from firmware_io.servo.find import find_servo, open_bus
-from firmware_io.servo.fitness import SettingChange, settable, unfit_settings
+from scanwright.design.errors import DeviceError
+from scanwright.design.record import Record, explain
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.bus.unit import ServoUnit
+from scanwright.firmware_io.servo.families import all_tables
+from scanwright.firmware_io.servo.find import find_servo, open_bus
+from scanwright.firmware_io.servo.fitness import SettingChange, settable, unfit_settings
 
 
 class ServoSetting(Record):

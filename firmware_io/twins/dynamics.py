@@ -18,8 +18,8 @@ from jaxtyping import Float64, Int64
 from numpy import ndarray
 from scipy.integrate import BDF, LSODA, Radau
 
-from design.arrays import Floats
-from firmware_io.twins.servo_plant import Actuation, Load, Plant, effort, equations, walked_rad
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.twins.servo_plant import Actuation, Load, Plant, effort, equations, walked_rad
 
 _SOLVERS = {"LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 

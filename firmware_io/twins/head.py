@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from design import frames
-from design.angles import AngleSet
-from design.arrays import Rotation, Vector
-from design.errors import DeviceError
-from firmware_io.twins.servo_plant import Load
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Rotation, Vector
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.twins.servo_plant import Load
 
 _GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from firmware_io.lidar.device_clock import STAMP_WRAP_MS
-from firmware_io.lidar.scip.parameters import Parameters
+from scanwright.firmware_io.lidar.device_clock import STAMP_WRAP_MS
+from scanwright.firmware_io.lidar.scip.parameters import Parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

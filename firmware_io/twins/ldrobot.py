@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, suggest
-from firmware_io.twins.lidar_line import LidarLine, Sight
-from firmware_io.twins.world import turned_deg
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, suggest
+from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.twins.world import turned_deg
 
 BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
 _POINTS = 12

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, suggest
-from firmware_io.lidar.scip import measurement
-from firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
-from firmware_io.twins.lidar_line import LidarLine, Sight
-from firmware_io.twins.lidar_machine import LidarMachine, Look
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, suggest
+from scanwright.firmware_io.lidar.scip import measurement
+from scanwright.firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
+from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.twins.lidar_machine import LidarMachine, Look
 
 _HEAD = 32  # bytes of a scan before its ranges: echo, status, stamp
 

@@ -22,7 +22,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from design.arrays import Floats, Times
+from scanwright.design.arrays import Floats, Times
 
 Sight = Callable[[Times, Floats], tuple[Floats, Floats]]
 """True times [ns, time.monotonic_ns] in order and bearings [rad] of beams, (n,) -> range [m] (inf or NaN: no return,

@@ -11,19 +11,19 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from design import frames
-from design.angles import AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import SceneError
-from design.motion import Spin
-from design.scene.ray_caster import Scene, build_scene, cast, load_scene
-from firmware_io.device_ports import Ports
-from firmware_io.lidar.families import family_of
-from firmware_io.twins.lidar_line import LidarLine
-from firmware_io.twins.servo.twin import ServoTwin
-from firmware_io.twins.servo_plant import Load
-from firmware_io.twins.world import furnished_room, looking, range_model, rays
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import SceneError
+from scanwright.design.motion import Spin
+from scanwright.design.scene.ray_caster import Scene, build_scene, cast, load_scene
+from scanwright.firmware_io.device_ports import Ports
+from scanwright.firmware_io.lidar.families import family_of
+from scanwright.firmware_io.twins.lidar_line import LidarLine
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.servo_plant import Load
+from scanwright.firmware_io.twins.world import furnished_room, looking, range_model, rays
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,10 +21,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from design.arrays import Floats
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo.bus.registers import RPM
+from scanwright.design.arrays import Floats
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.servo.bus.registers import RPM
 
 Mode = Literal["off", "share", "velocity", "position", "steps"]
 _PLASTIC_TEETH = ("AX-12A", "XL330-M288", "XL430-W250")

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.arrays import Floats
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError
-from design.motion import Motion, Spin, Sweep
-from design.scene.ray_caster import Scene
-from firmware_io.recording.arrays import RecordingArrays
-from firmware_io.samples import JointLog
-from firmware_io.twins.world import measure_ranges, range_model, see
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError
+from scanwright.design.motion import Motion, Spin, Sweep
+from scanwright.design.scene.ray_caster import Scene
+from scanwright.firmware_io.recording.arrays import RecordingArrays
+from scanwright.firmware_io.samples import JointLog
+from scanwright.firmware_io.twins.world import measure_ranges, range_model, see
 
 JOINT_HZ = 200.0
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Floats, Times
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, suggest
-from firmware_io.twins.lidar_line import LidarLine, Sight
-from firmware_io.twins.world import turned_deg
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, suggest
+from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.twins.world import turned_deg
 
 _FIRMWARE = (1, 29)
 _CHUNK_NS = 8_000_000

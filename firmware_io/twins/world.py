@@ -14,11 +14,11 @@ import trimesh
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.angles import AngleSet
-from design.arrays import Floats, Times
-from design.catalogue.products import Lidar
-from design.errors import TaskError
-from design.scene.ray_caster import Hits, Scene, cast
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import TaskError
+from scanwright.design.scene.ray_caster import Hits, Scene, cast
 
 _MOST_NOISE_MM = 1e5
 _WANDER = 0.01

@@ -4,8 +4,6 @@ Angles of the arguments are degrees, lengths metres, as in task files; arrays th
 that can go wrong by wrong input raises a `ScanwrightError` whose message is one line for each fault.
 """
 
-from design.angles import load_angles as load_angles
-from design.task.task import load_task as load_task
 from scanwright.api.clouds import make_map as make_map
 from scanwright.api.clouds import read_cloud as read_cloud
 from scanwright.api.clouds import register as register
@@ -26,3 +24,5 @@ from scanwright.api.tasks import compare as compare
 from scanwright.api.tasks import draw_density as draw_density
 from scanwright.api.tasks import evaluate as evaluate
 from scanwright.api.tasks import optimise as optimise
+from scanwright.design.angles import load_angles as load_angles
+from scanwright.design.task.task import load_task as load_task

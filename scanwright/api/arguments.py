@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from design.angles import AngleSet, load_angles
-from design.task.task import LoadedTask, load_task
+from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.task.task import LoadedTask, load_task
 
 if TYPE_CHECKING:
     from scanwright.pipeline.built import BuiltScanner

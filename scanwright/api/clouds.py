@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from design.atomic_file import check_place
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
 from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.design.atomic_file import check_place
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
 if TYPE_CHECKING:
-    from firmware_io.mapping.map_files import MapSummary
-    from firmware_io.registration.register_files import RegisteredFiles
+    from scanwright.firmware_io.mapping.map_files import MapSummary
+    from scanwright.firmware_io.registration.register_files import RegisteredFiles
 
 
 def register(
@@ -47,7 +47,7 @@ def register(
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
             covariance.
     """
-    from firmware_io.registration.register_files import register_files
+    from scanwright.firmware_io.registration.register_files import register_files
 
     target = Path(out)
     check_place(target, RecordingError)
@@ -94,7 +94,7 @@ def make_map(
         RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map. Nothing is
             written then.
     """
-    from firmware_io.mapping.map_files import map_files
+    from scanwright.firmware_io.mapping.map_files import map_files
 
     scanner = None if angles is None else as_angle_set(angles)
     tum = None if poses is None else Path(poses)

@@ -10,11 +10,11 @@ from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
 from scanwright.api.recordings import assemble
 
 if TYPE_CHECKING:
-    from firmware_io.assembly.assemble import AssembleSummary
-    from firmware_io.lidar.lidar import LidarDriver
-    from firmware_io.recording.arrays import RecordingArrays
-    from firmware_io.scan.scan_summary import ScanSummary
-    from firmware_io.servo.servo import ServoDriver
+    from scanwright.firmware_io.assembly.assemble import AssembleSummary
+    from scanwright.firmware_io.lidar.lidar import LidarDriver
+    from scanwright.firmware_io.recording.arrays import RecordingArrays
+    from scanwright.firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.servo.servo import ServoDriver
 
 
 def open_servo(
@@ -40,7 +40,7 @@ def open_servo(
         ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
-    from firmware_io.servo.servo import open_servo
+    from scanwright.firmware_io.servo.servo import open_servo
 
     folder = None if undo_folder is None else Path(undo_folder)
     return open_servo(port, model, servo_id, spins=spins, undo_folder=folder)
@@ -71,7 +71,7 @@ def set_up_servo(
     Raises:
         DeviceError: no such servo, its torque is on, a setting does not stay, or the file cannot be written.
     """
-    from firmware_io.servo.settings import set_up
+    from scanwright.firmware_io.servo.settings import set_up
 
     undo: Path | None = None
     for step in set_up(port, model, servo_id, Path(undo_folder), spins=spins):
@@ -92,7 +92,7 @@ def open_lidar(address: str, model: str | None = None) -> LidarDriver:
     Raises:
         DeviceError: no such port, it is in use, or what answers is no sensor that is known.
     """
-    from firmware_io.lidar.families import open_lidar
+    from scanwright.firmware_io.lidar.families import open_lidar
 
     return open_lidar(address, model)
 
@@ -140,8 +140,8 @@ def scan(
         ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
             stopped then, and what was recorded is whole.
     """
-    from firmware_io.scan.acquire import acquire
-    from firmware_io.scan.plan import plan_scan
+    from scanwright.firmware_io.scan.acquire import acquire
+    from scanwright.firmware_io.scan.plan import plan_scan
 
     named = None if recording is None else Path(recording)
     plan = plan_scan(
@@ -183,8 +183,8 @@ def simulate(
         TaskError: the sensor is not in the catalogue.
         DeviceError: the angle set does not say how the servo moves.
     """
-    from firmware_io.twins.scanner import room
-    from firmware_io.twins.simulated import simulated_recording
+    from scanwright.firmware_io.twins.scanner import room
+    from scanwright.firmware_io.twins.simulated import simulated_recording
 
     place = room(None if scene is None else Path(scene))
     return simulated_recording(as_angle_set(angles), place, turns=turns, sigma_mm=noise_mm, seed=seed)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cad.kernel import require_kernel
-from design.angles import load_angles
-from design.task.task import load_task
 from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
+from scanwright.cad.kernel import require_kernel
+from scanwright.design.angles import load_angles
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.build import Build, build_task
 from scanwright.pipeline.manifest import require_as_built
 
 if TYPE_CHECKING:
-    from cad.assembly.assembly import Assembly
-    from cad.checks.check import Check
+    from scanwright.cad.assembly.assembly import Assembly
+    from scanwright.cad.checks.check import Check
 
 
 def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
@@ -52,7 +52,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
         BuildError: a part cannot be made.
     """
     require_kernel("the making of parts")
-    from cad.assembly.make import make_parts
+    from scanwright.cad.assembly.make import make_parts
 
     loaded = as_task(task)
     for line in loaded.misfits():
@@ -75,6 +75,6 @@ def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
     folder = Path(folder)
     require_as_built(folder)
     scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
-    from cad.checks.run import check_scanner
+    from scanwright.cad.checks.run import check_scanner
 
     return check_scanner(scanner, say)

@@ -10,20 +10,20 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Literal
 
-from design.angles import AngleSet
-from design.atomic_file import check_place
-from design.errors import RecordingError
-from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.clouds.formats import check_target
-from firmware_io.ros import robot_frames
 from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
+from scanwright.design.angles import AngleSet
+from scanwright.design.atomic_file import check_place
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.clouds.formats import check_target
+from scanwright.firmware_io.ros import robot_frames
 
 if TYPE_CHECKING:
-    from firmware_io.assembly.assemble import AssembleSummary
-    from firmware_io.calibration.calibrate import Calibration
-    from firmware_io.poses.trajectory import Trajectory
-    from firmware_io.recording.importer import ImportSummary
-    from firmware_io.recording.recording import Recording
+    from scanwright.firmware_io.assembly.assemble import AssembleSummary
+    from scanwright.firmware_io.calibration.calibrate import Calibration
+    from scanwright.firmware_io.poses.trajectory import Trajectory
+    from scanwright.firmware_io.recording.importer import ImportSummary
+    from scanwright.firmware_io.recording.recording import Recording
 
 
 def import_bag(
@@ -51,7 +51,7 @@ def import_bag(
     Raises:
         RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
     """
-    from firmware_io.recording.importer import import_bag
+    from scanwright.firmware_io.recording.importer import import_bag
 
     return import_bag(Path(bag), Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also)
 
@@ -62,7 +62,7 @@ def open_recording(path: str | Path) -> Recording:
     Raises:
         RecordingError: the file is missing, cut off, not of our topics and types, or empty.
     """
-    from firmware_io.recording.recording import open_recording
+    from scanwright.firmware_io.recording.recording import open_recording
 
     return open_recording(Path(path))
 
@@ -120,8 +120,8 @@ def assemble(
             this. Nothing is written then.
         InstallError: the format needs the extra `clouds`.
     """
-    from firmware_io.assembly.assemble import BeamLimits, assemble_recording
-    from firmware_io.assembly.finish import Finish, finish_clouds, seen_from
+    from scanwright.firmware_io.assembly.assemble import BeamLimits, assemble_recording
+    from scanwright.firmware_io.assembly.finish import Finish, finish_clouds, seen_from
 
     recording, scanner, target = Path(recording), as_angle_set(angles), Path(out)
     check_target(target)
@@ -131,7 +131,7 @@ def assemble(
     platform, said = _platform(recording, poses, imu, imu_rpy_deg)
     paint = None
     if camera is not None:
-        from firmware_io.colour.paint import painter
+        from scanwright.firmware_io.colour.paint import painter
 
         paint = painter(as_task(camera), recording, scanner, platform, lag_s, organised=organised)
     with ExitStack() as stack:
@@ -163,15 +163,15 @@ def _platform(
     recording: Path, poses: str | None, imu: str | None, imu_rpy_deg: tuple[float, float, float] | None
 ) -> tuple[Trajectory | None, list[str]]:
     """Where the platform was, how it turned between two poses if an IMU tells, and what is to be said of that."""
-    from firmware_io.poses.pose_files import load_trajectory
+    from scanwright.firmware_io.poses.pose_files import load_trajectory
 
     trajectory = None if poses is None else load_trajectory(poses, recording)
     if imu is None:
         return trajectory, []
     if trajectory is None:
         raise RecordingError("imu: a gyro goes from pose to pose; name the --poses too")
-    from firmware_io.poses.gyro import oriented
-    from firmware_io.poses.gyro_files import imu_mount, load_gyro
+    from scanwright.firmware_io.poses.gyro import oriented
+    from scanwright.firmware_io.poses.gyro_files import imu_mount, load_gyro
 
     gyro = load_gyro(imu, recording)
     return oriented(trajectory, gyro, imu_mount(imu_rpy_deg, gyro, trajectory.platform, recording))
@@ -201,7 +201,7 @@ def calibrate(
         RecordingError: a recording is unreadable, they do not show the mounting errors, or `out` is the file of
             `angles`. Nothing is written then.
     """
-    from firmware_io.calibration.calibrate import calibrate_recordings
+    from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 
     before, target = as_angle_set(angles), Path(out)
     check_place(target, RecordingError)

@@ -12,9 +12,9 @@ from scanwright.api.arguments import Say, TaskLike, as_built_scanner, as_task, q
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from design.evaluation.comparison import ComparisonRow
-    from design.evaluation.evaluation import Evaluation
-    from design.search.optimum import Optimum
+    from scanwright.design.evaluation.comparison import ComparisonRow
+    from scanwright.design.evaluation.evaluation import Evaluation
+    from scanwright.design.search.optimum import Optimum
 
 
 def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
@@ -38,7 +38,7 @@ def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
         >>> alpha_rot, beta_rot  # this task fixes them: it hangs upside down
         (180.0, 0.0)
     """
-    from design.search.optimum import find_optimum
+    from scanwright.design.search.optimum import find_optimum
 
     return find_optimum(as_task(task), say)
 
@@ -70,7 +70,7 @@ def evaluate(
         >>> abs(rolling.score.J - rolling.ball.J) < rolling.score.J_error + rolling.ball.J_error
         True
     """
-    from design.evaluation import evaluation
+    from scanwright.design.evaluation import evaluation
 
     built = as_built_scanner(task)
     loaded = as_task(task) if built is None else built.loaded
@@ -88,8 +88,8 @@ def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[Comparis
         TaskError: as for `optimise`.
         BuildError: a file of the build folder is gone or was edited.
     """
-    from design.evaluation.comparison import compare
-    from design.search.optimum import find_optimum
+    from scanwright.design.evaluation.comparison import compare
+    from scanwright.design.search.optimum import find_optimum
 
     built = as_built_scanner(task)
     optimum = find_optimum(as_task(task) if built is None else built.loaded, say)
@@ -113,9 +113,9 @@ def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) ->
         >>> figure.get_size_inches().tolist()
         [8.0, 4.0]
     """
-    from design.evaluation.density_picture import density_figure
-    from design.evaluation.evaluation import setting_rad
-    from design.objective.problem import problem_of
+    from scanwright.design.evaluation.density_picture import density_figure
+    from scanwright.design.evaluation.evaluation import setting_rad
+    from scanwright.design.objective.problem import problem_of
 
     loaded = as_task(task)
     settings = {name: setting_rad(angles) for name, angles in settings_deg.items()}

@@ -13,10 +13,10 @@ from typing import Annotated, Any
 
 import typer
 
-from design.errors import ScanwrightError, notes_of
 from scanwright.cli import clouds, design, devices, new, pages, parts
 from scanwright.cli.console import complain, own_voice
 from scanwright.cli.help import Commands, GroupedHelp
+from scanwright.design.errors import ScanwrightError, notes_of
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """What typer raises when a command is called wrongly; it names only this kind of it."""

@@ -72,7 +72,7 @@ def repair(
     ] = None,
 ) -> None:
     """Save every whole message of a recording that was cut off or damaged, into another file."""
-    from firmware_io.recording.repair.repair import repair, repaired_place
+    from scanwright.firmware_io.recording.repair.repair import repair, repaired_place
 
     target = out or repaired_place(recording)
     show(repair(recording, target).lines(recording, target))
@@ -274,6 +274,6 @@ def convert(
 
     A recording becomes a ROS 1 bag where OUT ends in .bag, else a ROS 2 bag in sqlite3.
     """
-    from firmware_io.recording.convert import convert
+    from scanwright.firmware_io.recording.convert import convert
 
     show(convert(source, target, organised=organised))

@@ -20,7 +20,7 @@ from typing import IO, Annotated, Any
 
 import typer
 
-from design.errors import require
+from scanwright.design.errors import require
 
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
 TaskOrBuild = Annotated[

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cad.kernel import require_kernel
+from scanwright.cad.kernel import require_kernel
 from scanwright.cli.console import AsJson, Progress, TaskFile, TaskOrBuild, hint, show, show_json
 from scanwright.cli.help import Commands
 
@@ -29,10 +29,10 @@ def optimise(
 
     optimum = api.optimise(task, say=Progress())
     if picture is not None:
-        from design.evaluation.landscape_picture import landscape_picture
+        from scanwright.design.evaluation.landscape_picture import landscape_picture
 
         picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
-    from design.evaluation.metres import on_planes
+    from scanwright.design.evaluation.metres import on_planes
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
@@ -71,9 +71,9 @@ def evaluate(
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
     import numpy as np
 
-    from design.evaluation.evaluation import angles_in
     from scanwright import api
     from scanwright.api.arguments import as_built_scanner
+    from scanwright.design.evaluation.evaluation import angles_in
 
     built = as_built_scanner(task)
     if built is None and angles is None:
@@ -82,7 +82,7 @@ def evaluate(
     found = api.evaluate(task, None if angles is None else angles_in(angles), pole=pole, lever=lever, say=Progress())
     angles_deg = np.degrees(found.angles_rad).round(9).tolist()
     if cloud is not None:
-        from firmware_io.clouds.ply import write_points
+        from scanwright.firmware_io.clouds.ply import write_points
 
         beams = found.beam_directions()
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
@@ -120,10 +120,10 @@ def accuracy(
 
         show(report_choices(loaded, folder, Progress()))
         return
-    from design.accuracy.report import report_precision, report_search, report_stress
+    from scanwright.design.accuracy.report import report_precision, report_search, report_stress
 
     if stress:
-        from firmware_io.twins.servo_plant import plant_of
+        from scanwright.firmware_io.twins.servo_plant import plant_of
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
@@ -180,8 +180,8 @@ def catalogue(
     as_json: AsJson = False,
 ) -> None:
     """List the products that a task can name, in tables, or one of them with the source of every value."""
-    from design.catalogue.catalogue import load_catalogue
-    from design.catalogue.table import chosen, table_lines
+    from scanwright.design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.table import chosen, table_lines
 
     products = load_catalogue()
     listed = (
@@ -204,6 +204,6 @@ def catalogue(
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a task file, so that an editor completes and checks it."""
-    from design.task.task import Task
+    from scanwright.design.task.task import Task
 
     show_json(Task.model_json_schema())

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from design.errors import DeviceError, ScanwrightError, notes_of, require
 from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
+from scanwright.design.errors import DeviceError, ScanwrightError, notes_of, require
 
 if TYPE_CHECKING:
-    from firmware_io.scan.live_feed import Viewer
-    from firmware_io.scan.plan import ScanPlan
-    from firmware_io.scan.scan_end import ScanEnd
-    from firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.scan.live_feed import Viewer
+    from scanwright.firmware_io.scan.plan import ScanPlan
+    from scanwright.firmware_io.scan.scan_end import ScanEnd
+    from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 app = Commands("Devices")
 
@@ -82,10 +82,10 @@ def emulate(
     ] = False,
 ) -> None:
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
-    from design.angles import load_angles
-    from firmware_io.device_ports import announced
-    from firmware_io.twins.head import read_load
-    from firmware_io.twins.scanner import emulated_scanner, room
+    from scanwright.design.angles import load_angles
+    from scanwright.firmware_io.device_ports import announced
+    from scanwright.firmware_io.twins.head import read_load
+    from scanwright.firmware_io.twins.scanner import emulated_scanner, room
 
     angles = load_angles(out / "angles.json")
     place = room(scene, unit_m, at)
@@ -132,9 +132,9 @@ def scan(
     if live and foxglove:
         raise DeviceError("--live and --foxglove: one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
-    from firmware_io.scan import scan_end
-    from firmware_io.scan.plan import plan_scan
     from scanwright import api
+    from scanwright.firmware_io.scan import scan_end
+    from scanwright.firmware_io.scan.plan import plan_scan
 
     plan = plan_scan(
         out,
@@ -168,8 +168,8 @@ def scan(
 
 def _acquired(plan: ScanPlan, say: Progress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
     """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
-    from firmware_io.scan import scan_end
-    from firmware_io.scan.acquire import acquire
+    from scanwright.firmware_io.scan import scan_end
+    from scanwright.firmware_io.scan.acquire import acquire
 
     try:
         with on_duty():
@@ -226,8 +226,8 @@ def ros2(
     if foxglove and recording is not None:
         raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
-    from firmware_io.ros.serve import Publishing, serve_devices, serve_recording
-    from firmware_io.scan.plan import plan_scan
+    from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
+    from scanwright.firmware_io.scan.plan import plan_scan
 
     given = ros_args or []
     points = Publishing(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
@@ -262,7 +262,7 @@ def doctor(
     """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
     from itertools import chain
 
-    from firmware_io.scan import doctor as examination
+    from scanwright.firmware_io.scan import doctor as examination
 
     if restore is not None:
         findings = examination.restore(restore, servo)
@@ -303,10 +303,10 @@ def servo_setup(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be written, and stop.")] = False,
 ) -> None:
     """Write the settings that a scan needs to the servo; keeps a file to undo it."""
-    from design.angles import load_angles
-    from design.motion import Spin
-    from firmware_io.servo import settings
-    from firmware_io.servo.address import set_address
+    from scanwright.design.angles import load_angles
+    from scanwright.design.motion import Spin
+    from scanwright.firmware_io.servo import settings
+    from scanwright.firmware_io.servo.address import set_address
 
     numbers = new_id is not None or new_baud is not None
     if sum([numbers, undo is not None, scanner is not None or dry_run]) > 1:

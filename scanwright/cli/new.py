@@ -10,9 +10,9 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from design.errors import ScanwrightError, TaskError, suggest
 from scanwright.cli.console import hint, show, warn
 from scanwright.cli.help import Commands
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
 app = Commands("Design")
 T = TypeVar("T")
@@ -50,7 +50,7 @@ def new(
 
     On a terminal what no flag answers is asked; elsewhere lidar, servo, height and what to see are needed.
     """
-    from design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.pipeline.new_task import Answers, task_text, write_task_file
 
     products = load_catalogue()
@@ -92,7 +92,7 @@ def _asked(
     scan_s: float | None,
 ) -> tuple[str, str, float, str, list[str], float]:
     """The five questions, but for those that flags have answered; an answer that makes no sense is asked for again."""
-    from design.catalogue.table import DOUBT, chosen, table_lines
+    from scanwright.design.catalogue.table import DOUBT, chosen, table_lines
     from scanwright.pipeline.new_task import Answers, check_answers
 
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from cad.kernel import require_kernel
-from design.errors import require
+from scanwright.cad.kernel import require_kernel
 from scanwright.cli.console import AllowOrigin, Progress, require_pages
 from scanwright.cli.help import Commands
+from scanwright.design.errors import require
 
 app = Commands("Pages")
 
@@ -29,7 +29,7 @@ def studio(
     require_pages("studio")
 
     require_kernel("studio")
-    from design.task.task import load_task
+    from scanwright.design.task.task import load_task
     from scanwright.studio.session import run_studio
 
     run_studio(load_task(task), port=port, out=out, say=Progress())

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from design.errors import notes_of, require
 from scanwright.cli.console import (
     AsJson,
     BuildFolder,
@@ -25,9 +24,10 @@ from scanwright.cli.console import (
     warn,
 )
 from scanwright.cli.help import Commands
+from scanwright.design.errors import notes_of, require
 
 if TYPE_CHECKING:
-    from cad.checks.check import Check, Severity
+    from scanwright.cad.checks.check import Check, Severity
 
 app = Commands("Parts")
 
@@ -124,7 +124,7 @@ def study(
 
 def _complain_of(checks: Sequence[Check]) -> None:
     """Print the failed checks on standard error, before any result."""
-    from cad.checks.check import failure_lines
+    from scanwright.cad.checks.check import failure_lines
 
     for line in failure_lines(checks):
         complain(line)

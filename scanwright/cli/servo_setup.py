@@ -12,7 +12,7 @@ import typer
 from scanwright.cli.console import complain
 
 if TYPE_CHECKING:
-    from firmware_io.servo.fitness import ServoSetupError
+    from scanwright.firmware_io.servo.fitness import ServoSetupError
 
 T = TypeVar("T")
 
@@ -51,8 +51,8 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
         ServoSetupError: nobody is there to be asked, or a setting does not last; nothing moves.
         typer.Exit: the person declines, code 2; nothing moves.
     """
-    from firmware_io.servo.fitness import ServoSetupError
-    from firmware_io.servo.settings import set_up
+    from scanwright.firmware_io.servo.fitness import ServoSetupError
+    from scanwright.firmware_io.servo.settings import set_up
 
     written: set[str] = set()
     while True:

@@ -13,11 +13,11 @@ import viser
 from jaxtyping import Int64
 from numpy import ndarray
 
-from design.arrays import Float32s, Vector
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import write_clouds
-from firmware_io.scan.live_feed import CloudGrowth
-from firmware_io.scan.scan_end import LOST, ScanEnd
+from scanwright.design.arrays import Float32s, Vector
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import write_clouds
+from scanwright.firmware_io.scan.live_feed import CloudGrowth
+from scanwright.firmware_io.scan.scan_end import LOST, ScanEnd
 from scanwright.live.ruler import Ruler
 from scanwright.serving.style import Colours, banner_html, note_html, ramp
 

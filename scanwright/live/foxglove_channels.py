@@ -16,15 +16,15 @@ from functools import partial
 
 import numpy as np
 
-from design import frames
-from design.angles import AngleSet
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.streaming import Assembler, ScanPoints
-from firmware_io.recording import ros_messages
-from firmware_io.recording.recording import JOINT_TOPIC, SCAN_TOPIC
-from firmware_io.ros.point_rows import point_rows
-from firmware_io.ros.robot_frames import fixed_frames
-from firmware_io.samples import JointSample, Scan
+from scanwright.design import frames
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.streaming import Assembler, ScanPoints
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.recording import JOINT_TOPIC, SCAN_TOPIC
+from scanwright.firmware_io.ros.point_rows import point_rows
+from scanwright.firmware_io.ros.robot_frames import fixed_frames
+from scanwright.firmware_io.samples import JointSample, Scan
 
 _DESCRIBED_NS = 1_000_000_000
 _ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew

@@ -16,17 +16,17 @@ from pathlib import Path
 
 from mcap.writer import Writer
 
-from design.angles import angles_in_use, load_angles
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError, TaskError
-from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.recording.mcap_chunks import read_note
-from firmware_io.recording.metadata import NOTE, held_by
-from firmware_io.recording.recording import open_recording
-from firmware_io.ros.replay import replay
-from firmware_io.ros.robot_frames import description
-from firmware_io.samples import JointSample, Scan
-from firmware_io.scan.live_feed import Batch, Feed, Viewer, Watch, batches
+from scanwright.design.angles import angles_in_use, load_angles
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError, TaskError
+from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.recording.mcap_chunks import read_note
+from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.ros.replay import replay
+from scanwright.firmware_io.ros.robot_frames import description
+from scanwright.firmware_io.samples import JointSample, Scan
+from scanwright.firmware_io.scan.live_feed import Batch, Feed, Viewer, Watch, batches
 from scanwright.live.foxglove_channels import FoxgloveChannels, Log, channels
 from scanwright.live.foxglove_server import foxglove_server
 

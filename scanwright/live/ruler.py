@@ -9,7 +9,7 @@ import viser
 from jaxtyping import Float
 from numpy import ndarray
 
-from design.arrays import Float32s, Vector
+from scanwright.design.arrays import Float32s, Vector
 
 REACH_RAD = np.radians(1.0)  # of a click about its ray
 COLOUR = (224, 49, 49)

@@ -17,11 +17,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
 
-from design.angles import angles_in_use
-from design.errors import DeviceError
-from firmware_io.assembly.own_body import own_body_beside
-from firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
-from firmware_io.scan.scan_end import LOST
+from scanwright.design.angles import angles_in_use
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
+from scanwright.firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do

@@ -9,29 +9,34 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cad.checks.check import Check, failed_of, read_checks
-from cad.kernel import require_kernel
-from design.angles import standard_settings
-from design.concurrency.processes import Packed, processes_beside
-from design.task.task import LoadedTask, load_task
+from scanwright.cad.checks.check import Check, failed_of, read_checks
+from scanwright.cad.kernel import require_kernel
+from scanwright.design.angles import standard_settings
+from scanwright.design.concurrency.processes import Packed, processes_beside
+from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
 from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
-    from cad.assembly.assembly import Assembly
-    from cad.files.part_files import PartReport, PartsResult
-    from cad.findings import PartFinding
-    from design.evaluation.as_built import AsBuilt
-    from design.evaluation.metres import PlaneFigures
-    from design.left_out import LeftOut
-    from design.scanner import Scanner
-    from design.search.optimum import Optimum
-    from design.search.with_parts import Chosen, Workshop
+    from scanwright.cad.assembly.assembly import Assembly
+    from scanwright.cad.files.part_files import PartReport, PartsResult
+    from scanwright.cad.findings import PartFinding
+    from scanwright.design.evaluation.as_built import AsBuilt
+    from scanwright.design.evaluation.metres import PlaneFigures
+    from scanwright.design.left_out import LeftOut
+    from scanwright.design.scanner import Scanner
+    from scanwright.design.search.optimum import Optimum
+    from scanwright.design.search.with_parts import Chosen, Workshop
 
 Say = Callable[[str], None]
 
-KERNEL = ("cad.checks.run", "cad.drawings.files", "cad.files.workshop_files", "scanwright.report.page")
+KERNEL = (
+    "scanwright.cad.checks.run",
+    "scanwright.cad.drawings.files",
+    "scanwright.cad.files.workshop_files",
+    "scanwright.report.page",
+)
 """What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
 
 BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files": 0.73, "report": 0.9}
@@ -172,13 +177,13 @@ def setting_built(optimum: Optimum) -> Chosen:
         BuildError: no setting can be built.
     """
     require_kernel("what parts hide")
-    from cad.assembly.shadow import PartsWorkshop
+    from scanwright.cad.assembly.shadow import PartsWorkshop
 
     return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), lambda _: None)
 
 
 def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
-    from design.search.with_parts import choose_with_parts
+    from scanwright.design.search.with_parts import choose_with_parts
 
     task = optimum.loaded.task
     return choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
@@ -186,9 +191,9 @@ def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
 
 def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Packed[Assembly]]:
     """The setting, the scanner with it, and its parts."""
-    from cad.assembly.shadow import PartsWorkshop
-    from cad.layout.layout import mount_offset_mm
-    from design.search.optimum import angle_set
+    from scanwright.cad.assembly.shadow import PartsWorkshop
+    from scanwright.cad.layout.layout import mount_offset_mm
+    from scanwright.design.search.optimum import angle_set
 
     loaded = optimum.loaded
     workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
@@ -201,14 +206,14 @@ def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chos
 
 def _checked(scanner: Scanner, assembly: Packed[Assembly], say: Say) -> dict[str, bytes]:
     """Checks and shadow as files."""
-    from cad.checks.run import check_files
+    from scanwright.cad.checks.run import check_files
 
     return check_files(scanner, assembly.open(), say)
 
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Say) -> PartsMade:
     """The parts in the folder, with their labels."""
-    from cad.files.part_files import build_parts
+    from scanwright.cad.files.part_files import build_parts
 
     parts = build_parts(scanner, folder, _at(say, "parts"), lambda _: assembly.open())
     return PartsMade(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
@@ -218,7 +223,7 @@ def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, say: Say
 ) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
     """What goes to the workshop, in the folder, but the drawings; findings, and what was left out."""
-    from cad.files.workshop_files import export_scanner
+    from scanwright.cad.files.workshop_files import export_scanner
 
     exports = export_scanner(scanner, parts.open(), folder, _at(say, "files"))
     return exports.findings, exports.left_out
@@ -226,8 +231,8 @@ def _exported(
 
 def _drawn(scanner: Scanner, parts: Packed[PartsResult], say: Say) -> dict[str, bytes]:
     """Drawings as files."""
-    from cad.drawings.files import drawing_files
-    from cad.layout.layout import config_hash
+    from scanwright.cad.drawings.files import drawing_files
+    from scanwright.cad.layout.layout import config_hash
 
     say("drawing the parts")
     made = parts.open()
@@ -250,16 +255,16 @@ def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:
 
 def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     """All of it, in the order in which one thing follows from another."""
-    from cad.files.part_files import write_files
-    from design.evaluation.as_built import as_built
-    from design.evaluation.metres import on_planes
-    from design.search.optimum import find_optimum
+    from scanwright.cad.files.part_files import write_files
+    from scanwright.design.evaluation.as_built import as_built
+    from scanwright.design.evaluation.metres import on_planes
+    from scanwright.design.search.optimum import find_optimum
 
     with fresh_folder(target) as work, processes_beside(2, KERNEL) as begin:  # this one never loads the kernel
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        from design.evaluation.density_picture import density_picture  # while the kernel still loads
+        from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
 
         made = begin(_chosen_and_made, optimum, asked.sha256(), say)

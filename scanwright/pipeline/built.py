@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.angles import AngleSet, load_angles
-from design.arrays import Setting
-from design.shadow import Shadow, load_own_body
-from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.arrays import Setting
+from scanwright.design.shadow import Shadow, load_own_body
+from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
 from scanwright.pipeline.manifest import require_as_built
 from scanwright.report.answer import mounting_rad, task_as_built
 

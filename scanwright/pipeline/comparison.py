@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from design.evaluation.comparison import ComparisonRow, compare
-from design.evaluation.comparison_picture import compare_picture
-from design.evaluation.comparison_table import notes, table, write_csv
-from design.search.optimum import Optimum, find_optimum
-from design.task.task import LoadedTask
+from scanwright.design.evaluation.comparison import ComparisonRow, compare
+from scanwright.design.evaluation.comparison_picture import compare_picture
+from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.search.optimum import Optimum, find_optimum
+from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.built import BuiltScanner
 from scanwright.pipeline.folder import report_folder
 

@@ -15,9 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from design.atomic_file import place_in
-from design.errors import BuildError
-from design.task.task import LoadedTask
+from scanwright.design.atomic_file import place_in
+from scanwright.design.errors import BuildError
+from scanwright.design.task.task import LoadedTask
 
 MANIFEST = "manifest.json"
 _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest

@@ -8,16 +8,16 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from cad.layout.direct.adapter import adapter_of
-from cad.layout.direct.stack import DirectStack
-from cad.layout.layout import drive_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import Catalogue
-from design.catalogue.products import Lidar, Servo, SlipRing
-from design.errors import BuildError, TaskError
-from design.scanner import scanner_of
-from design.task.shapes import LEAST_M, MOST_M
-from design.task.task import load_task
+from scanwright.cad.layout.direct.adapter import adapter_of
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.layout import drive_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import Catalogue
+from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.scanner import scanner_of
+from scanwright.design.task.shapes import LEAST_M, MOST_M
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
 
 GRAVITY_M_S2 = 9.81

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from design.atomic_file import place_in, whole_file
-from design.concurrency.processes import Begin, in_turn
-from design.errors import BuildError
-from design.left_out import LeftOut
-from design.search.search import SearchResult
-from design.task.shapes import MapRegion, MeshRegion
-from design.task.task import LoadedTask, Task
+from scanwright.design.atomic_file import place_in, whole_file
+from scanwright.design.concurrency.processes import Begin, in_turn
+from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.search.search import SearchResult
+from scanwright.design.task.shapes import MapRegion, MeshRegion
+from scanwright.design.task.task import LoadedTask, Task
 from scanwright.pipeline.manifest import enter, require_as_built, write_json
 
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 
 from pydantic import TypeAdapter, ValidationError
 
-from design.errors import TaskError, suggest
-from design.record import faults_of
-from design.task.shapes import Region
-from design.task.task import SMALLEST_BALL_DEG, Task
+from scanwright.design.errors import TaskError, suggest
+from scanwright.design.record import faults_of
+from scanwright.design.task.shapes import Region
+from scanwright.design.task.task import SMALLEST_BALL_DEG, Task
 
 Numbers = tuple[float, ...]
 _REGION: TypeAdapter[Region] = TypeAdapter(Region)

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.arrays import Array
-from design.evaluation.as_built import AsBuilt, as_built
-from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps
-from design.objective.problem import Problem, problem_of
-from design.objective.tolerance import sensitivity
-from design.shadow import Shadow
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.evaluation.as_built import AsBuilt, as_built
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.gaps import gaps
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.tolerance import sensitivity
+from scanwright.design.shadow import Shadow
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 
 OFF_DEG = 1.0  # what a printed and screwed mount may be off by
 

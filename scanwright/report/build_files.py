@@ -11,8 +11,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from design.arrays import Array
-from design.errors import BuildError
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 from scanwright.report.data_uri import data_uri
 
 T = TypeVar("T")

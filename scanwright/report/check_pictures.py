@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from design.arrays import Array
-from design.scene.parallel_view import in_front, view_of
-from design.scene.ray_caster import build_scene
+from scanwright.design.arrays import Array
+from scanwright.design.scene.parallel_view import in_front, view_of
+from scanwright.design.scene.ray_caster import build_scene
 from scanwright.report.data_uri import png_uri
 
 SIZE = 200, 150  # pixels, wide and high

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from design.arrays import Rotation, Vector
-from design.frames import Ry, Rz
-from design.task.shapes import CeilingRegion, OnPlane
-from design.task.task import Task
+from scanwright.design.arrays import Rotation, Vector
+from scanwright.design.frames import Ry, Rz
+from scanwright.design.task.shapes import CeilingRegion, OnPlane
+from scanwright.design.task.task import Task
 
 PIXELS = 1_100_000
 MARGIN = 0.005  # beside the room, one length from the camera

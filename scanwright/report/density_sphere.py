@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from design.angles import AngleSet, standard_settings
-from design.arrays import Array
-from design.evaluation.coverage import mean_density_at
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.shadow import Shadow
+from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.arrays import Array
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.shadow import Shadow
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from design.angles import AngleSet, standard_settings
-from design.arrays import Array, Setting
-from design.evaluation.landscape_picture import LandscapePanel, draw_landscape
-from design.evaluation.picture_files import svg_bytes
-from design.objective.holes import NO_BLIND_WEIGHT, holes, percent
-from design.objective.problem import Problem
-from design.objective.score import score
-from design.search.constraints import Requirements
-from design.search.optimum import price
-from design.task.task import Task
+from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.evaluation.landscape_picture import LandscapePanel, draw_landscape
+from scanwright.design.evaluation.picture_files import svg_bytes
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT, holes, percent
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import score
+from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.optimum import price
+from scanwright.design.task.task import Task
 from scanwright.report.data_uri import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")

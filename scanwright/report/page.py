@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
-from design.angles import AngleSet, load_angles
-from design.arrays import Array
-from design.concurrency.processes import Begin, in_turn
-from design.errors import BuildError
-from design.evaluation.metres import on_planes
-from design.objective.holes import percent
-from design.shadow import load_own_body
-from design.task.task import load_task
+from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.arrays import Array
+from scanwright.design.concurrency.processes import Begin, in_turn
+from scanwright.design.errors import BuildError
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.objective.holes import percent
+from scanwright.design.shadow import load_own_body
+from scanwright.design.task.task import load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_table, read_text

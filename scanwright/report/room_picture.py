@@ -19,14 +19,14 @@ from numpy import ndarray
 from PIL import Image
 from scipy.ndimage import binary_dilation
 
-from design.arrays import Array, Setting
-from design.evaluation.coverage import UNSEEN, mean_density_at
-from design.frames import Rx, Ry, Rz
-from design.objective.problem import Problem
-from design.scene import ray_caster
-from design.shadow import Shadow
-from design.task.shapes import MeshRegion
-from design.task.task import Task
+from scanwright.design.arrays import Array, Setting
+from scanwright.design.evaluation.coverage import UNSEEN, mean_density_at
+from scanwright.design.frames import Rx, Ry, Rz
+from scanwright.design.objective.problem import Problem
+from scanwright.design.scene import ray_caster
+from scanwright.design.shadow import Shadow
+from scanwright.design.task.shapes import MeshRegion
+from scanwright.design.task.task import Task
 from scanwright.report.check_pictures import PlacedBody
 from scanwright.report.cut_room import Pinhole, Room, Walls, pinhole_behind, room_about, walls_behind
 from scanwright.report.data_uri import png_uri

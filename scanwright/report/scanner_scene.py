@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.angles import AngleSet
-from design.arrays import Array
-from design.frames import apply
-from design.motion import Sweep
-from design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Array
+from scanwright.design.frames import apply
+from scanwright.design.motion import Sweep
+from scanwright.design.shadow import AXIS_STEPS, Shadow
 from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from design.angles import AngleSet
-from design.evaluation.metres import PlaneFigures, rounded
-from design.motion import Motion
-from design.objective.holes import percent
+from scanwright.design.angles import AngleSet
+from scanwright.design.evaluation.metres import PlaneFigures, rounded
+from scanwright.design.motion import Motion
+from scanwright.design.objective.holes import percent
 from scanwright.report.answer import BuildAnswer
 
 AT_M = 3.0  # from the scanner, where a ball of directions is told as a disc

@@ -14,7 +14,7 @@ from http import HTTPStatus
 from websockets.datastructures import Headers
 from websockets.http11 import Response
 
-from design.errors import DeviceError, TaskError
+from scanwright.design.errors import DeviceError, TaskError
 
 MOST_VISITORS = 8
 

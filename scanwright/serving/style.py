@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 COLOUR_STOPS = (  # dark to light, readable in grey and for the colour-blind: a few stops of cividis
     (0, 34, 78),

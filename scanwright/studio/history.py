@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from threading import Lock
 
-from design.task.angle_ranges import NAMES
+from scanwright.design.task.angle_ranges import NAMES
 from scanwright.studio.state import Canvas, Setting
 
 JOINED_S = 1.0  # changes of one thing that follow each other this closely are one step: a slider that is dragged

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from design.angles import STANDARD_DEG, standard_settings
-from design.errors import ScanwrightError, TaskError
-from design.search.optimum import Optimum
-from design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.design.angles import STANDARD_DEG, standard_settings
+from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.search.optimum import Optimum
+from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
 from scanwright.serving.style import note_html
 from scanwright.studio.brush import PaintBrush
 from scanwright.studio.history import JOINED_S, History, PageState

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from threading import Thread
 
-from design.concurrency.processes import processes_beside
-from design.errors import ScanwrightError
-from design.evaluation.as_built import as_built
-from design.search.optimum import Optimum, find_optimum
+from scanwright.design.concurrency.processes import processes_beside
+from scanwright.design.errors import ScanwrightError
+from scanwright.design.evaluation.as_built import as_built
+from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.pipeline.build import setting_built
 from scanwright.studio.panel.controls import Controls, put
 from scanwright.studio.state import Canvas, Setting

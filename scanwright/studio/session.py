@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from design.task.task import LoadedTask
+from scanwright.design.task.task import LoadedTask
 from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.studio.page import Studio
 

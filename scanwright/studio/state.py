@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 from pydantic import ValidationError
 
-from design.arrays import Array
-from design.errors import TaskError
-from design.record import explain
-from design.task.shapes import ConeRegion, MaskRegion, Region
-from design.task.task import LoadedTask
+from scanwright.design.arrays import Array
+from scanwright.design.errors import TaskError
+from scanwright.design.record import explain
+from scanwright.design.task.shapes import ConeRegion, MaskRegion, Region
+from scanwright.design.task.task import LoadedTask
 
 BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
 """Of the mounting angles: what a task file may say."""

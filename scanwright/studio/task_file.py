@@ -8,10 +8,10 @@ from pathlib import Path
 import tomli_w
 from pydantic import ValidationError
 
-from design.errors import TaskError
-from design.record import explain
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask, Task, load_task
+from scanwright.design.errors import TaskError
+from scanwright.design.record import explain
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask, Task, load_task
 from scanwright.pipeline.records import rename_files
 from scanwright.studio.state import Setting
 

@@ -12,28 +12,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cad.assembly.shadow import PartsWorkshop, at_setting
-from cad.kernel import require_kernel
-from design.arrays import Array
-from design.errors import BuildError, ScanwrightError, TaskError
-from design.evaluation.as_built import seen_of
-from design.objective.named_objectives import beams_per_ball
-from design.objective.problem import Problem, problem_of
-from design.objective.score import Score
-from design.scanner import Scanner
-from design.search.families import Family
-from design.search.optimum import angle_set
-from design.search.shortest_period import shortest_period_s
-from design.search.with_parts import Refused, choose_with_parts
-from design.shadow import Shadow
-from design.task.task import LoadedTask
+from scanwright.cad.assembly.shadow import PartsWorkshop, at_setting
+from scanwright.cad.kernel import require_kernel
+from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError, ScanwrightError, TaskError
+from scanwright.design.evaluation.as_built import seen_of
+from scanwright.design.objective.named_objectives import beams_per_ball
+from scanwright.design.objective.problem import Problem, problem_of
+from scanwright.design.objective.score import Score
+from scanwright.design.scanner import Scanner
+from scanwright.design.search.families import Family
+from scanwright.design.search.optimum import angle_set
+from scanwright.design.search.shortest_period import shortest_period_s
+from scanwright.design.search.with_parts import Refused, choose_with_parts
+from scanwright.design.shadow import Shadow
+from scanwright.design.task.task import LoadedTask
 from scanwright.study.candidate import density_gain, of_lidar, per_ball, price_usd, why, with_motion
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result
 
 if TYPE_CHECKING:
-    from cad.assembly.assembly import Assembly
-    from cad.checks.check import Check
+    from scanwright.cad.assembly.assembly import Assembly
+    from scanwright.cad.checks.check import Check
 
 LOADS = ("static_torque", "spin_up_torque", "tilt_moment", "axial_load", "bearing_load")
 BENDS = "deflection"  # of linkage and shaft, by finite elements
@@ -146,8 +146,8 @@ def _shortest(problem: Problem, loaded: LoadedTask, family: Family) -> float | N
 
 
 def _made(scanner: Scanner) -> BuiltSetting | Refused:
-    from cad.assembly.make import make_parts
-    from cad.checks.run import run_checks
+    from scanwright.cad.assembly.make import make_parts
+    from scanwright.cad.checks.run import run_checks
 
     try:
         assembly = make_parts(scanner)
@@ -159,7 +159,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
 
 def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: Shadow) -> BuiltSetting:
-    from cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.masses import link_bodies
 
     margins = {
         check.kind: check.limit / check.value

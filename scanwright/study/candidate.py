@@ -12,16 +12,16 @@ from math import exp
 
 import numpy as np
 
-from design.catalogue.catalogue import Catalogue
-from design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
-from design.errors import ScanwrightError, TaskError
-from design.evaluation.coverage import coverage
-from design.evaluation.gaps import gaps
-from design.objective.named_objectives import beams_per_ball
-from design.objective.problem import Problem
-from design.scanner import HOMING_SWITCH
-from design.search.optimum import Optimum, find_optimum
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import Catalogue
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
+from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.gaps import gaps
+from scanwright.design.objective.named_objectives import beams_per_ball
+from scanwright.design.objective.problem import Problem
+from scanwright.design.scanner import HOMING_SWITCH
+from scanwright.design.search.optimum import Optimum, find_optimum
+from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result, address
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from design.catalogue.catalogue import Catalogue
-from design.errors import TaskError
-from design.record import explain
-from design.task.named_products import motion_faults
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import Catalogue
+from scanwright.design.errors import TaskError
+from scanwright.design.record import explain
+from scanwright.design.task.named_products import motion_faults
+from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting
 
 LONGEST_NAME = 64  # of a task

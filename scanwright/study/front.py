@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from design.accuracy.front import dominators
-from design.arrays import Array
+from scanwright.design.accuracy.front import dominators
+from scanwright.design.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

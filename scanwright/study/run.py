@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cad.checks.check import failure_lines
-from cad.kernel import require_kernel
-from design.arrays import Array
-from design.atomic_file import place_in
-from design.errors import BuildError
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.cad.checks.check import failure_lines
+from scanwright.cad.kernel import require_kernel
+from scanwright.design.arrays import Array
+from scanwright.design.atomic_file import place_in
+from scanwright.design.errors import BuildError
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task
 from scanwright.study.bench import judge_candidate
 from scanwright.study.candidate import addresses, bounds_of, search_candidate, search_record, winner_task

@@ -11,14 +11,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from design.catalogue.catalogue import Catalogue, load_catalogue
-from design.catalogue.products import Lidar, Printer, Servo, SlipRing
-from design.errors import TaskError, suggest
-from design.motion import LONGEST_S, SHORTEST_S
-from design.record import Record, explain
-from design.task.angle_ranges import AngleRanges
-from design.task.named_record import named_table
-from design.task.task import Limits, LoadedTask, load_task
+from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
+from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
+from scanwright.design.errors import TaskError, suggest
+from scanwright.design.motion import LONGEST_S, SHORTEST_S
+from scanwright.design.record import Record, explain
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.named_record import named_table
+from scanwright.design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.front import COLUMNS
 
 SHIPPED = Path(__file__).parent / "shipped"

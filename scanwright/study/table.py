@@ -10,9 +10,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from design.atomic_file import place_in, whole_file
-from design.errors import BuildError
-from design.task.angle_ranges import NAMES
+from scanwright.design.atomic_file import place_in, whole_file
+from scanwright.design.errors import BuildError
+from scanwright.design.task.angle_ranges import NAMES
 from scanwright.study.crossing import AXES
 from scanwright.study.front import COLUMNS, costs
 from scanwright.study.front_picture import front_picture

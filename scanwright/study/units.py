@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from design.errors import BuildError, ScanwrightError
+from scanwright.design.errors import BuildError, ScanwrightError
 from scanwright.study.results import Result, Results, program
 
 TRIES = 3

@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager, contextmanager
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from design.concurrency.processes import cores, ctrl_c_held_back, kill, one_thread_each, spawn_pool
-from design.errors import BuildError, TaskError, require
+from scanwright.design.concurrency.processes import cores, ctrl_c_held_back, kill, one_thread_each, spawn_pool
+from scanwright.design.errors import BuildError, TaskError, require
 from scanwright.study.units import Crew
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from design.accuracy.trials import Trial
-from design.arrays import Floats
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.samples import AxisCurve, JointLog, straight
+from scanwright.design.accuracy.trials import Trial
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
 SECONDS = 36.0  # two turns at 20 deg/s
 RATE_HZ = 100.0  # of the encoder

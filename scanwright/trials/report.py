@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from design.accuracy.trials import report_trials
-from design.search.optimum import find_optimum
-from design.task.task import LoadedTask
-from firmware_io.twins.servo_plant import plant_of
+from scanwright.design.accuracy.trials import report_trials
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.task.task import LoadedTask
+from scanwright.firmware_io.twins.servo_plant import plant_of
 from scanwright.trials.axis import axis_trials
 from scanwright.trials.solver import solver_trials
 
@@ -20,8 +20,8 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
         TaskError: no direction has a weight, or no setting keeps the limits.
         BuildError: a part cannot be made.
     """
-    from cad.assembly.make import make_parts
-    from cad.geometry.mesh_trials import mesh_trials
+    from scanwright.cad.assembly.make import make_parts
+    from scanwright.cad.geometry.mesh_trials import mesh_trials
 
     optimum = find_optimum(loaded, say)
     solids = make_parts(loaded.scanner(optimum.angle_set())).made

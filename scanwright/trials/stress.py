@@ -13,15 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.accuracy.stress import StressRow, row
-from design.angles import Angles, AngleSet
-from design.motion import Spin
-from design.scene.ray_caster import build_scene, cast
-from firmware_io.assembly.deskew import deskew
-from firmware_io.samples import JointLog, Scan
-from firmware_io.twins.dynamics import HornMotion, Motion
-from firmware_io.twins.servo_plant import Actuation, Load, Plant, equations
-from firmware_io.twins.world import furnished_room
+from scanwright.design.accuracy.stress import StressRow, row
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.motion import Spin
+from scanwright.design.scene.ray_caster import build_scene, cast
+from scanwright.firmware_io.assembly.deskew import deskew
+from scanwright.firmware_io.samples import JointLog, Scan
+from scanwright.firmware_io.twins.dynamics import HornMotion, Motion
+from scanwright.firmware_io.twins.servo_plant import Actuation, Load, Plant, equations
+from scanwright.firmware_io.twins.world import furnished_room
 
 SETTLED = 25.0  # time constants of rotor and load
 GOAL_RAD_S = 1.0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cad.files.part_files import build_parts
+from scanwright.cad.files.part_files import build_parts
 
 sys.path.insert(0, str(Path(__file__).parent))  # scanners.py
 

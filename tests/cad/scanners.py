@@ -1,8 +1,8 @@
 """Scanners that tests of several files take: of equal ones the fixture `parts_of` makes the parts once."""
 
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import NO_MODULES, scanner_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.scanner import NO_MODULES, scanner_of
 
 RING, CAPSULE = "UH1256-02-0610-06S", "SRC022A-6"
 GROUND_AHEAD, ROLLING, PITCHING, UPRIGHT = (0, -55, -80, 75), (0, 90, 0, -90), (-90, 0, 90, 0), (0, 0, 60, -30)

@@ -5,9 +5,9 @@ import pytest
 from scanners import scanner_at
 from scipy.spatial import ConvexHull
 
-from cad import solids
-from cad.layout.layout import layout_of
-from cad.parts.base_mount import base_mount
+from scanwright.cad import solids
+from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.base_mount import base_mount
 
 
 @pytest.mark.parametrize("twist", [0.0, 2e-7, 1e-6, 1e-5, 1e-4, 1e-2])

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from design.catalogue.catalogue import load_catalogue
-from design.sphere.regions import field_of
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.sphere.regions import field_of
+from scanwright.design.task.task import LoadedTask, Task
 
 
 def field(weight, mask=(), maps=(), background=0.0):

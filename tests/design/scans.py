@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from design.density.beams import scan_at
-from design.density.phase_walk import half_width, halves
+from scanwright.design.density.beams import scan_at
+from scanwright.design.density.phase_walk import half_width, halves
 
 
 def simulated_scan(bearings_rad, lines, angles_rad, start_phase_rad=0.0):

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from design.angles import STANDARD_DEG, Angles, AngleSet, load_angles
-from design.errors import TaskError
-from design.task.task import load_task
+from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet, load_angles
+from scanwright.design.errors import TaskError
+from scanwright.design.task.task import load_task
 
 degrees = st.floats(-360, 360)
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")

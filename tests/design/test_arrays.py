@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 
-from design import frames
-from design.density.ball_count import ball_count
-from design.shadow import Shadow
+from scanwright.design import frames
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.shadow import Shadow
 
 
 def test_a_wrong_shape_is_refused():

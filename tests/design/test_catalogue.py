@@ -5,10 +5,10 @@ import tomllib
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
-from design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
-from design.catalogue.table import FIGURES, chosen, table_lines
-from design.errors import TaskError
+from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
+from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
+from scanwright.design.catalogue.table import FIGURES, chosen, table_lines
+from scanwright.design.errors import TaskError
 
 FILES = sorted(SHIPPED.glob("*.toml"))
 RING = """kind = "slip_ring"

@@ -6,7 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from design.frames import R_rot_laser, R_world_rot, Rx, Ry, Rz, apply, rigid, roll_pitch_yaw, rotvec_to_matrix
+from scanwright.design.frames import (
+    R_rot_laser,
+    R_world_rot,
+    Rx,
+    Ry,
+    Rz,
+    apply,
+    rigid,
+    roll_pitch_yaw,
+    rotvec_to_matrix,
+)
 
 angle = st.floats(-7, 7) | st.floats(-1e-7, 1e-7) | st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, -np.pi])
 rotvec = st.tuples(angle, angle, angle)

@@ -11,19 +11,19 @@ from pydantic import ValidationError
 from quick_tests import samples
 from scipy.spatial import cKDTree
 
-from design.density.beams import beam_directions_rot, scan_at
-from design.density.spin import ball_search
-from design.density.sweep import SweepLines, mean_count_swept, zones_swept
-from design.evaluation.coverage import coverage
-from design.evaluation.gaps import empty_cap, gaps
-from design.frames import R_world_rot
-from design.motion import StopAndGo, Sweep
-from design.objective.ball_search import ball_score
-from design.objective.named_objectives import log_density
-from design.objective.problem import motion_lines, problem_of
-from design.objective.score import score
-from design.sphere.directions import spiral
-from design.task.task import load_task
+from scanwright.design.density.beams import beam_directions_rot, scan_at
+from scanwright.design.density.spin import ball_search
+from scanwright.design.density.sweep import SweepLines, mean_count_swept, zones_swept
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.gaps import empty_cap, gaps
+from scanwright.design.frames import R_world_rot
+from scanwright.design.motion import StopAndGo, Sweep
+from scanwright.design.objective.ball_search import ball_score
+from scanwright.design.objective.named_objectives import log_density
+from scanwright.design.objective.problem import motion_lines, problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.task.task import load_task
 
 FAN = np.radians(np.linspace(-119.5, 119.9, 171))
 limit = st.floats(-180, 180)

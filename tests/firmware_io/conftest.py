@@ -3,11 +3,11 @@
 import pytest
 from virtual_bus import VirtualBus
 
-from firmware_io.lidar.scip import dialogue, driver
-from firmware_io.lidar.sick import dialogue as cola_dialogue
-from firmware_io.lidar.sick import driver as sick_driver
-from firmware_io.servo import examine, prepare
-from firmware_io.servo.bus import bus, serial_line, unit
+from scanwright.firmware_io.lidar.scip import dialogue, driver
+from scanwright.firmware_io.lidar.sick import dialogue as cola_dialogue
+from scanwright.firmware_io.lidar.sick import driver as sick_driver
+from scanwright.firmware_io.servo import examine, prepare
+from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 
 
 @pytest.fixture(autouse=True)

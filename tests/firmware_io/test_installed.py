@@ -7,17 +7,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from design.angles import AngleSet
-from design.catalogue import catalogue
-from design.catalogue.catalogue import SHIPPED, load_catalogue
-from design.catalogue.products import Lidar, Servo
-from design.errors import DeviceError
-from firmware_io.lidar import families as lidar_families
-from firmware_io.lidar.families import family_of, open_lidar
-from firmware_io.servo import families as servo_families
-from firmware_io.servo.servo import open_servo
-from firmware_io.twins.scanner import emulated_scanner, room
-from firmware_io.twins.servo.twin import ServoTwin
+from scanwright.design.angles import AngleSet
+from scanwright.design.catalogue import catalogue
+from scanwright.design.catalogue.catalogue import SHIPPED, load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar import families as lidar_families
+from scanwright.firmware_io.lidar.families import family_of, open_lidar
+from scanwright.firmware_io.servo import families as servo_families
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 # Ten turns a second of four beams, one line of text each: "range range range range" in millimetres.
 LIDAR = """
@@ -25,10 +25,10 @@ import time
 
 import numpy as np
 
-from firmware_io.lidar.lidar import LidarFamily, TimedScan
-from firmware_io.lidar.sensor_line import SensorLine
-from firmware_io.samples import Scan
-from firmware_io.twins.lidar_line import LidarLine
+from scanwright.firmware_io.lidar.lidar import LidarFamily, TimedScan
+from scanwright.firmware_io.lidar.sensor_line import SensorLine
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.twins.lidar_line import LidarLine
 
 
 class Acme:
@@ -104,10 +104,10 @@ NO_FAMILY = 7
 SERVO = """
 from dataclasses import replace
 
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.servo.families import ServoFamily
-from firmware_io.servo.feetech.packets import Sts
-from firmware_io.servo.feetech.tables import TABLES
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.servo.families import ServoFamily
+from scanwright.firmware_io.servo.feetech.packets import Sts
+from scanwright.firmware_io.servo.feetech.tables import TABLES
 
 
 class AcmePackets(Sts):
@@ -120,7 +120,7 @@ NO_FAMILY = 7
 
 
 def Twin(table, load, time_ns, angle_rad):
-    from firmware_io.twins.servo.feetech_machine import FeetechMachine
+    from scanwright.firmware_io.twins.servo.feetech_machine import FeetechMachine
 
     made = FeetechMachine(table, load, time_ns, angle_rad)
     made.memory[3], made.memory[6] = 4711, 2

@@ -75,7 +75,7 @@ def test_the_search_for_circles_sees_imports_in_functions_and_for_types(tmp_path
     (tmp_path / "design" / "a.py").write_text("def f():\n    import design.b\n")
     (tmp_path / "design" / "b.py").write_text("if TYPE_CHECKING:\n    from design.a import f\n")
     graph = nx.DiGraph((one.importer, one.imported) for one in imports(tmp_path, ("design",)))
-    assert {"design.a", "design.b"} in list(nx.strongly_connected_components(graph))
+    assert {"scanwright.design.a", "scanwright.design.b"} in list(nx.strongly_connected_components(graph))
 
 
 def test_an_import_inside_a_function_keeps_a_heavy_library_out_of_the_start():

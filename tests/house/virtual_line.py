@@ -4,10 +4,10 @@ import time
 from collections import deque
 from pkgutil import resolve_name
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError
-from firmware_io.lidar.families import family_of
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar.families import family_of
 
 _BUFFER_NS = 50_000_000  # of a line that nobody reads
 

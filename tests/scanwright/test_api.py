@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import scanwright as sw
-from design.errors import RecordingError, TaskError
 from scanwright import api
 from scanwright.api import tasks
+from scanwright.design.errors import RecordingError, TaskError
 
 TASK = {
     "name": "ahead",
@@ -88,8 +88,8 @@ def test_a_linkage_comes_as_a_shape_of_cadquery():
 
 
 def test_a_recording_comes_as_arrays(tmp_path):
-    from firmware_io.recording.recording import RecordingWriter
-    from firmware_io.samples import Scan
+    from scanwright.firmware_io.recording.recording import RecordingWriter
+    from scanwright.firmware_io.samples import Scan
 
     start_ns = 1_700_000_000_000_000_000
     with RecordingWriter(tmp_path / "two.mcap", {}) as writer:

@@ -6,9 +6,9 @@ from math import cos, pi
 import cadquery as cq
 import pytest
 
-from cad.geometry import mesh_trials as meshes
-from design.accuracy.trials import Trial, best_trials
-from firmware_io.twins.servo_plant import plant_of
+from scanwright.cad.geometry import mesh_trials as meshes
+from scanwright.design.accuracy.trials import Trial, best_trials
+from scanwright.firmware_io.twins.servo_plant import plant_of
 from scanwright.trials import axis
 from scanwright.trials import solver as solvers
 

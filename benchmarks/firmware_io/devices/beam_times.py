@@ -16,11 +16,11 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from design.arrays import Floats, Times
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from firmware_io.lidar.families import family_of, open_lidar
-from firmware_io.samples import Scan
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.lidar.families import family_of, open_lidar
+from scanwright.firmware_io.samples import Scan
 
 MODELS = ("UTM-30LX", "LD19", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS111", "LMS 200")
 LEARNT = 20  # turns after which a clock is known

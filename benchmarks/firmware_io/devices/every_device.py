@@ -15,10 +15,10 @@ from contextlib import suppress
 from itertools import cycle
 
 from benchmarks.firmware_io.devices.low_cost_cloud import scanned
-from design.angles import AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar, Servo
-from design.errors import ScanwrightError
+from scanwright.design.angles import AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.errors import ScanwrightError
 
 _MOTION = {"mode": "sweep", "limits_deg": [-85, 85], "period_s": 6.0, "profile": "trapezoid", "accel_deg_s2": 200.0}
 _ANGLES_DEG = {"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 0, "beta_laser": 50}

@@ -20,16 +20,16 @@ from pathlib import Path
 
 import numpy as np
 
-from design.angles import AngleSet
-from design.arrays import Floats
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.scene.ray_caster import Scene, cast
-from firmware_io.clouds.ply import read_ply
-from firmware_io.scan.acquire import acquire
-from firmware_io.scan.plan import plan_scan
-from firmware_io.twins.scanner import emulated_scanner, room
 from scanwright import api
+from scanwright.design.angles import AngleSet
+from scanwright.design.arrays import Floats
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.scene.ray_caster import Scene, cast
+from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.scan.acquire import acquire
+from scanwright.firmware_io.scan.plan import plan_scan
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
 
 _ASIDE_RAD = math.radians(0.5)
 _LEAST_M = 1e-6

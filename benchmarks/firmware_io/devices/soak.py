@@ -19,8 +19,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from threading import Thread
 
-from design.angles import Angles, AngleSet
-from design.motion import Spin
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.motion import Spin
 
 ROW_S = 30.0
 AWAY_S = 12.0

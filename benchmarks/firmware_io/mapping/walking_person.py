@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from design.angles import Angles, AngleSet
-from design.arrays import Floats, Mask
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.motion import Spin
-from design.scene.ray_caster import Scene, build_scene, cast
-from firmware_io.mapping.seen_through import Stand, seen_through
-from firmware_io.twins.world import furnished_room, rays
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Floats, Mask
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.motion import Spin
+from scanwright.design.scene.ray_caster import Scene, build_scene, cast
+from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
+from scanwright.firmware_io.twins.world import furnished_room, rays
 
 FLOOR_M = -0.9
 SPEED_M_S = 1.0

@@ -22,7 +22,7 @@ from benchmarks.scanwright.study.efficiency import efficiency
 from benchmarks.scanwright.study.invented import run_invented
 from benchmarks.scanwright.study.kills import kills
 from benchmarks.scanwright.study.memory import memory
-from design.errors import ScanwrightError
+from scanwright.design.errors import ScanwrightError
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from design.task.task import Limits, LoadedTask, load_task
+from scanwright.design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.candidate import record_digest
 from scanwright.study.crossing import Crossing
 from scanwright.study.front import six_digits

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
-from design.task.task import LoadedTask
+from scanwright.design.task.task import LoadedTask
 from scanwright.study.crossing import Crossing
 from scanwright.study.results import Result, open_results
 from scanwright.study.run import StudyRun

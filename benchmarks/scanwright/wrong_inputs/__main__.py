@@ -30,10 +30,10 @@ import numpy as np
 
 from benchmarks.scanwright.wrong_inputs.accidents import damage, number
 from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, Job, furnish, jobs
-from design.errors import ScanwrightError
-from design.record import MOST_TOLD
-from firmware_io.clouds.formats import read_clouds
 from scanwright.cli.app import run
+from scanwright.design.errors import ScanwrightError
+from scanwright.design.record import MOST_TOLD
+from scanwright.firmware_io.clouds.formats import read_clouds
 
 _MOST_BYTES = 2 << 30
 _MOST_S = 30
@@ -42,9 +42,22 @@ _HANGS_S = 3 * _KILL_S  # by the clock on the wall: other people's work may shar
 _ROOM_BYTES = 3 << 30  # of addresses beyond what the program has before it begins
 _FARTHEST_M = 1e8
 _LOADED = (  # once, and not anew by every child
-    *("firmware_io.assembly.assemble", "firmware_io.calibration.calibrate", "firmware_io.clouds.e57"),
-    *("firmware_io.clouds.las", "firmware_io.clouds.pcd", "firmware_io.recording.importer", "firmware_io.scan.plan"),
-    *("firmware_io.registration.register_files", "design.evaluation.evaluation", "design.search.optimum"),
+    *(
+        "scanwright.firmware_io.assembly.assemble",
+        "scanwright.firmware_io.calibration.calibrate",
+        "scanwright.firmware_io.clouds.e57",
+    ),
+    *(
+        "scanwright.firmware_io.clouds.las",
+        "scanwright.firmware_io.clouds.pcd",
+        "scanwright.firmware_io.recording.importer",
+        "scanwright.firmware_io.scan.plan",
+    ),
+    *(
+        "scanwright.firmware_io.registration.register_files",
+        "scanwright.design.evaluation.evaluation",
+        "scanwright.design.search.optimum",
+    ),
     *("matplotlib.pyplot", "scanwright.api", "scipy.interpolate", "scipy.spatial.transform"),
 )
 

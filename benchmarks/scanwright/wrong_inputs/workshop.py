@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from design.angles import Angles, AngleSet
-from design.motion import Spin
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import write_clouds
-from firmware_io.recording.bag_export import export_bag
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import Scan
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.motion import Spin
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import write_clouds
+from scanwright.firmware_io.recording.bag_export import export_bag
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import Scan
 
 FORMATS = ("ply", "pcd", "las", "laz", "e57", "npz", "xyz")
 _START_NS = 1_763_000_000_000_000_000

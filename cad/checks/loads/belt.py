@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from cad.checks.check import Check, at_most, horn_check, note, tidy
-from cad.geometry.inertia import Inertial
-from cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
-from cad.layout.belt.stack import BeltStack
-from cad.layout.loads import FAR_MM, Weight, noise_deg
-from cad.layout.names import BEARING, BELT
-from design.scanner import Scanner
+from scanwright.cad.checks.check import Check, at_most, horn_check, note, tidy
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg
+from scanwright.cad.layout.names import BEARING, BELT
+from scanwright.design.scanner import Scanner
 
 
 def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weight, torque: float) -> list[Check]:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 
-from cad.checks.check import Check, at_most, horn_check, rated
-from cad.layout.direct.cage import share_weight
-from cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
-from cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
-from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
-from cad.layout.names import BEARING, SERVO, SERVO_SHAFT
-from design.scanner import Scanner
+from scanwright.cad.checks.check import Check, at_most, horn_check, rated
+from scanwright.cad.layout.direct.cage import share_weight
+from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
+from scanwright.cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
+from scanwright.cad.layout.names import BEARING, SERVO, SERVO_SHAFT
+from scanwright.design.scanner import Scanner
 
 
 def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Check]:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.print_settings import print_words
-from cad.checks.remarks import products_of
-from cad.checks.retention import material_of
-from cad.files.manual.pictures import StepPictures
-from cad.files.manual.scenes import StepScene, scenes_of
-from cad.geometry.mesh import TriMesh
-from cad.layout.joints import CASE_EAR, DECK_MM, Joint
-from cad.layout.names import FIT_COUPON
-from cad.layout.tightening import hold_of
-from design.catalogue.products import Product
-from design.electrics.wiring import network_of
-from design.scanner import Scanner
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.checks.remarks import products_of
+from scanwright.cad.checks.retention import material_of
+from scanwright.cad.files.manual.pictures import StepPictures
+from scanwright.cad.files.manual.scenes import StepScene, scenes_of
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, Joint
+from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.cad.layout.tightening import hold_of
+from scanwright.design.catalogue.products import Product
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.scanner import Scanner
 
 NUTS = (
     "Put the nuts into their traps before anything else: those of a plate or an arm from below; those of a boss from "

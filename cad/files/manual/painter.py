@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from design.arrays import Array, Vector
-from design.scene.parallel_view import ParallelView
-from design.scene.ray_caster import Scene
+from scanwright.design.arrays import Array, Vector
+from scanwright.design.scene.parallel_view import ParallelView
+from scanwright.design.scene.ray_caster import Scene
 
 EDGE = 0.45  # of a body's colour, where it ends before something else
 STEP_M = 0.0015  # between two distances that are an edge

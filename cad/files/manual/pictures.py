@@ -13,15 +13,15 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from cad.drawings.dimensions import spread
-from cad.files.manual.painter import Piece, painted, png_bytes, rod
-from cad.files.manual.scenes import StepScene
-from cad.geometry.mesh import TriMesh
-from cad.layout.joints import Joint
-from cad.screws import Screw
-from design.arrays import Array, Vector
-from design.scene.parallel_view import ParallelView, view_of
-from design.scene.ray_caster import Scene, build_scene
+from scanwright.cad.drawings.dimensions import spread
+from scanwright.cad.files.manual.painter import Piece, painted, png_bytes, rod
+from scanwright.cad.files.manual.scenes import StepScene
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.screws import Screw
+from scanwright.design.arrays import Array, Vector
+from scanwright.design.scene.parallel_view import ParallelView, view_of
+from scanwright.design.scene.ray_caster import Scene, build_scene
 
 SIZE = 720, 480  # pixels, wide and high
 WORDS = 210  # of them at the right, for the screws

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.assembly.assembly import Assembly
-from cad.assembly.steps import steps_of
-from cad.layout.balance.counterweight import Counterweight
-from cad.layout.joints import ALL_SCREWS, Joint, screws
-from cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS, STANDING_LEADS
-from cad.parts.part_spec import Step
-from design.arrays import Rotation, Vector
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.layout.balance.counterweight import Counterweight
+from scanwright.cad.layout.joints import ALL_SCREWS, Joint, screws
+from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS, STANDING_LEADS
+from scanwright.cad.parts.part_spec import Step
+from scanwright.design.arrays import Rotation, Vector
 
 
 @dataclass(frozen=True, slots=True)

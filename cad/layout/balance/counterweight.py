@@ -15,20 +15,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from cad.layout.balance.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
-from cad.layout.deck import FOOT_THICKNESS, FREE, Deck
-from cad.layout.direct.loads import horn_bears, horn_bears_balanced
-from cad.layout.direct.stack import DirectStack
-from cad.layout.envelope import rotor_radius
-from cad.layout.hub import CROSS_ABOVE_BOTTOM
-from cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, neck_corners
-from cad.layout.loads import STEEL_G_CM3, tilt_sine
-from cad.layout.names import COUNTERWEIGHT
-from cad.screws import SCREWS
-from design.arrays import Array
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from scanwright.cad.layout.balance.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from scanwright.cad.layout.deck import FOOT_THICKNESS, FREE, Deck
+from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import rotor_radius
+from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM
+from scanwright.cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, neck_corners
+from scanwright.cad.layout.loads import STEEL_G_CM3, tilt_sine
+from scanwright.cad.layout.names import COUNTERWEIGHT
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 # bright steel bar as it is sold (EN 10278), across and along the axis, lightest first
 SECTIONS = (

@@ -10,9 +10,9 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
-from cad.layout.linkage import AlignmentLinkage
-from design.arrays import Array, Mask
+from scanwright.cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
+from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.design.arrays import Array, Mask
 
 FAR_ABOVE = 1e3
 

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from cad.layout.balance.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
-from cad.layout.envelope import PLATE_THICKNESS
-from cad.layout.linkage import AlignmentLinkage, neck_corners
-from cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
-from design.arrays import Array
-from design.motion import Sweep
-from design.scanner import Scanner
+from scanwright.cad.layout.balance.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
+from scanwright.cad.layout.envelope import PLATE_THICKNESS
+from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
+from scanwright.cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
+from scanwright.design.arrays import Array
+from scanwright.design.motion import Sweep
+from scanwright.design.scanner import Scanner
 
 CELL = 2.0
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cad.layout import names
-from cad.layout.belt.sizing import belt_stack
-from cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
-from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
-from design.arrays import Array
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout import names
+from scanwright.cad.layout.belt.sizing import belt_stack
+from scanwright.cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.design.arrays import Array
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 BUILT = (
     names.SLIP_RING_ADAPTER,

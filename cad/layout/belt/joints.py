@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from cad.layout import names
-from cad.layout.belt import plate as of_plate
-from cad.layout.belt.plate import plate_of
-from cad.layout.belt.stack import (
+from scanwright.cad.layout import names
+from scanwright.cad.layout.belt import plate as of_plate
+from scanwright.cad.layout.belt.plate import plate_of
+from scanwright.cad.layout.belt.stack import (
     BOSS,
     DISC,
     GRUB,
@@ -23,8 +23,15 @@ from cad.layout.belt.stack import (
     TRAVEL,
     BeltStack,
 )
-from cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_HEAD, disc_azimuths, flange_centres, tower_of
-from cad.layout.joints import (
+from scanwright.cad.layout.belt.tower import (
+    DISC_SCREW,
+    SCREW_DEPTH,
+    UNDER_HEAD,
+    disc_azimuths,
+    flange_centres,
+    tower_of,
+)
+from scanwright.cad.layout.joints import (
     CASE_EAR,
     Joint,
     held_in,
@@ -34,8 +41,8 @@ from cad.layout.joints import (
     round_wall_mm,
     upright_axes,
 )
-from cad.screws import SCREWS, passing_hole, thread_in_part
-from design.scanner import Scanner
+from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
+from scanwright.design.scanner import Scanner
 
 
 def belt_joints(scanner: Scanner, stack: BeltStack) -> Iterator[Joint]:

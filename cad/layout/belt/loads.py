@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.loads import Weight
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.loads import Weight
 
 PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed
 PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout.belt.stack import PLATE_SCREW, BeltStack
-from cad.layout.names import DRIVE_PLATE
-from cad.screws import SCREWS, Screw, passing_hole
-from design.catalogue.products import Servo
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.belt.stack import PLATE_SCREW, BeltStack
+from scanwright.cad.layout.names import DRIVE_PLATE
+from scanwright.cad.screws import SCREWS, Screw, passing_hole
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 UNDER_HEAD = 2.5  # of the plate
 HORN_ROOM = 1.5  # around the foot of the pulley

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cad.layout.belt.stack import (
+from scanwright.cad.layout.belt.stack import (
     CASE_ROOM,
     FOOT_HOLE,
     FOOT_SCREW,
@@ -16,13 +16,13 @@ from cad.layout.belt.stack import (
     BeltStack,
     drive_corners,
 )
-from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
-from cad.layout.hub import HUB_WALL
-from cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
-from cad.screws import SCREWS
-from design.catalogue.products import Bearing, Belt, Printer, Servo, SlipRing
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
+from scanwright.cad.layout.hub import HUB_WALL
+from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
+from scanwright.cad.screws import SCREWS
+from scanwright.design.catalogue.products import Bearing, Belt, Printer, Servo, SlipRing
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 SPIGOT_DIAMETER = 12.0  # as in direct drive: a wider hub would hide more
 SHAFT_WALL = 4.0  # least, around the bore

@@ -26,10 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.hub import BEARING_STEP, Hub
-from cad.screws import SCREWS
-from design.arrays import Array
-from design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
+from scanwright.cad.layout.hub import BEARING_STEP, Hub
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
 
 GRUB = SCREWS["M3"]  # of the pulley on the shaft
 GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat

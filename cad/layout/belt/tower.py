@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad import outlines
-from cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
-from cad.screws import SCREWS, Thread, passing_hole, thread_in_part
-from design.scanner import Scanner
+from scanwright.cad import outlines
+from scanwright.cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
+from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
+from scanwright.design.scanner import Scanner
 
 DISC_SCREW = SCREWS["M3"]
 DISC_SCREWS = 3

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.cables.obstacles import farther
-from cad.layout.cables.path import Path, PathPiece
-from cad.layout.cables.way import GAP, LeadRoom
-from design.arrays import Array
+from scanwright.cad.layout.cables.obstacles import farther
+from scanwright.cad.layout.cables.path import Path, PathPiece
+from scanwright.cad.layout.cables.way import GAP, LeadRoom
+from scanwright.design.arrays import Array
 
 LENGTH = 12.0  # crimps beside each other, and a shrink tube over them
 WALL = 0.5  # of the shrink tube; of what a lead keeps to all others it leaves a tenth

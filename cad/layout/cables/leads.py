@@ -14,18 +14,18 @@ from itertools import product
 
 import numpy as np
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables import joint as joints
-from cad.layout.cables.joint import LeadJoint, joint_of
-from cad.layout.cables.path import Path
-from cad.layout.cables.room import RotorRoom, room_of
-from cad.layout.cables.tie_seat import TieSeat
-from cad.layout.cables.way import Ending, lattice_about_axis, short_way
-from cad.layout.direct.loads import JOURNAL_WALL
-from cad.layout.direct.stack import DirectStack
-from cad.layout.layout import Layout
-from design.arrays import Array
-from design.catalogue.products import SlipRing
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables import joint as joints
+from scanwright.cad.layout.cables.joint import LeadJoint, joint_of
+from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.room import RotorRoom, room_of
+from scanwright.cad.layout.cables.tie_seat import TieSeat
+from scanwright.cad.layout.cables.way import Ending, lattice_about_axis, short_way
+from scanwright.cad.layout.direct.loads import JOURNAL_WALL
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.layout import Layout
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import SlipRing
 
 SAMPLE = 1.5  # mm between the points that stand for a lead that is laid
 BESIDE = 0.25  # between two leads, and a lead and its channel's wall

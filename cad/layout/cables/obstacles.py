@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from design.arrays import Array, Mask
+from scanwright.design.arrays import Array, Mask
 
 HUB_SIDES = 24
 Way = Callable[[Array], Mask]

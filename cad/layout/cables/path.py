@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 STRAIGHT = 1e-6  # rad: less is no corner
 

@@ -10,17 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.balance.counterweight import LONGER, Counterweight
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
-from cad.layout.deck import FOOT_THICKNESS, Deck
-from cad.layout.envelope import Box, box_corners, envelope_of
-from cad.layout.layout import Layout
-from cad.layout.linkage import neck_corners
-from cad.layout.modules.homing_flag import ARM_HIGH, VANE, VANE_HALF, Flag
-from cad.screws import SCREWS
-from design.arrays import Array, Mask
-from design.catalogue.products import Lidar
+from scanwright.cad.layout.balance.counterweight import LONGER, Counterweight
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
+from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.envelope import Box, box_corners, envelope_of
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.linkage import neck_corners
+from scanwright.cad.layout.modules.homing_flag import ARM_HIGH, VANE, VANE_HALF, Flag
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.catalogue.products import Lidar
 
 BAR_SCREW = SCREWS["M4"]
 BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens

@@ -12,19 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.leads import SAMPLE, mass_g
-from cad.layout.cables.path import Path
-from cad.layout.cables.standing_room import StandingRoom, standing_room_of
-from cad.layout.cables.ties import foot_ties_of
-from cad.layout.cables.way import Ending, short_way
-from cad.layout.deck import FOOT_THICKNESS, Deck
-from cad.layout.direct.stack import STATOR_EXIT
-from cad.layout.joints import triple
-from cad.layout.layout import Layout
-from cad.layout.modules.ring_cover import RingCover, cover_of
-from cad.layout.names import SERVO_CABLE, STATOR_LEADS
-from design.arrays import Array
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
+from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.standing_room import StandingRoom, standing_room_of
+from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.cables.way import Ending, short_way
+from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.direct.stack import STATOR_EXIT
+from scanwright.cad.layout.joints import triple
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
+from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
+from scanwright.design.arrays import Array
 
 BUNDLED = 1.2  # diameter of a bundle of bundles, over that of one and the root of their number
 LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend

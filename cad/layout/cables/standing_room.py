@@ -11,19 +11,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cad import outlines
-from cad.layout.belt.stack import FOOT, FOOT_HALF, PLATE, SHELF, BeltStack, case_corners, drive_corners
-from cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
-from cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PLUG_GAP, RAIL_INSET, STRUT_BEHIND, Deck, strut_corners
-from cad.layout.direct import adapter
-from cad.layout.direct.cage import SEAT_GAP, plate_half_x
-from cad.layout.direct.stack import DirectStack
-from cad.layout.envelope import box_corners
-from cad.layout.layout import Layout
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from cad.layout.modules.ring_cover import RingCover, cover_of
-from cad.screws import SCREWS
-from design.arrays import Array, Mask
+from scanwright.cad import outlines
+from scanwright.cad.layout.belt.stack import FOOT, FOOT_HALF, PLATE, SHELF, BeltStack, case_corners, drive_corners
+from scanwright.cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
+from scanwright.cad.layout.deck import (
+    BACK_THICKNESS,
+    FOOT_THICKNESS,
+    PLUG_GAP,
+    RAIL_INSET,
+    STRUT_BEHIND,
+    Deck,
+    strut_corners,
+)
+from scanwright.cad.layout.direct import adapter
+from scanwright.cad.layout.direct.cage import SEAT_GAP, plate_half_x
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import box_corners
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array, Mask
 
 RAIL_HALF = 5.0  # of the mount's rails, at most
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 
 SLOT_ALONG, SLOT_ACROSS = 3.2, 1.8  # for a tie 2.5 wide and 1.1 thick
 SLOT_WALL = 2.0  # outside a slot

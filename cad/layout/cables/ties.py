@@ -12,17 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
-from cad.layout.deck import FOOT_THICKNESS, PAD_HALF, Deck
-from cad.layout.envelope import PLATE_THICKNESS
-from cad.layout.linkage import AlignmentLinkage, neck_corners
-from cad.layout.names import HUB_TIE, PLATE_TIE
-from design.arrays import Array
-from design.catalogue.products import Lidar
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
+from scanwright.cad.layout.deck import FOOT_THICKNESS, PAD_HALF, Deck
+from scanwright.cad.layout.envelope import PLATE_THICKNESS
+from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
+from scanwright.cad.layout.names import HUB_TIE, PLATE_TIE
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 CHANNEL_LOW = 4.2  # height over the hub's lower face that the leads of a bearing's sleeve leave by
 LEAD = 3.75  # room of a bundle between the slots

@@ -16,8 +16,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cad.layout.cables.path import Path
-from design.arrays import Array, Mask
+from scanwright.cad.layout.cables.path import Path
+from scanwright.design.arrays import Array, Mask
 
 SAMPLE = 3.0  # mm between two points that are looked at
 AZIMUTHS = 24

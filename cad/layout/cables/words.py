@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from cad.layout.belt.stack import BeltStack
-from cad.layout.cables.joint import LENGTH
-from cad.layout.cables.leads import RotorLead, tied_mm
-from cad.layout.cables.standing import StandingLead
-from cad.layout.layout import Layout
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.joint import LENGTH
+from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
+from scanwright.cad.layout.cables.standing import StandingLead
+from scanwright.cad.layout.layout import Layout
 
 SPARE = 15.0  # mm more than its way, so that a joint can be made once again
 HUB, SHAFT, NECK, PLATE, FOOT = "hub", "shaft", "neck", "plate", "foot of the mount"  # where cables are tied

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cad.layout.direct.cage import FOOT_RADIUS, BearingCage, plate_half_x
-from cad.layout.direct.stack import DirectStack
-from cad.layout.names import SLIP_RING_ADAPTER
-from cad.screws import SCREWS, Screw, passing_hole
-from design.catalogue.products import Servo
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, BearingCage, plate_half_x
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.names import SLIP_RING_ADAPTER
+from scanwright.cad.screws import SCREWS, Screw, passing_hole
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 PLATE = 6.0
 PLAY = 0.25  # between arm and stator, on the radius

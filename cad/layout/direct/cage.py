@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
-from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import Weight
-from cad.layout.names import CAGE_BASE
-from cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
-from design.catalogue.products import Bearing, Servo
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.names import CAGE_BASE
+from scanwright.cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from scanwright.design.catalogue.products import Bearing, Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 BASE_HEIGHT = 20.0
 RING_ABOVE_BASE = 1.5

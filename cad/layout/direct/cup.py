@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 
-from cad.layout.direct.stack import DirectStack
-from cad.layout.envelope import hub_height, lidar_pose, rows_of
-from cad.layout.hub import CUP_HUB_WALL
-from cad.screws import SCREWS
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import hub_height, lidar_pose, rows_of
+from scanwright.cad.layout.hub import CUP_HUB_WALL
+from scanwright.cad.screws import SCREWS
+from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
 FLOOR = 4.0  # on the horn

@@ -6,16 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cad.layout import names
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.direct.stack import DirectStack
-from cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
-from cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from cad.screws import SCREWS
-from design.catalogue.products import Servo
-from design.errors import BuildError
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout import names
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
+from scanwright.cad.screws import SCREWS
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 # The order that always works: what comes over the shaft follows what carries it.
 BUILT = (

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from cad.layout import names
-from cad.layout.direct import cage as of_cage
-from cad.layout.direct.adapter import adapter_of
-from cad.layout.direct.cage import BearingCage, cage_of
-from cad.layout.direct.stack import DirectStack
-from cad.layout.joints import CASE_EAR, Joint, held_in, horn_joint, inward_axes, round_wall_mm, upright_axes
-from design.scanner import Scanner
+from scanwright.cad.layout import names
+from scanwright.cad.layout.direct import cage as of_cage
+from scanwright.cad.layout.direct.adapter import adapter_of
+from scanwright.cad.layout.direct.cage import BearingCage, cage_of
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.joints import CASE_EAR, Joint, held_in, horn_joint, inward_axes, round_wall_mm, upright_axes
+from scanwright.design.scanner import Scanner
 
 
 def direct_joints(scanner: Scanner, stack: DirectStack) -> Iterator[Joint]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import (
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
     STANDARD_GRAVITY,
@@ -20,8 +20,8 @@ from cad.layout.loads import (
     tilt_sine,
     weight_of,
 )
-from design.catalogue.products import Bearing
-from design.scanner import Scanner
+from scanwright.design.catalogue.products import Bearing
+from scanwright.design.scanner import Scanner
 
 UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
-from cad.layout.direct.loads import ALUMINIUM, STEEL, UNRATED_NM, ShaftMetal, heaviest, supported
-from cad.layout.direct.stack import DirectStack
-from cad.layout.loads import Weight, rated_moment_nm
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, UNRATED_NM, ShaftMetal, heaviest, supported
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.loads import Weight, rated_moment_nm
+from scanwright.design.scanner import Scanner
 
 TRUED_MM = 0.05  # on the indicator over a turn: the flange is tapped within the play of its screws
 INNER_RING_MM = 0.013  # Kia of a bearing of the normal class, 18 to 30 mm, ISO 492

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from cad.layout.direct.adapter import fork_holes
-from cad.layout.direct.cup import cup_stack
-from cad.layout.direct.loads import bearing_for, horn_bears
-from cad.layout.direct.misalignment import with_waist
-from cad.layout.direct.stack import DirectStack
-from cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
-from cad.layout.hub import HUB_WALL
-from cad.layout.names import SERVO_SHAFT
-from cad.screws import SCREWS
-from design.arrays import Array
-from design.catalogue.products import Servo
-from design.errors import BuildError
-from design.scanner import Scanner
+from scanwright.cad.layout.direct.adapter import fork_holes
+from scanwright.cad.layout.direct.cup import cup_stack
+from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
+from scanwright.cad.layout.direct.misalignment import with_waist
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
+from scanwright.cad.layout.hub import HUB_WALL
+from scanwright.cad.layout.names import SERVO_SHAFT
+from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
 
 SHAFT_PLAIN = 12.0  # without a ring, where the heads of the horn's screws leave room
 SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout.hub import HUB_GAP, Hub
-from cad.layout.names import HORN_CUP, SERVO_SHAFT
-from design.arrays import Array
+from scanwright.cad.layout.hub import HUB_GAP, Hub
+from scanwright.cad.layout.names import HORN_CUP, SERVO_SHAFT
+from scanwright.design.arrays import Array
 
 RING_GAP = 3.0
 STATOR_EXIT = 5.0  # over a ring's lower end, of leads that leave the side of its stator

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cad.layout import names
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.adapter import ARM, PLAY, adapter_of, arm_top
-from cad.layout.direct.cage import cage_of
-from cad.layout.drive import Cuboid, Stack
-from cad.layout.joints import Joint, inward_axes, round_wall_mm, upright_axes
-from cad.layout.modules.unasked import unasked
-from cad.screws import SCREWS, passing_hole
-from design.catalogue.products import SlotSwitch
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout import names
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.adapter import ARM, PLAY, adapter_of, arm_top
+from scanwright.cad.layout.direct.cage import cage_of
+from scanwright.cad.layout.drive import Cuboid, Stack
+from scanwright.cad.layout.joints import Joint, inward_axes, round_wall_mm, upright_axes
+from scanwright.cad.layout.modules.unasked import unasked
+from scanwright.cad.screws import SCREWS, passing_hole
+from scanwright.design.catalogue.products import SlotSwitch
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 SCREW = SCREWS["M3"]  # of the bracket
 VANE = 2.0  # thickness

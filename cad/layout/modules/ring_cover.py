@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout import names
-from cad.layout.belt.stack import BeltStack
-from cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, adapter_of, arm_top
-from cad.layout.direct.cage import SEAT_GAP, cage_of
-from cad.layout.direct.stack import STATOR_EXIT
-from cad.layout.drive import Stack
-from cad.layout.joints import Joint, inward_axes, round_wall_mm
-from cad.layout.modules.unasked import unasked
-from cad.screws import SCREWS, passing_hole
-from design.left_out import LeftOut
-from design.scanner import Scanner
+from scanwright.cad.layout import names
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, adapter_of, arm_top
+from scanwright.cad.layout.direct.cage import SEAT_GAP, cage_of
+from scanwright.cad.layout.direct.stack import STATOR_EXIT
+from scanwright.cad.layout.drive import Stack
+from scanwright.cad.layout.joints import Joint, inward_axes, round_wall_mm
+from scanwright.cad.layout.modules.unasked import unasked
+from scanwright.cad.screws import SCREWS, passing_hole
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 SCREW = SCREWS["M3"]
 WALL = 2.4

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cad.layout.joints import shank_mm
-from cad.screws import TRIPOD_SCREW, Screw, Thread, thread_in_part
-from design.catalogue.products import Printer
+from scanwright.cad.layout.joints import shank_mm
+from scanwright.cad.screws import TRIPOD_SCREW, Screw, Thread, thread_in_part
+from scanwright.design.catalogue.products import Printer
 
 LEAST = 8.0  # thickness: the nut and a floor under it
 FLOOR = 2.0  # under the tripod's nut: its screw stands out little

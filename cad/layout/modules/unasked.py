@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from design.left_out import LeftOut
+from scanwright.design.left_out import LeftOut
 
 
 def unasked(part: str) -> LeftOut:

@@ -14,10 +14,10 @@ from jaxtyping import Float64, Int64
 from numpy import ndarray
 from scipy.stats import chi2
 
-from design.arrays import Floats
-from firmware_io.calibration.model import LAG, Mount, beam_rays
-from firmware_io.calibration.solve import WIDTH, Grouping, covariance, reduced, step
-from firmware_io.calibration.tiles import FlatTiles
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.calibration.model import LAG, Mount, beam_rays
+from scanwright.firmware_io.calibration.solve import WIDTH, Grouping, covariance, reduced, step
+from scanwright.firmware_io.calibration.tiles import FlatTiles
 
 _U = WIDTH - 2
 _RATES = 6

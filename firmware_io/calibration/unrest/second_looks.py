@@ -15,9 +15,9 @@ from jaxtyping import Float64
 from numpy import ndarray
 from scipy.stats import norm
 
-from design.arrays import Floats, Ints, Mask
-from firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
-from firmware_io.calibration.scans import Scans
+from scanwright.design.arrays import Floats, Ints, Mask
+from scanwright.firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
+from scanwright.firmware_io.calibration.scans import Scans
 
 _ONCE_IN = 1000  # recordings: noise takes one beam of them for a place that another went through
 _SQUARES = (

@@ -14,14 +14,14 @@ from types import TracebackType
 
 import numpy as np
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.ldrobot import protocol
-from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.sensor_line import SensorLine, until_back
-from firmware_io.lidar.turn import Points, TurnQueue, timed_scan
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.ldrobot import protocol
+from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.sensor_line import SensorLine, until_back
+from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
 

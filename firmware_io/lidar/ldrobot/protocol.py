@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.arrays import Float32s
-from design.errors import ProtocolError
+from scanwright.design.arrays import Float32s
+from scanwright.design.errors import ProtocolError
 
 POINTS = 12
 SIZE = 47

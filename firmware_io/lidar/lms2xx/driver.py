@@ -14,14 +14,14 @@ from typing import Self
 
 import numpy as np
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.lms2xx import protocol
-from firmware_io.lidar.lms2xx.telegram_count import TelegramCount
-from firmware_io.lidar.sensor_line import SensorLine, until_back
-from firmware_io.samples import Scan
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.lms2xx import protocol
+from scanwright.firmware_io.lidar.lms2xx.telegram_count import TelegramCount
+from scanwright.firmware_io.lidar.sensor_line import SensorLine, until_back
+from scanwright.firmware_io.samples import Scan
 
 FAMILY = "lms2xx"
 

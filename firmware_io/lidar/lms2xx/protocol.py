@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray
 
-from design.errors import ProtocolError
+from scanwright.design.errors import ProtocolError
 
 MODE, TYPE, VARIANT = 0x20, 0x3A, 0x3B
 ANSWER = 0x80

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.lms2xx.protocol import LmsScan
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.lms2xx.protocol import LmsScan
 
 _RATE_MAX = 1e-2  # of its motor [assumed]
 _GRAIN_NS = 3e5  # that its telegrams wander [assumed]

@@ -7,10 +7,10 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 
-from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.lidar.byte_stream import FIRST_BAUD
-from firmware_io.lidar.scip import measurement, protocol
-from firmware_io.lidar.sensor_line import SensorLine
+from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.firmware_io.lidar.byte_stream import FIRST_BAUD
+from scanwright.firmware_io.lidar.scip import measurement, protocol
+from scanwright.firmware_io.lidar.sensor_line import SensorLine
 
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
 _TRIES = 3  # a first request may be glued to what a client before us left half said, which is answered by a refusal

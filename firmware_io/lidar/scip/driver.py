@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from types import TracebackType
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.device_ports import lidar_ports
-from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
-from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.scip import measurement, parameters, protocol
-from firmware_io.lidar.scip.dialogue import ScipDialogue
-from firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
-from firmware_io.lidar.sensor_line import until_back
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.device_ports import lidar_ports
+from scanwright.firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
+from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
+from scanwright.firmware_io.lidar.scip.dialogue import ScipDialogue
+from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
+from scanwright.firmware_io.lidar.sensor_line import until_back
 
 _SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
 _EXCHANGES = 60

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from design.errors import ProtocolError
-from firmware_io.lidar.scip.protocol import LINE_CHARACTERS, Integers, Reply, decode
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.lidar.scip.protocol import LINE_CHARACTERS, Integers, Reply, decode
 
 _SCAN_ECHO = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?(?:;.*)?")
 

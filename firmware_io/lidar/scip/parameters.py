@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.arrays import Float32s
-from design.errors import ProtocolError
-from firmware_io.lidar.lidar import StampAt
-from firmware_io.lidar.scip.measurement import Window
-from firmware_io.lidar.scip.protocol import Integers
+from scanwright.design.arrays import Float32s
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.lidar.lidar import StampAt
+from scanwright.firmware_io.lidar.scip.measurement import Window
+from scanwright.firmware_io.lidar.scip.protocol import Integers
 
 
 @dataclass(frozen=True, slots=True)

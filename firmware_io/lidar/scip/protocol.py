@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from design.errors import ProtocolError
+from scanwright.design.errors import ProtocolError
 
 Integers = NDArray[np.int32]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from jaxtyping import Float32
 from numpy import ndarray
 
-from firmware_io.lidar.scip.parameters import Parameters
-from firmware_io.samples import Scan
+from scanwright.firmware_io.lidar.scip.parameters import Parameters
+from scanwright.firmware_io.samples import Scan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import xor
 
-from design.errors import ProtocolError
-from firmware_io.lidar.sick.values import FORMAT, Kind, Reader
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.lidar.sick.values import FORMAT, Kind, Reader
 
 LONGEST = 1 << 15  # payload: LMS1xx with all its channels needs a fifth
 _START_B = b"\x02\x02\x02\x02"

@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import TypeVar
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.sensor_line import SensorLine
-from firmware_io.lidar.sick.cola import (
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.sensor_line import SensorLine
+from scanwright.firmware_io.lidar.sick.cola import (
     LONGEST,
     Telegram,
     TelegramSplitter,
@@ -18,7 +18,7 @@ from firmware_io.lidar.sick.cola import (
     error_words,
     framed,
 )
-from firmware_io.lidar.sick.values import Reader
+from scanwright.firmware_io.lidar.sick.values import Reader
 
 T = TypeVar("T")
 

@@ -11,16 +11,16 @@ from typing import Self
 
 import numpy as np
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.device_clock import DeviceClock, StampCounter
-from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.sensor_line import until_back
-from firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
-from firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
-from firmware_io.lidar.sick.scan_setting import set_rate
-from firmware_io.samples import Scan
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.device_clock import DeviceClock, StampCounter
+from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.sensor_line import until_back
+from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
+from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
+from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
+from scanwright.firmware_io.samples import Scan
 
 _SCAN_S = 1.0
 _READY_S = 30.0  # a motor that was off takes ten seconds

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float32
 from numpy import ndarray
 
-from design.errors import ProtocolError
-from firmware_io.lidar.sick.cola import Telegram, Writer
-from firmware_io.lidar.sick.values import Reader
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.lidar.sick.cola import Telegram, Writer
+from scanwright.firmware_io.lidar.sick.values import Reader
 
 WRAP_US = 1 << 32
 _ANGLE_UNIT_DEG = 1e-4

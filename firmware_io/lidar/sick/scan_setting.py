@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from design.catalogue.products import Lidar
-from design.errors import DeviceError
-from firmware_io.lidar.sick.dialogue import ColaDialogue, RefusedError
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar.sick.dialogue import ColaDialogue, RefusedError
 
 _SET_UP = {1: "its scan frequency", 2: "its resolution", 3: "its scan frequency and resolution", 4: "its scan area"}
 

@@ -6,7 +6,7 @@ import re
 import struct
 from typing import Literal
 
-from design.errors import ProtocolError
+from scanwright.design.errors import ProtocolError
 
 Kind = Literal["u8", "u16", "u32", "i16", "i32", "f32"]
 

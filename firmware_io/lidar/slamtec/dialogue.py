@@ -9,9 +9,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
-from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.sensor_line import SensorLine
-from firmware_io.lidar.slamtec import protocol
+from scanwright.design.errors import DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.sensor_line import SensorLine
+from scanwright.firmware_io.lidar.slamtec import protocol
 
 _ANSWER_S = 0.5
 

@@ -11,16 +11,16 @@ from contextlib import suppress
 from dataclasses import replace
 from types import TracebackType
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from firmware_io.lidar.lidar import StampAt, TimedScan
-from firmware_io.lidar.sensor_line import until_back
-from firmware_io.lidar.slamtec import protocol
-from firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
-from firmware_io.lidar.slamtec.point_count import PointCount
-from firmware_io.lidar.slamtec.series import SERIES
-from firmware_io.lidar.turn import TurnQueue, timed_scan
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.sensor_line import until_back
+from scanwright.firmware_io.lidar.slamtec import protocol
+from scanwright.firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
+from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
+from scanwright.firmware_io.lidar.slamtec.series import SERIES
+from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
 
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.slamtec import protocol
-from firmware_io.lidar.turn import Points
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.slamtec import protocol
+from scanwright.firmware_io.lidar.turn import Points
 
 _RATE_MAX = 0.05  # of points per second beside what it states: A1s measure 4 to 8 thousand
 _JUMP_DEG = 20.0  # from node to node: some were lost; angles that are triangulated go to and fro by less

@@ -18,8 +18,8 @@ import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from design.arrays import Float32s
-from design.errors import ProtocolError
+from scanwright.design.arrays import Float32s
+from scanwright.design.errors import ProtocolError
 
 STOP: Final = 0x25
 SCAN: Final = 0x20

@@ -20,11 +20,11 @@ import numpy as np
 from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 
-from design.atomic_file import check_place, whole_file
-from design.errors import RecordingError
-from firmware_io.foreign import foreign
-from firmware_io.recording.mcap_chunks import TimedChunks, read_messages
-from firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages
+from scanwright.design.atomic_file import check_place, whole_file
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
+from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages
 
 
 def repair(path: Path, out: Path | None = None) -> RepairSummary:

@@ -13,7 +13,7 @@ from typing import Any
 from mcap import records as mcap
 from mcap.writer import MCAP0_MAGIC
 
-from firmware_io.recording.repair.salvage import (
+from scanwright.firmware_io.recording.repair.salvage import (
     RECORD_HEAD,
     WholeChunk,
     between_magics,

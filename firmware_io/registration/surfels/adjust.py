@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from design import frames
-from design.arrays import Floats, Pose
-from design.concurrency.parallel import in_chunks
-from firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
-from firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
+from scanwright.design import frames
+from scanwright.design.arrays import Floats, Pose
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
+from scanwright.firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
 
 _ROUNDS = 8
 _SETTLED = 5e-2  # squared sigmas of a step: beams at the edges of pieces come and go, and move it as much for ever

@@ -15,7 +15,7 @@ from jaxtyping import Float32, Float64, Int64
 from numba import njit
 from numpy import ndarray
 
-from design.arrays import Float32s, Floats, Ints
+from scanwright.design.arrays import Float32s, Floats, Ints
 
 UNKNOWNS = 13
 """Three of the plane, six of the pose (rotation vector [rad], translation [m]), four of the calibration."""

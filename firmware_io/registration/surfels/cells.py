@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from design.arrays import Floats
+from scanwright.design.arrays import Floats
 
 _LEVELS = 4
 _FINEST = 2.5  # times the spacing: the edge of the smallest cubes

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import PacketFormat, Status
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.bus.serial_line import SerialLine
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.packet_format import PacketFormat, Status
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 _TRIES = 3
 _EXCUSED = 10  # tries in which this computer was kept from running: they say nothing of the servo

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from firmware_io.servo.bus.serial_line import SerialLine
+from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 NO_ANSWER = "no answer: look at its power and cable; another program may have set another speed"
 

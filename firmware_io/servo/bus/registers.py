@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from design.errors import DeviceError
-from firmware_io.servo.bus.packet_format import PacketFormat
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 
 RPM = 2 * math.pi / 60
 

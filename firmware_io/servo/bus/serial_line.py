@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from design.errors import ProtocolError
-from firmware_io.serial_port import open_serial_port
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.serial_port import open_serial_port
 
 _MANY = 4096
 _MOST_LATE = 512  # bytes: several of the longest answers

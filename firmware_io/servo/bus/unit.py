@@ -6,9 +6,9 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.bus import ServoAnswer, ServoBus
-from firmware_io.servo.bus.registers import ControlTable, Register
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.bus import ServoAnswer, ServoBus
+from scanwright.firmware_io.servo.bus.registers import ControlTable, Register
 
 PING_S = 0.05  # a servo answers within a millisecond; USB adapters gather bytes for up to 16 ms, both ways
 

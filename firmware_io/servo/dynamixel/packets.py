@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
-from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
-from firmware_io.servo.bus.serial_line import SerialLine
+from scanwright.design.errors import DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
+from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 _PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 _EVERYONE = 254

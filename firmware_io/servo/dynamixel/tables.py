@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.servo.bus.registers import RPM, ControlTable, Register
-from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
+from scanwright.firmware_io.servo.bus.registers import RPM, ControlTable, Register
+from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 
 _NUMBER = Register(0, 2)
 _CLOCKWISE = 10  # the bit of protocol 1.0

@@ -10,9 +10,9 @@ the registers and the signs are not. A servo that gets a damaged request says no
 
 from __future__ import annotations
 
-from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
-from firmware_io.servo.bus.serial_line import SerialLine
+from scanwright.design.errors import DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
+from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 _PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 _HEADER = b"\xff\xff"

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.servo.bus.registers import ControlTable, Register
-from firmware_io.servo.feetech.packets import STS
+from scanwright.firmware_io.servo.bus.registers import ControlTable, Register
+from scanwright.firmware_io.servo.feetech.packets import STS
 
 _STEP_RAD = 2 * math.pi / 4096
 _MODE = Register(33, 1, name="mode")

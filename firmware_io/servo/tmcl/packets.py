@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import struct
 
-from design.errors import DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
-from firmware_io.servo.bus.serial_line import SerialLine
+from scanwright.design.errors import DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
+from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 AXIS, GLOBAL, USER, INPUT, COMMAND = 0, 1000, 2000, 3000, 4000
 ROTATE_RIGHT, MOVE_TO, FIRMWARE_VERSION = COMMAND + 1, COMMAND + 4, COMMAND + 136

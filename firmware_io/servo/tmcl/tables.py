@@ -18,8 +18,17 @@ from __future__ import annotations
 
 import math
 
-from firmware_io.servo.bus.registers import ControlTable, Register
-from firmware_io.servo.tmcl.packets import AXIS, FIRMWARE_VERSION, GLOBAL, INPUT, MOVE_TO, ROTATE_RIGHT, TMCL, USER
+from scanwright.firmware_io.servo.bus.registers import ControlTable, Register
+from scanwright.firmware_io.servo.tmcl.packets import (
+    AXIS,
+    FIRMWARE_VERSION,
+    GLOBAL,
+    INPUT,
+    MOVE_TO,
+    ROTATE_RIGHT,
+    TMCL,
+    USER,
+)
 
 _PULSE_DIVISOR = 3
 _MICROSTEP_RAD = 2 * math.pi / (200 * 256)

@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.twins.dynamics import HornMotion
-from firmware_io.twins.servo import dynamixel_groups as groups
-from firmware_io.twins.servo.dynamixel_control import count_of, show, wanted
-from firmware_io.twins.servo.dynamixel_memory import INDIRECT, ITEMS
-from firmware_io.twins.servo.dynamixel_packets import fast_status, status, take
-from firmware_io.twins.servo.machine import BROADCAST, Request
-from firmware_io.twins.servo.memory import ACCESS, RANGE, Memory
-from firmware_io.twins.servo_plant import Actuation, Load, plant_of
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.twins.dynamics import HornMotion
+from scanwright.firmware_io.twins.servo import dynamixel_groups as groups
+from scanwright.firmware_io.twins.servo.dynamixel_control import count_of, show, wanted
+from scanwright.firmware_io.twins.servo.dynamixel_memory import INDIRECT, ITEMS
+from scanwright.firmware_io.twins.servo.dynamixel_packets import fast_status, status, take
+from scanwright.firmware_io.twins.servo.machine import BROADCAST, Request
+from scanwright.firmware_io.twins.servo.memory import ACCESS, RANGE, Memory
+from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5

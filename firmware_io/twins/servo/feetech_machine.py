@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.twins.dynamics import HornMotion
-from firmware_io.twins.servo import feetech_packets
-from firmware_io.twins.servo.machine import BROADCAST, Request
-from firmware_io.twins.servo.memory import Memory, TableItem, ro, rw
-from firmware_io.twins.servo_plant import Actuation, Load, plant_of
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.twins.dynamics import HornMotion
+from scanwright.firmware_io.twins.servo import feetech_packets
+from scanwright.firmware_io.twins.servo.machine import BROADCAST, Request
+from scanwright.firmware_io.twins.servo.memory import Memory, TableItem, ro, rw
+from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pkgutil import resolve_name
 
-from design.errors import DeviceError
-from firmware_io.servo.families import all_families, all_tables
-from firmware_io.twins.servo.machine import ServoMachine
-from firmware_io.twins.servo_plant import Load
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.servo.families import all_families, all_tables
+from scanwright.firmware_io.twins.servo.machine import ServoMachine
+from scanwright.firmware_io.twins.servo_plant import Load
 
 
 def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> ServoMachine:

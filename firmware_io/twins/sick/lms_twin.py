@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.catalogue.products import Lidar
-from firmware_io.twins.lidar_line import LidarLine, Sight
+from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
 
 _NEVER_NS = 1 << 62
 _BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady

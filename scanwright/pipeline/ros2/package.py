@@ -11,8 +11,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
-from design.angles import load_angles
-from design.motion import Spin
+from scanwright.design.angles import load_angles
+from scanwright.design.motion import Spin
 from scanwright.pipeline.ros2.layouts import foxglove_layout, rviz_layout
 
 FOLDER = "ros2"

@@ -6,8 +6,8 @@ from typing import Any, Literal, get_args
 
 import viser
 
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
 from scanwright.studio.view.view_3d import SIDES
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from design.angles import standard_settings
-from design.errors import TaskError
-from design.evaluation.metres import PlaneFigures, on_planes, planes_of
-from design.objective.problem import NODES, Problem, problem_of
-from design.objective.score import Score, score, score_on
-from design.search.limits import blind_cones_deg, line_gaps_deg
-from design.search.shortest_period import shortest_period_s
-from design.task.task import LoadedTask
+from scanwright.design.angles import standard_settings
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.metres import PlaneFigures, on_planes, planes_of
+from scanwright.design.objective.problem import NODES, Problem, problem_of
+from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.search.limits import blind_cones_deg, line_gaps_deg
+from scanwright.design.search.shortest_period import shortest_period_s
+from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 
 DRAG_NODES = 2187

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from threading import Lock
 
-from design.angles import STANDARD_DEG
-from design.errors import TaskError
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.errors import TaskError
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.controls import Controls, put
 from scanwright.studio.panel.facts import Facts, Judge

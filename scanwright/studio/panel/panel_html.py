@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from html import escape
 
-from design.evaluation.metres import PlaneFigures
-from design.objective.holes import percent
-from design.objective.stated_error import error_words
+from scanwright.design.evaluation.metres import PlaneFigures
+from scanwright.design.objective.holes import percent
+from scanwright.design.objective.stated_error import error_words
 from scanwright.serving.style import COLOUR_STOPS
 from scanwright.studio.panel.facts import WALL_M, Facts
 from scanwright.studio.view.coloured_sphere import LEAST_OF_HIGHEST

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from design.errors import TaskError
-from design.task.task import LoadedTask
+from scanwright.design.errors import TaskError
+from scanwright.design.task.task import LoadedTask
 from scanwright.serving.style import note_html
 from scanwright.studio.panel.build_process import BuildProcess
 from scanwright.studio.panel.controls import Controls, put

@@ -8,11 +8,11 @@ import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
-from design.arrays import Array
-from design.evaluation.coverage import mean_density_at
-from design.objective.problem import Problem
-from design.sphere.directions import spiral
-from design.sphere.regions import Field
+from scanwright.design.arrays import Array
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.objective.problem import Problem
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.sphere.regions import Field
 from scanwright.serving.style import Colours, ramp
 
 TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from design import frames
-from design.arrays import Array
-from design.frames import Rx, Ry, Rz
-from design.scanner import Scanner
-from design.scene.ray_caster import Scene, build_scene, load_scene
-from design.task.shapes import Placed
-from firmware_io.twins.world import furnished_room, measure_ranges, range_model, see
+from scanwright.design import frames
+from scanwright.design.arrays import Array
+from scanwright.design.frames import Rx, Ry, Rz
+from scanwright.design.scanner import Scanner
+from scanwright.design.scene.ray_caster import Scene, build_scene, load_scene
+from scanwright.design.task.shapes import Placed
+from scanwright.firmware_io.twins.world import furnished_room, measure_ranges, range_model, see
 
 MOST_RAYS = 150_000  # what a page draws at once
 SEED = 0

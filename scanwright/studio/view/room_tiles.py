@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, UInt32
 from numpy import ndarray
 
-from design.arrays import Array
+from scanwright.design.arrays import Array
 from scanwright.report.cut_room import Room
 
 TILES = 5_000  # about; as many as the sphere has

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cad.layout.names import ALIGNMENT_LINKAGE
-from design.scanner import Scanner
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.design.scanner import Scanner
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,8 +36,8 @@ def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     Raises:
         BuildError: a part cannot be made.
     """
-    from cad.assembly.linkage_preview import coarse_mesh, draft_linkage
-    from cad.assembly.make import make_parts
+    from scanwright.cad.assembly.linkage_preview import coarse_mesh, draft_linkage
+    from scanwright.cad.assembly.make import make_parts
 
     assembly = make_parts(scanner, lambda spec: spec.name != ALIGNMENT_LINKAGE and spec.turns == turning)
     meshes = {name: coarse_mesh(solid) for name, solid in (assembly.made | assembly.bought).items()}

@@ -8,10 +8,10 @@ import numpy as np
 import viser
 import viser.transforms
 
-from design.arrays import Array
-from design.frames import R_world_rot
-from design.objective.problem import Problem
-from design.task.task import Task
+from scanwright.design.arrays import Array
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.task.task import Task
 from scanwright.report.cut_room import Room, room_about
 from scanwright.serving.style import Colours, ramp
 from scanwright.studio.state import Setting

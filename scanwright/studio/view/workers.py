@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import ParamSpec, TypeVar
 
-from design.concurrency.processes import kill, spawn_pool
-from design.errors import ScanwrightError
-from design.objective.problem import Problem
-from design.scanner import Scanner
-from design.task.task import LoadedTask
+from scanwright.design.concurrency.processes import kill, spawn_pool
+from scanwright.design.errors import ScanwrightError
+from scanwright.design.objective.problem import Problem
+from scanwright.design.scanner import Scanner
+from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.preview_scan import preview_scan

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from scanners import scanner_at
 
-from cad.assembly.assembly import as_tree
-from cad.assembly.bought import bought_of
-from cad.files.step import step_text
-from cad.layout.layout import layout_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
+from scanwright.cad.assembly.assembly import as_tree
+from scanwright.cad.assembly.bought import bought_of
+from scanwright.cad.files.step import step_text
+from scanwright.cad.layout.layout import layout_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.scanner import scanner_of
 
 CASES = [(90, 0), (60, -30)]  # whose parts other tests take too
 

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scanners import PITCHING, scanner_at
 
-from cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
-from cad.checks.beams import beam_checks
-from design.search.with_parts import Refused, Workshop
-from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
+from scanwright.cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
+from scanwright.cad.checks.beams import beam_checks
+from scanwright.design.search.with_parts import Refused, Workshop
+from scanwright.design.shadow import AXIS_STEPS, Shadow, own_body_bytes
 
 
 def scanner_for(*setting_deg):

@@ -11,24 +11,24 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import cad.checks.run as room
-from cad.assembly import masses
-from cad.checks.check import at_least, at_most, checks_text, failed_of, failure_lines, read_checks
-from cad.checks.clearance import together_check, turning_check
-from cad.checks.islands import islands_check, islands_of
-from cad.checks.mechanics import mechanics_checks
-from cad.checks.printing import printing_checks, thin_walls
-from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import TriMesh, mesh_of
-from cad.geometry.print_pose import print_pose
-from cad.layout.balance.imbalance import keeps_flank
-from cad.layout.direct.sizing import direct_stack
-from cad.solids import box, location, upright
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.errors import BuildError
-from design.motion import Sweep
-from design.scanner import scanner_of
+import scanwright.cad.checks.run as room
+from scanwright.cad.assembly import masses
+from scanwright.cad.checks.check import at_least, at_most, checks_text, failed_of, failure_lines, read_checks
+from scanwright.cad.checks.clearance import together_check, turning_check
+from scanwright.cad.checks.islands import islands_check, islands_of
+from scanwright.cad.checks.mechanics import mechanics_checks
+from scanwright.cad.checks.printing import printing_checks, thin_walls
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.geometry.mesh import TriMesh, mesh_of
+from scanwright.cad.geometry.print_pose import print_pose
+from scanwright.cad.layout.balance.imbalance import keeps_flank
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.solids import box, location, upright
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import BuildError
+from scanwright.design.motion import Sweep
+from scanwright.design.scanner import scanner_of
 
 
 def scanner_for(alpha_rot, beta_rot, alpha, beta, lidar="UTM-30LX", servo="MX-64R"):

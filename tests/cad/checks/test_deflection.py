@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cad.checks.deflection import sag_of, split
-from cad.geometry.inertia import Inertial
-from cad.geometry.mesh import mesh_of
-from cad.layout.direct.loads import hanging, shaft_modulus_pa
-from cad.layout.layout import layout_of
-from cad.layout.loads import ALUMINIUM_PA, weight_of
-from cad.parts.horn_cup import horn_cup
-from cad.solids import box, upright
-from cad.statics import elastic
-from cad.statics.sag import linkage_sag
-from cad.statics.shaft import shaft_bend
-from cad.statics.voxels import Grid, filled
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
+from scanwright.cad.checks.deflection import sag_of, split
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.geometry.mesh import mesh_of
+from scanwright.cad.layout.direct.loads import hanging, shaft_modulus_pa
+from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.layout.loads import ALUMINIUM_PA, weight_of
+from scanwright.cad.parts.horn_cup import horn_cup
+from scanwright.cad.solids import box, upright
+from scanwright.cad.statics import elastic
+from scanwright.cad.statics.sag import linkage_sag
+from scanwright.cad.statics.shaft import shaft_bend
+from scanwright.cad.statics.voxels import Grid, filled
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.scanner import scanner_of
 
 
 def rot(axis, angle):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scanners import scanner_at
 
-from cad.assembly.shadow import shadow_of, triangles_of
-from cad.assembly.steps import steps_of
-from cad.assembly.tube import lead_solid
-from cad.checks.clearance import clearance_checks
-from cad.checks.rotor_leads import lead_checks
-from cad.layout.cables import joint
-from cad.layout.cables.path import Path
+from scanwright.cad.assembly.shadow import shadow_of, triangles_of
+from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.assembly.tube import lead_solid
+from scanwright.cad.checks.clearance import clearance_checks
+from scanwright.cad.checks.rotor_leads import lead_checks
+from scanwright.cad.layout.cables import joint
+from scanwright.cad.layout.cables.path import Path
 
 
 @pytest.fixture(scope="module")

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cad.assembly.masses import link_bodies
-from cad.checks.mount import carried, mount_checks
-from cad.geometry.mesh import mesh_of
-from cad.layout.loads import STANDARD_GRAVITY
-from cad.layout.names import BASE_MOUNT
-from cad.screws import SCREWS
-from cad.solids import box
-from cad.statics.mount_sag import Carried, mount_sag
+from scanwright.cad.assembly.masses import link_bodies
+from scanwright.cad.checks.mount import carried, mount_checks
+from scanwright.cad.geometry.mesh import mesh_of
+from scanwright.cad.layout.loads import STANDARD_GRAVITY
+from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.screws import SCREWS
+from scanwright.cad.solids import box
+from scanwright.cad.statics.mount_sag import Carried, mount_sag
 
 HALF, HIGH, MODULUS, DENSITY = 12.0, 120.0, 2000.0, 1.2  # mm, MPa, g/cm3
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, scanner_at
 
-import cad.checks.retention as room
-from cad import solids
-from cad.checks.retention import hanging_on, retention_checks, worst_shares
-from cad.layout.all_joints import joints_of
-from cad.layout.joints import ScrewAxis
-from cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
-from cad.screws import SCREWS, thread_in_part
-from design.catalogue.catalogue import load_catalogue
+import scanwright.cad.checks.retention as room
+from scanwright.cad import solids
+from scanwright.cad.checks.retention import hanging_on, retention_checks, worst_shares
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.joints import ScrewAxis
+from scanwright.cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
+from scanwright.cad.screws import SCREWS, thread_in_part
+from scanwright.design.catalogue.catalogue import load_catalogue
 
 SCANNERS = {"direct": scanner_at(GROUND_AHEAD), "belt": scanner_at(ROLLING, slip_ring=CAPSULE)}
 

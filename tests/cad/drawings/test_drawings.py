@@ -20,18 +20,18 @@ from shapely import box as shapely_box
 from shapely.affinity import rotate, translate
 from svglib.svglib import svg2rlg
 
-from cad.drawings.dimensions import angle_between, spread
-from cad.drawings.part import part_of
-from cad.drawings.patterns import number, patterns_of
-from cad.drawings.pen import CAPITAL, DIAMETER, TURN, Pen, document_at
-from cad.drawings.project import Arc, project
-from cad.drawings.section import HATCH_MM, cut_along_axis, hatching
-from cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
-from cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
-from cad.geometry.holes import rounds_of
-from cad.layout.all_joints import joints_of
-from cad.layout.fits import OnSheet, ToleratedDiameter
-from cad.solids import box, cylinder, upright
+from scanwright.cad.drawings.dimensions import angle_between, spread
+from scanwright.cad.drawings.part import part_of
+from scanwright.cad.drawings.patterns import number, patterns_of
+from scanwright.cad.drawings.pen import CAPITAL, DIAMETER, TURN, Pen, document_at
+from scanwright.cad.drawings.project import Arc, project
+from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
+from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
+from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
+from scanwright.cad.geometry.holes import rounds_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)
 SVG = "{http://www.w3.org/2000/svg}"

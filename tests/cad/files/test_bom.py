@@ -9,17 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scanners import TILTED, scanner_at
 
-from cad.assembly.make import make_parts
-from cad.files.bom import _wiring, bom_text, items_of
-from cad.files.manual.instructions import instructions_text
-from cad.files.manual.scenes import scenes_of
-from cad.geometry.holes import rounds_of
-from cad.layout.all_joints import joints_of
-from cad.layout.joints import LENGTHS, shank_mm
-from cad.screws import INSERT_LENGTH, SCREWS
-from design.angles import Angles
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.files.bom import _wiring, bom_text, items_of
+from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.geometry.holes import rounds_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.joints import LENGTHS, shank_mm
+from scanwright.cad.screws import INSERT_LENGTH, SCREWS
+from scanwright.design.angles import Angles
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
 
 
 @pytest.fixture(scope="module")

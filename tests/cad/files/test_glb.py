@@ -9,8 +9,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from cad.files.glb import shaded
-from cad.geometry.mesh import TriMesh
+from scanwright.cad.files.glb import shaded
+from scanwright.cad.geometry.mesh import TriMesh
 
 SIZE = {5123: ("<u2", 2), 5125: ("<u4", 4), 5126: ("<f4", 4)}
 WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}

@@ -8,7 +8,7 @@ from quick_tests import samples
 from scanners import CAPSULE, UPRIGHT, scanner_at
 
 from benchmarks.cad import elements, freecad
-from cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.names import BASE_MOUNT
 
 SETTINGS = {  # five linkages, three of them on a mount
     "ground_ahead": None,

@@ -14,13 +14,13 @@ from lib3mf import get_wrapper
 from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
-from cad.assembly.print_settings import print_words, slicer_settings
-from cad.files.threemf import threemf_bytes
-from cad.geometry.mesh import TriMesh
-from cad.geometry.print_pose import on_bed, print_pose
-from cad.labels.glyphs import GLYPHS, text_width
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Printer
+from scanwright.cad.assembly.print_settings import print_words, slicer_settings
+from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.print_pose import on_bed, print_pose
+from scanwright.cad.labels.glyphs import GLYPHS, text_width
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Printer
 
 SETTINGS = {"layer_height": "0.25", "fill_density": "100%"}
 BED = (220.0, 220.0, 250.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from cad.files.step import canonical_step
-from cad.geometry.mesh import TriMesh, mesh_of, stl_bytes
-from cad.solids import box, upright
+from scanwright.cad.files.step import canonical_step
+from scanwright.cad.geometry.mesh import TriMesh, mesh_of, stl_bytes
+from scanwright.cad.solids import box, upright
 
 STEP = """ISO-10303-21;
 HEADER;

@@ -8,13 +8,13 @@ from lib3mf import get_wrapper
 from PIL import Image
 from scipy.spatial import ConvexHull
 
-from cad.files.manual.instructions import picture_name, step_files
-from cad.files.manual.pictures import SIZE, WORDS, StepPictures
-from cad.files.manual.scenes import scenes_of
-from cad.files.plates import EDGE_MM, GAP_MM, plates_of
-from cad.geometry.mesh import TriMesh
-from cad.geometry.print_pose import on_bed
-from cad.layout.all_joints import joints_of
+from scanwright.cad.files.manual.instructions import picture_name, step_files
+from scanwright.cad.files.manual.pictures import SIZE, WORDS, StepPictures
+from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.files.plates import EDGE_MM, GAP_MM, plates_of
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.print_pose import on_bed
+from scanwright.cad.layout.all_joints import joints_of
 
 
 @pytest.fixture(scope="module")

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from cad.files.part_files import build_parts
-from cad.files.urdf import urdf_text
-from cad.geometry.inertia import Inertial
-from cad.layout.cables.leads import leads_of
-from cad.layout.cables.standing import standing_leads_of
-from cad.layout.layout import drive_of, layout_of, mount_offset_mm
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Bearing
-from design.errors import BuildError
-from design.frames import roll_pitch_yaw
-from design.scanner import scanner_of
+from scanwright.cad.files.part_files import build_parts
+from scanwright.cad.files.urdf import urdf_text
+from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.cables.leads import leads_of
+from scanwright.cad.layout.cables.standing import standing_leads_of
+from scanwright.cad.layout.layout import drive_of, layout_of, mount_offset_mm
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Bearing
+from scanwright.design.errors import BuildError
+from scanwright.design.frames import roll_pitch_yaw
+from scanwright.design.scanner import scanner_of
 
 CASES = {
     "rolling": {"angles_deg": (0, 90, 0, 0, -90, 0)},

@@ -6,12 +6,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cad.files.schematic import schematic_svg
-from cad.files.wiring import wiring_files
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.electrics.wiring import network_of
-from design.scanner import scanner_of
+from scanwright.cad.files.schematic import schematic_svg
+from scanwright.cad.files.wiring import wiring_files
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.scanner import scanner_of
 
 SVG = "{http://www.w3.org/2000/svg}"
 SCANNERS = {

@@ -7,18 +7,18 @@ import pytest
 import shapely
 import trimesh
 
-from cad import solids
-from cad.geometry.holes import Piercing
-from cad.geometry.mesh import checked_mesh
-from cad.labels.engrave import engrave, groove_of
-from cad.labels.flats import flat_at, flats_of
-from cad.labels.glyphs import letters, text_width
-from cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
-from cad.labels.sight import Sight
-from cad.layout.layout import config_hash, layout_of
-from cad.solids import box, upright
-from design.left_out import LeftOut
-from design.motion import Sweep
+from scanwright.cad import solids
+from scanwright.cad.geometry.holes import Piercing
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.labels.engrave import engrave, groove_of
+from scanwright.cad.labels.flats import flat_at, flats_of
+from scanwright.cad.labels.glyphs import letters, text_width
+from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
+from scanwright.cad.labels.sight import Sight
+from scanwright.cad.layout.layout import config_hash, layout_of
+from scanwright.cad.solids import box, upright
+from scanwright.design.left_out import LeftOut
+from scanwright.design.motion import Sweep
 
 STROKE = 0.8
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
-from cad.layout.cables.leads import leads_of, outlet_mm
-from cad.layout.cables.path import Path
-from cad.layout.cables.room import room_of
-from cad.layout.layout import layout_of
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.scanner import scanner_of
+from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
+from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
+from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.room import room_of
+from scanwright.cad.layout.layout import layout_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.scanner import scanner_of
 
 BORE, CAPSULE = "UH1256-02-0610-06S", "SRC022A-6"
 SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a hollow shaft

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cad.geometry.mesh import checked_mesh
-from cad.layout.deck import deck_of
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.layout import drive_of, layout_of
-from cad.parts.base_mount import base_mount
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.deck_holes import Circle, Rectangle
-from design.errors import BuildError
-from design.scanner import scanner_of
-from design.task.task import load_task
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.layout.deck import deck_of
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.layout import drive_of, layout_of
+from scanwright.cad.parts.base_mount import base_mount
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.deck_holes import Circle, Rectangle
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import scanner_of
+from scanwright.design.task.task import load_task
 
 SCREW_HOLE = {"M3": 3.4, "M4": 4.4, "M5": 5.4, "M6": 6.4}  # with the 0.4 mm of fdm-0.4
 TASK = """name = "holes"

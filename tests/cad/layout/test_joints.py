@@ -17,12 +17,12 @@ from OCP.BRepAdaptor import BRepAdaptor_Surface
 from quick_tests import samples
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
-from cad.geometry.holes import Piercing, rounds_of
-from cad.layout.all_joints import joints_of
-from cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
-from cad.screws import SCREWS, thread_hole, trap_of
-from design.deck_holes import Rectangle
-from design.scanner import Modules
+from scanwright.cad.geometry.holes import Piercing, rounds_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
+from scanwright.cad.screws import SCREWS, thread_hole, trap_of
+from scanwright.design.deck_holes import Rectangle
+from scanwright.design.scanner import Modules
 
 COAXIAL = 0.05
 LOOSE = 0.1  # the kernel bounds a face whose end is cut by bore and flat no better

@@ -4,10 +4,10 @@ import ast
 import re
 from pathlib import Path
 
-import cad
-from cad.layout import names
+import scanwright.cad
+from scanwright.cad.layout import names
 
-FOLDER = Path(cad.__file__).parent
+FOLDER = Path(scanwright.cad.__file__).parent
 WORDS = {"BEARING", "BELT", "DECK", "LIDAR", "RING", "SERVO", "SWITCH", "TRIPOD"}  # of everyday speech, and of frames
 NAMES = [value for key, value in vars(names).items() if key.isupper() and key not in WORDS]
 

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cad.layout.joints import LENGTHS, shank_mm
-from cad.screws import SCREWS
+from scanwright.cad.layout.joints import LENGTHS, shank_mm
+from scanwright.cad.screws import SCREWS
 
 ISO_888 = (2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 25, 30, 35, 40, 45, 50)
 """Nominal lengths of bolts and screws."""

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from cad.assembly.make import make_parts
-from cad.checks.clearance import clearance_checks
-from cad.checks.retention import retention_checks
-from cad.layout.all_joints import joints_of
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.joints import held_in
-from cad.layout.layout import layout_of
-from cad.screws import SCREWS
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import SlipRing
-from design.errors import BuildError
-from design.scanner import scanner_of
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.checks.clearance import clearance_checks
+from scanwright.cad.checks.retention import retention_checks
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.joints import held_in
+from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.screws import SCREWS
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import SlipRing
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import scanner_of
 
 CATALOGUE = load_catalogue()
 TILTED = (0, -55, -80, 75)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
-from cad.layout.cables.standing import standing_leads_of
-from cad.layout.cables.standing_room import standing_room_of
-from cad.layout.cables.ties import foot_ties_of
-from cad.layout.deck import FOOT_THICKNESS
-from cad.layout.layout import layout_of
-from design.deck_holes import Rectangle
+from scanwright.cad.layout.cables.standing import standing_leads_of
+from scanwright.cad.layout.cables.standing_room import standing_room_of
+from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.layout import layout_of
+from scanwright.design.deck_holes import Rectangle
 
 LAID = [
     (GROUND_AHEAD, {}),  # a cage around the ring

@@ -11,20 +11,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scanners import GROUND_AHEAD, ROLLING, scanner_at
 
-from cad.assembly.make import make_parts
-from cad.assembly.masses import link_bodies, rotor_moment, rotor_of
-from cad.assembly.shadow import shadow_of, triangles_of
-from cad.files.manual.instructions import instructions_text
-from cad.files.manual.scenes import scenes_of
-from cad.geometry.inertia import of_line, of_solid
-from cad.layout.all_joints import joints_of
-from cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
-from cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
-from cad.layout.cables.leads import SAMPLE
-from cad.layout.layout import drive_of, layout_of
-from cad.layout.linkage import Ear, linkage_of
-from design.left_out import LeftOut
-from design.motion import Sweep
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.masses import link_bodies, rotor_moment, rotor_of
+from scanwright.cad.assembly.shadow import shadow_of, triangles_of
+from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.geometry.inertia import of_line, of_solid
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.balance.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
+from scanwright.cad.layout.balance.imbalance import estimated_moment, keeps_flank, torque_nm
+from scanwright.cad.layout.cables.leads import SAMPLE
+from scanwright.cad.layout.layout import drive_of, layout_of
+from scanwright.cad.layout.linkage import Ear, linkage_of
+from scanwright.design.left_out import LeftOut
+from scanwright.design.motion import Sweep
 from scanwright.studio.view.scanner_bodies import make_bodies
 
 SHIPPED = [GROUND_AHEAD, ROLLING]

@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 from quick_tests import samples
 from scanners import GROUND_AHEAD, ROLLING, scanner_at
 
-from cad.assembly.make import make_parts
-from cad.assembly.masses import link_bodies, rotor_weight
-from cad.checks.remarks import findings_of, left_out_of
-from cad.geometry.mesh import checked_mesh
-from cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, heaviest, supported
-from cad.layout.direct.misalignment import contributions, offsets_mm, worst_moment_nm
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.layout import config_hash, layout_of
-from cad.layout.loads import Weight
-from cad.layout.names import ROTOR_LEAD
-from cad.parts.all_parts import parts_of
-from design.catalogue.products import Bearing, Servo
-from design.errors import BuildError
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.masses import link_bodies, rotor_weight
+from scanwright.cad.checks.remarks import findings_of, left_out_of
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.layout.direct.cage import cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, heaviest, supported
+from scanwright.cad.layout.direct.misalignment import contributions, offsets_mm, worst_moment_nm
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.layout import config_hash, layout_of
+from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.names import ROTOR_LEAD
+from scanwright.cad.parts.all_parts import parts_of
+from scanwright.design.catalogue.products import Bearing, Servo
+from scanwright.design.errors import BuildError
 
 degrees = st.floats(-90, 90)
 

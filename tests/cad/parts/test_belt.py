@@ -12,36 +12,36 @@ import trimesh
 from cadquery import Vector
 from scanners import CAPSULE, scanner_at
 
-from cad.assembly.make import make_parts
-from cad.checks.printing import thin_walls
-from cad.checks.remarks import without_traps
-from cad.checks.run import run_checks
-from cad.drawings.files import drawing_of
-from cad.drawings.write import Words, drawn_on
-from cad.files.bom import items_of
-from cad.files.manual.instructions import instructions_text
-from cad.files.manual.scenes import scenes_of
-from cad.files.urdf import urdf_text
-from cad.geometry.holes import rounds_of
-from cad.geometry.mesh import mesh_of
-from cad.layout.all_joints import joints_of
-from cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, press_newton
-from cad.layout.belt.sizing import QUARTERS, belt_stack
-from cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
-from cad.layout.belt.tower import tower_of
-from cad.layout.direct.stack import DirectStack
-from cad.layout.layout import config_hash, drive_of, layout_of, mount_offset_mm
-from cad.layout.loads import Weight
-from cad.layout.names import ROTOR_LEAD
-from cad.outlines import polygon
-from cad.parts.all_parts import parts_of
-from cad.parts.bearing_tower import bearing_tower
-from cad.screws import SCREWS
-from cad.solids import prism, upright
-from cad.statics.shaft import belt_shaft_bend
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo, SlipRing
-from design.errors import BuildError
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.checks.printing import thin_walls
+from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.run import run_checks
+from scanwright.cad.drawings.files import drawing_of
+from scanwright.cad.drawings.write import Words, drawn_on
+from scanwright.cad.files.bom import items_of
+from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.files.urdf import urdf_text
+from scanwright.cad.geometry.holes import rounds_of
+from scanwright.cad.geometry.mesh import mesh_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, press_newton
+from scanwright.cad.layout.belt.sizing import QUARTERS, belt_stack
+from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
+from scanwright.cad.layout.belt.tower import tower_of
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.layout import config_hash, drive_of, layout_of, mount_offset_mm
+from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.names import ROTOR_LEAD
+from scanwright.cad.outlines import polygon
+from scanwright.cad.parts.all_parts import parts_of
+from scanwright.cad.parts.bearing_tower import bearing_tower
+from scanwright.cad.screws import SCREWS
+from scanwright.cad.solids import prism, upright
+from scanwright.cad.statics.shaft import belt_shaft_bend
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo, SlipRing
+from scanwright.design.errors import BuildError
 
 
 def scanner_for(alpha_rot=0, beta_rot=90, alpha=0, beta=-90, ring=CAPSULE):
@@ -378,7 +378,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
 
 
 def test_the_frame_chain_names_the_servo_beside_the_axis(made):
-    from cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.masses import link_bodies
 
     drive, bodies = made.assembly.layout.drive, link_bodies(made.scanner, made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]

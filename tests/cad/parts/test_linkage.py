@@ -12,23 +12,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from quick_tests import samples
 
-from cad.assembly.linkage_preview import draft_linkage
-from cad.checks.printing import thin_walls
-from cad.geometry.mesh import checked_mesh
-from cad.layout.deck import deck_of
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.envelope import covered_screws, ear_screws, envelope_of, rotor_radius, screw_travel_mm, slot_ends
-from cad.layout.layout import config_hash, drive_of, layout_of
-from cad.layout.linkage import linkage_of
-from cad.parts.alignment_linkage import alignment_linkage
-from cad.parts.base_mount import base_mount
-from cad.parts.sub_plate import sub_plate
-from cad.solids import box, building
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Provenance, SlipRing
-from design.errors import BuildError
-from design.scanner import scanner_of
+from scanwright.cad.assembly.linkage_preview import draft_linkage
+from scanwright.cad.checks.printing import thin_walls
+from scanwright.cad.geometry.mesh import checked_mesh
+from scanwright.cad.layout.deck import deck_of
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.envelope import (
+    covered_screws,
+    ear_screws,
+    envelope_of,
+    rotor_radius,
+    screw_travel_mm,
+    slot_ends,
+)
+from scanwright.cad.layout.layout import config_hash, drive_of, layout_of
+from scanwright.cad.layout.linkage import linkage_of
+from scanwright.cad.parts.alignment_linkage import alignment_linkage
+from scanwright.cad.parts.base_mount import base_mount
+from scanwright.cad.parts.sub_plate import sub_plate
+from scanwright.cad.solids import box, building
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Provenance, SlipRing
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import scanner_of
 
 degrees = st.floats(-90, 90)
 turns = st.floats(-180, 180)

@@ -10,27 +10,27 @@ import trimesh
 from quick_tests import samples
 from scanners import GROUND_AHEAD, RING, ROLLING, UPRIGHT, scanner_at
 
-from cad.assembly.make import make_parts
-from cad.assembly.shadow import PartsWorkshop
-from cad.assembly.steps import steps_of
-from cad.checks.clearance import clearance_checks
-from cad.checks.remarks import left_out_of
-from cad.checks.retention import hanging_on, retention_checks, worst_shares
-from cad.checks.run import module_checks
-from cad.files.bom import items_of
-from cad.layout.all_joints import joints_of
-from cad.layout.deck import FOOT_THICKNESS
-from cad.layout.layout import config_hash, layout_of
-from cad.layout.modules.homing_flag import bracket_of, passes_at_deg, vane_half_deg
-from cad.layout.modules.ring_cover import cover_of
-from cad.layout.names import LIDAR
-from cad.parts.all_parts import parts_of
-from design.electrics.rules import broken_rules
-from design.electrics.wiring import network_of
-from design.errors import BuildError
-from design.left_out import LeftOut
-from design.scanner import NO_MODULES, Modules
-from design.search.with_parts import Refused
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.shadow import PartsWorkshop
+from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.checks.clearance import clearance_checks
+from scanwright.cad.checks.remarks import left_out_of
+from scanwright.cad.checks.retention import hanging_on, retention_checks, worst_shares
+from scanwright.cad.checks.run import module_checks
+from scanwright.cad.files.bom import items_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.layout import config_hash, layout_of
+from scanwright.cad.layout.modules.homing_flag import bracket_of, passes_at_deg, vane_half_deg
+from scanwright.cad.layout.modules.ring_cover import cover_of
+from scanwright.cad.layout.names import LIDAR
+from scanwright.cad.parts.all_parts import parts_of
+from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import NO_MODULES, Modules
+from scanwright.design.search.with_parts import Refused
 
 
 def scanner_for(angles, modules, ring=RING):

@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from scanners import TILTED, scanner_at
 
-from cad import outlines, solids
-from cad.checks.remarks import without_traps
-from cad.files.bom import items_of
-from cad.files.manual.instructions import instructions_text
-from cad.files.manual.scenes import scenes_of
-from cad.geometry.holes import rounds_of
-from cad.labels.fit_coupon import fit_coupon
-from cad.layout.all_joints import joints_of
-from cad.layout.direct.cage import cage_of, has_room
-from cad.layout.direct.sizing import direct_stack
-from cad.layout.linkage import linkage_of
-from cad.parts.alignment_linkage import alignment_linkage
-from cad.screws import SCREWS, thread_in_part, trap_of
-from design.angles import Angles
-from design.catalogue.catalogue import load_catalogue
+from scanwright.cad import outlines, solids
+from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.files.bom import items_of
+from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.geometry.holes import rounds_of
+from scanwright.cad.labels.fit_coupon import fit_coupon
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.direct.cage import cage_of, has_room
+from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.linkage import linkage_of
+from scanwright.cad.parts.alignment_linkage import alignment_linkage
+from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
+from scanwright.design.angles import Angles
+from scanwright.design.catalogue.catalogue import load_catalogue
 
 M3 = SCREWS["M3"]
 ACROSS, HEIGHT = 5.5, 2.4  # ISO 4032

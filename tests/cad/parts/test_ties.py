@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
-from cad.assembly.steps import steps_of
-from cad.checks.remarks import left_out_of
-from cad.layout.cables.leads import tied_mm
-from cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
-from cad.layout.cables.ties import foot_ties_of
-from cad.layout.cables.words import tied_at
-from cad.layout.deck import FOOT_THICKNESS
-from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
+from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.checks.remarks import left_out_of
+from scanwright.cad.layout.cables.leads import tied_mm
+from scanwright.cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
+from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.cables.words import tied_at
+from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
 
 TIE = (2.5, 1.1)  # width and thickness
 

@@ -11,18 +11,18 @@ import pytest
 from quick_tests import samples
 
 from benchmarks.design.claims import contest, random_claim
-from design.catalogue.catalogue import load_catalogue
-from design.objective import score as scoring
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.search.coarse import Effort, coarse_landscape
-from design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
-from design.search.optimum import directions_left_out
-from design.search.search import search
-from design.sphere import polar_rule
-from design.sphere.directions import Samples, spiral
-from design.sphere.polar_rule import breaks_of
-from design.task.task import Limits, LoadedTask, Task, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.objective import score as scoring
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.coarse import Effort, coarse_landscape
+from scanwright.design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
+from scanwright.design.search.optimum import directions_left_out
+from scanwright.design.search.search import search
+from scanwright.design.sphere import polar_rule
+from scanwright.design.sphere.directions import Samples, spiral
+from scanwright.design.sphere.polar_rule import breaks_of
+from scanwright.design.task.task import Limits, LoadedTask, Task, load_task
 
 BAND = {"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}
 EXACT = Effort(margin=np.inf, rounds=0)  # so that no bound stands for a J

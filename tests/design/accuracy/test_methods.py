@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from design.accuracy import work_precision
-from design.accuracy.methods import METHODS, by_ball_count, by_ball_search
-from design.accuracy.reference import smooth_reference
-from design.accuracy.work_precision import Point, best_points, measure_methods
-from design.density.beams import beam_directions_rot, polar_and_azimuth
-from design.density.spin import zones
-from design.errors import TaskError
-from design.objective.problem import FRONT, NODES, nodes_for, problem_of
-from design.objective.score import score
-from design.task.task import load_task
 from scanwright.cli.app import run as scanwright_command
+from scanwright.design.accuracy import work_precision
+from scanwright.design.accuracy.methods import METHODS, by_ball_count, by_ball_search
+from scanwright.design.accuracy.reference import smooth_reference
+from scanwright.design.accuracy.work_precision import Point, best_points, measure_methods
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth
+from scanwright.design.density.spin import zones
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.problem import FRONT, NODES, nodes_for, problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.task.task import load_task
 
 ANGLES = np.radians([0.0, 0.0, -50.0, 35.0])
 
@@ -66,9 +66,11 @@ def test_every_method_converges_to_the_reference(ground, name):
 
 
 def test_the_error_is_the_worst_of_several_settings(ground, monkeypatch):
-    monkeypatch.setattr("design.accuracy.methods.METHODS", {"segments": (METHODS["segments"][0], "nodes", (81,))})
+    monkeypatch.setattr(
+        "scanwright.design.accuracy.methods.METHODS", {"segments": (METHODS["segments"][0], "nodes", (81,))}
+    )
     monkeypatch.setattr(work_precision, "OTHERS", 1)
-    monkeypatch.setattr("design.accuracy.reference.ORDERS", (12, 20, 40))
+    monkeypatch.setattr("scanwright.design.accuracy.reference.ORDERS", (12, 20, 40))
     measured = measure_methods(load_task(Path("ground_ahead")), ground, ANGLES, lambda _: None)
     (found,) = measured.points
     assert [truth.J for truth in measured.truths[:1]] == [smooth_reference(ground, ANGLES).J]
@@ -100,8 +102,8 @@ def test_the_stress_command_writes_its_table(tmp_path, monkeypatch, capsys):
 
 def test_the_report_on_a_fixed_setting(tmp_path, monkeypatch, capsys):
     few = {name: (*METHODS[name][:2], METHODS[name][2][:2]) for name in ("segments", "mean count", "rings")}
-    monkeypatch.setattr("design.accuracy.methods.METHODS", few)
-    monkeypatch.setattr("design.accuracy.reference.ORDERS", (12, 20))
+    monkeypatch.setattr("scanwright.design.accuracy.methods.METHODS", few)
+    monkeypatch.setattr("scanwright.design.accuracy.reference.ORDERS", (12, 20))
     monkeypatch.setattr(sys, "argv", ["scanwright", "accuracy", "rolling", "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as stop:
         scanwright_command()

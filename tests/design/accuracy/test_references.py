@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from design.accuracy.methods import METHODS
-from design.accuracy.reference import is_smooth, reference, smooth_reference
-from design.objective.counted import counted_J
-from design.objective.problem import problem_of
-from design.task.task import load_task
+from scanwright.design.accuracy.methods import METHODS
+from scanwright.design.accuracy.reference import is_smooth, reference, smooth_reference
+from scanwright.design.objective.counted import counted_J
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.task.task import load_task
 
 ANGLES = np.radians([0.0, 0.0, -50.0, 35.0])
 
@@ -36,7 +36,7 @@ def test_both_references_and_what_the_program_uses_are_one(objective):
 
 
 def test_what_is_not_smooth_is_drawn(monkeypatch):
-    monkeypatch.setattr("design.accuracy.reference.DRAWN", 2**10)
+    monkeypatch.setattr("scanwright.design.accuracy.reference.DRAWN", 2**10)
     turning = aimed("log").task.motion
     seam, worst = aimed("log", turning.model_copy(update={"period_s": 2.0125})), aimed("worst")
     for loaded in (seam, worst):

@@ -4,10 +4,10 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
-from design.accuracy import methods, search_trials
-from design.accuracy.report import report_precision, report_search
-from design.search import families
-from design.task.task import load_task
+from scanwright.design.accuracy import methods, search_trials
+from scanwright.design.accuracy.report import report_precision, report_search
+from scanwright.design.search import families
+from scanwright.design.task.task import load_task
 
 
 def rows_of(path):
@@ -37,7 +37,7 @@ def test_what_is_spent_on_a_search_and_what_it_gains(tmp_path, monkeypatch):
 def test_ways_to_compute_J_of_a_sweep(tmp_path, monkeypatch):
     few = {name: (*methods.SWEPT[name][:2], methods.SWEPT[name][2][-1:]) for name in ("directions", "ball count")}
     monkeypatch.setattr(methods, "SWEPT", few)
-    monkeypatch.setattr("design.accuracy.reference.DRAWN", 2**12)
+    monkeypatch.setattr("scanwright.design.accuracy.reference.DRAWN", 2**12)
     loaded = load_task(Path("indoor_urg"))
     fixed = {"alpha_rot_deg": 0.0, "beta_rot_deg": -90.0, "alpha_laser_deg": -90.0, "beta_laser_deg": 90.0}
     angles = loaded.task.angles.model_copy(update=fixed)

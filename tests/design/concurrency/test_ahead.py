@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from design.concurrency.ahead import ahead
+from scanwright.design.concurrency.ahead import ahead
 
 
 def test_results_come_in_order():

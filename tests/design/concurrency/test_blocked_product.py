@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from design.concurrency.blocked_product import ROWS, blocked_product, product
+from scanwright.design.concurrency.blocked_product import ROWS, blocked_product, product
 
 
 @pytest.mark.parametrize("rows", [0, 1, ROWS, 5 * ROWS + 3])

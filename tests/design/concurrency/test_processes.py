@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from design.angles import load_angles
-from design.concurrency import processes as beside
-from design.concurrency.processes import Packed, ctrl_c_held_back, in_turn, processes_beside
-from design.errors import BuildError, TaskError
+from scanwright.design.angles import load_angles
+from scanwright.design.concurrency import processes as beside
+from scanwright.design.concurrency.processes import Packed, ctrl_c_held_back, in_turn, processes_beside
+from scanwright.design.errors import BuildError, TaskError
 
 
 @pytest.mark.parametrize("cores", [1, 2])

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scans import simulated_scan
 
-from design.density.ball_count import ball_count
-from design.density.beams import scan_lines
-from design.density.spin import ball_search
-from design.sphere.directions import equal_angle_grid, spiral
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import scan_lines
+from scanwright.design.density.spin import ball_search
+from scanwright.design.sphere.directions import equal_angle_grid, spiral
 
 FAN = np.radians(np.arange(-540, 541) * 0.25)
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scans import simulated_scan
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.density.beams import (
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import (
     ScanLines,
     beam_directions_rot,
     line_spacing,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scans import count_at, simulated_scan
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.density.beams import beam_directions_rot, is_closed, polar_and_azimuth, scan_lines
-from design.density.spin import ball_search
-from design.frames import R_world_rot
-from design.search.grid_classes import mirrors_of
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import beam_directions_rot, is_closed, polar_and_azimuth, scan_lines
+from scanwright.design.density.spin import ball_search
+from scanwright.design.frames import R_world_rot
+from scanwright.design.search.grid_classes import mirrors_of
 
 
 def of(name):

@@ -11,19 +11,19 @@ from quick_tests import samples
 from scans import count_at, simulated_scan
 from scipy.spatial.transform import Rotation
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines
-from design.density.phase_walk import sort_by_buckets
-from design.density.spin import ball_search, mean_count, zones
-from design.frames import R_world_rot
-from design.objective import ball_search as oracle
-from design.objective.named_objectives import log_density
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.sphere import directions
-from design.sphere.directions import weighted_samples
-from design.task.task import load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines
+from scanwright.design.density.phase_walk import sort_by_buckets
+from scanwright.design.density.spin import ball_search, mean_count, zones
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective import ball_search as oracle
+from scanwright.design.objective.named_objectives import log_density
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.sphere import directions
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.task.task import load_task
 
 GIMBAL = [(0, 90), (0, -90), (90, 0), (0, 0), (45, 0), (90, 90), (-90, -90), (30, 90)]
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from design.density.ball_count import ball_count
-from design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_at
-from design.density.spin import mean_count
-from design.density.sweep import SweepLines, mean_count_swept
-from design.density.visible import free_lines, mean_count_free
-from design.motion import Sweep
-from design.shadow import AXIS_STEPS, Shadow
-from design.sphere.directions import spiral
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_at
+from scanwright.design.density.spin import mean_count
+from scanwright.design.density.sweep import SweepLines, mean_count_swept
+from scanwright.design.density.visible import free_lines, mean_count_free
+from scanwright.design.motion import Sweep
+from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.sphere.directions import spiral
 
 BEARINGS = np.radians(np.arange(-60.0, 61.0, 2.0))
 SETTING = np.array([0.0, 0.0, 0.4, -1.1])

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from design.angles import Angles, AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar, Servo, SlipRing
-from design.electrics.rules import broken_rules
-from design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
-from design.electrics.wiring import network_of
-from design.scanner import scanner_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.scanner import scanner_of
 
 CATALOGUE = load_catalogue()
 

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from design.density.ball_count import ball_count
-from design.density.beams import scan_at
-from design.errors import BuildError
-from design.evaluation.as_built import as_built, seen_of
-from design.evaluation.coverage import coverage, mean_density_at
-from design.evaluation.metres import on_planes
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.search.with_parts import score_with
-from design.shadow import AXIS_STEPS, Shadow
-from design.sphere.directions import spiral
-from design.task.task import load_task
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import scan_at
+from scanwright.design.errors import BuildError
+from scanwright.design.evaluation.as_built import as_built, seen_of
+from scanwright.design.evaluation.coverage import coverage, mean_density_at
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.with_parts import score_with
+from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.task.task import load_task
 
 GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height_m": 0.4}
 TASK = {"name": "t", "sensor": "URG-04LX", "servo": "AX-12A", "weight": [{"shape": "all"}]}
@@ -84,7 +84,7 @@ def test_the_record_is_of_the_scanner_with_its_parts_and_of_mounts_without(motio
 
 
 def _settings(found):
-    from design.angles import standard_settings
+    from scanwright.design.angles import standard_settings
 
     return [(mount, standard_settings()[mount.name]) for mount in found.mounts]
 

@@ -11,14 +11,14 @@ import pytest
 from quick_tests import samples
 from scans import count_at
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Multibeam
-from design.density.beams import beam_directions_rot, polar_and_azimuth
-from design.density.spin import ball_search
-from design.density.sweep import SweepLines
-from design.errors import BuildError
-from design.evaluation import comparison as comparison
-from design.evaluation.comparison import (
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Multibeam
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth
+from scanwright.design.density.spin import ball_search
+from scanwright.design.density.sweep import SweepLines
+from scanwright.design.errors import BuildError
+from scanwright.design.evaluation import comparison as comparison
+from scanwright.design.evaluation.comparison import (
     ComparisonRow,
     compare,
     layer_lines,
@@ -26,17 +26,17 @@ from design.evaluation.comparison import (
     ready_made,
     sampled,
 )
-from design.evaluation.comparison_picture import compare_picture
-from design.evaluation.comparison_table import notes, table, write_csv
-from design.frames import R_rot_laser, R_world_rot
-from design.objective.ball_search import SETS
-from design.objective.named_objectives import homogeneity, log_density
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.search.optimum import find_optimum
-from design.search.search import search
-from design.sphere.directions import sample_set, spiral
-from design.task.task import load_task
+from scanwright.design.evaluation.comparison_picture import compare_picture
+from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.frames import R_rot_laser, R_world_rot
+from scanwright.design.objective.ball_search import SETS
+from scanwright.design.objective.named_objectives import homogeneity, log_density
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.search.search import search
+from scanwright.design.sphere.directions import sample_set, spiral
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.folder import report_folder
 
 FULL = ("VLP-16", "HDL-32E", "HDL-64E")

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.evaluation.coverage import coverage
-from design.frames import R_world_rot
-from design.objective.ball_search import scan_tree
-from design.objective.named_objectives import log
-from design.objective.problem import problem_of
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.ball_search import scan_tree
+from scanwright.design.objective.named_objectives import log
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.task.task import LoadedTask, Task
 
 CONE = {"shape": "cone", "axis": [-1.0, 0.0, -0.5], "half_angle_deg": 25}
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from design.angles import STANDARD_DEG
-from design.evaluation.coverage import mean_density_at
-from design.evaluation.density_picture import STEP_DEG, density_figure
-from design.objective.problem import problem_of
-from design.task.task import load_task
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.evaluation.density_picture import STEP_DEG, density_figure
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.task.task import load_task
 
 SETTINGS = {
     "found: J = -6.1": np.radians([180, 55.9, 78.1, -80.3]),

@@ -8,15 +8,15 @@ import pytest
 from scans import simulated_scan
 from scipy.spatial import ConvexHull
 
-from design.density.ball_count import ball_count
-from design.density.beams import ScanLines, beam_directions_rot, scan_lines
-from design.errors import TaskError
-from design.evaluation.gaps import _in_fan, gaps, interlaced_period_s
-from design.frames import R_world_rot
-from design.objective.problem import problem_of
-from design.search.shortest_period import shortest_period_s
-from design.sphere.directions import spiral
-from design.task.task import load_task
+from scanwright.design.density.ball_count import ball_count
+from scanwright.design.density.beams import ScanLines, beam_directions_rot, scan_lines
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.gaps import _in_fan, gaps, interlaced_period_s
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.search.shortest_period import shortest_period_s
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.task.task import load_task
 
 SETTINGS = [(0, 90, 0, -90), (-90, 0, 90, 0), (10, 20, -50, 35), (0, 0, 45, 0), (200, -30, 70, -60), (0, 0, 0, 0)]
 

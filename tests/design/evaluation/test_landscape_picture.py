@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from design.errors import BuildError, TaskError
-from design.evaluation.landscape_picture import landscape_picture
-from design.objective.problem import problem_of
-from design.search.search import search
-from design.task.task import load_task
+from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.evaluation.landscape_picture import landscape_picture
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.search.search import search
+from scanwright.design.task.task import load_task
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ from math import cos, hypot, pi, radians, sin
 import numpy as np
 import pytest
 
-from design.evaluation.metres import AT_M, RING, SLACK, on_plane, on_planes, rounded
-from design.objective.problem import problem_of
-from design.task.task import load_task
+from scanwright.design.evaluation.metres import AT_M, RING, SLACK, on_plane, on_planes, rounded
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.task.task import load_task
 
 GROUND = {"shape": "ground", "from_m": 1.0, "to_m": 3.8, "width_m": 2.0, "height_m": 0.5}
 WALL = {"shape": "wall", "distance_m": 2.0, "width_m": 2.0, "height_m": 0.5, "top_m": 2.0, "heading_deg": 40.0}

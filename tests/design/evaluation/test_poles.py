@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.density.beams import ScanLines, scan_lines
-from design.errors import TaskError
-from design.evaluation.poles import Pole, parse_pole, pole_chances
-from design.frames import R_rot_laser, R_world_rot, Rz
-from design.objective.problem import problem_of
-from design.sphere.painting import COLUMNS, VALUE
-from design.task.task import Task, load_task
+from scanwright.design.density.beams import ScanLines, scan_lines
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.poles import Pole, parse_pole, pole_chances
+from scanwright.design.frames import R_rot_laser, R_world_rot, Rz
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.sphere.painting import COLUMNS, VALUE
+from scanwright.design.task.task import Task, load_task
 
 PARALLEL = np.radians([0, 0, 0, -90])  # the scan plane holds the upright axis: lines run along the poles
 CROSSING = np.radians([0, 0, 45, 0])

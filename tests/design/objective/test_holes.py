@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scans import simulated_scan
 
-from design.catalogue.catalogue import load_catalogue
-from design.density.beams import blind_zones
-from design.density.spin import ball_search
-from design.objective.holes import Hole, heading, holes, percent
-from design.objective.problem import problem_of
-from design.sphere.directions import weighted_samples
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.density.beams import blind_zones
+from scanwright.design.density.spin import ball_search
+from scanwright.design.objective.holes import Hole, heading, holes, percent
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.task.task import LoadedTask, Task
 
 GROUND_AHEAD_PLAIN = np.radians([0, -55, -80, 75])
 

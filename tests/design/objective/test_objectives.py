@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.errors import TaskError
-from design.objective.ball_search import ball_score
-from design.objective.named_objectives import Moment, homogeneity, kl, worst
-from design.objective.problem import problem_of
-from design.objective.score import quick_J, score
-from design.search import families
-from design.search.search import search
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.ball_search import ball_score
+from scanwright.design.objective.named_objectives import Moment, homogeneity, kl, worst
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import quick_J, score
+from scanwright.design.search import families
+from scanwright.design.search.search import search
+from scanwright.design.task.task import LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [60, 120], "phi_deg": [-80, 80]}
 GROUND = {"shape": "cone", "axis": [1, 0, -1], "half_angle_deg": 25, "value": 3.0}

@@ -10,20 +10,20 @@ import pytest
 from quick_tests import samples
 from scipy.spatial.transform import Rotation
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
-from design.density.spin import zones
-from design.errors import TaskError
-from design.frames import R_world_rot
-from design.objective import named_objectives
-from design.objective.ball_search import ball_score
-from design.objective.named_objectives import log_density
-from design.objective.problem import NODES, problem_of
-from design.objective.quadrature import polar_rule
-from design.objective.score import quick_J, score, score_on
-from design.sphere.painting import VALUE
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
+from scanwright.design.density.spin import zones
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective import named_objectives
+from scanwright.design.objective.ball_search import ball_score
+from scanwright.design.objective.named_objectives import log_density
+from scanwright.design.objective.problem import NODES, problem_of
+from scanwright.design.objective.quadrature import polar_rule
+from scanwright.design.objective.score import quick_J, score, score_on
+from scanwright.design.sphere.painting import VALUE
+from scanwright.design.task.task import LoadedTask, Task
 
 ALL = {"shape": "all"}
 BAND = {"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.objective.problem import problem_of
-from design.objective.score import score_on
-from design.objective.stated_error import error_words, rounded_to_error
-from design.task.task import LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score_on
+from scanwright.design.objective.stated_error import error_words, rounded_to_error
+from scanwright.design.task.task import LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [60, 140], "phi_deg": [-50, 50]}
 SPIN = {"period_s": 2.0}

@@ -12,10 +12,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design import frames
-from design.errors import SceneError
-from design.scene.nearest import by_boxes, by_embree
-from design.scene.ray_caster import Scene, build_scene, cast, load_scene, load_triangles
+from scanwright.design import frames
+from scanwright.design.errors import SceneError
+from scanwright.design.scene.nearest import by_boxes, by_embree
+from scanwright.design.scene.ray_caster import Scene, build_scene, cast, load_scene, load_triangles
 
 seeds = st.integers(0, 2**32 - 1)
 each_search = pytest.mark.parametrize("search", [by_embree, by_boxes])

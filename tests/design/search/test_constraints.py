@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.objective.holes import NO_BLIND_WEIGHT
-from design.objective.problem import problem_of
-from design.objective.score import Score, score, score_on
-from design.search import families, refinement
-from design.search.constraints import Requirements, fan_reach
-from design.search.search import search
-from design.sphere.directions import weighted_samples
-from design.sphere.outline import reach_about
-from design.task.angle_ranges import NAMES
-from design.task.task import Limits, LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.search import families, refinement
+from scanwright.design.search.constraints import Requirements, fan_reach
+from scanwright.design.search.search import search
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import Limits, LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [95, 140], "phi_deg": [-50, 50]}
 CONE = {"shape": "cone", "axis": [1, 0.3, -0.4], "half_angle_deg": 12}

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from scans import simulated_scan
 
-from design.catalogue.catalogue import load_catalogue
-from design.density.spin import ball_search
-from design.errors import TaskError
-from design.evaluation.gaps import gaps
-from design.objective.ball_search import start_phases
-from design.objective.problem import problem_of
-from design.objective.score import quick_J
-from design.objective.tolerance import rise_words, sensitivity, worst_within
-from design.search import families
-from design.search import search as search_module
-from design.search.grid_classes import fold_planes, mirrors_of
-from design.search.limits import allowed_planes
-from design.search.search import search
-from design.search.shortest_period import fastest
-from design.sphere.directions import weighted_samples
-from design.task.task import Limits, LoadedTask, Task, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.density.spin import ball_search
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.gaps import gaps
+from scanwright.design.objective.ball_search import start_phases
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import quick_J
+from scanwright.design.objective.tolerance import rise_words, sensitivity, worst_within
+from scanwright.design.search import families
+from scanwright.design.search import search as search_module
+from scanwright.design.search.grid_classes import fold_planes, mirrors_of
+from scanwright.design.search.limits import allowed_planes
+from scanwright.design.search.search import search
+from scanwright.design.search.shortest_period import fastest
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.task.task import Limits, LoadedTask, Task, load_task
 
 AHEAD = {"shape": "band", "theta_deg": [95, 140], "phi_deg": [-50, 50]}
 ANGLES = {"alpha_rot_deg": 0, "beta_rot_deg": [-90, 90], "alpha_laser_deg": -80, "step_deg": 15}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from design.objective.named_objectives import Moment, Objective
-from design.search.constraints import AtMost, NoHole
-from design.search.plane_axis_product import PART, PIECE, both_ways, lowest
+from scanwright.design.objective.named_objectives import Moment, Objective
+from scanwright.design.search.constraints import AtMost, NoHole
+from scanwright.design.search.plane_axis_product import PART, PIECE, both_ways, lowest
 
 PLANES, AXES, NODES = PIECE + 37, PART + 211, 7
 

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize, rosen
 
-from design.frames import R_world_rot
-from design.objective.problem import problem_of
-from design.search import families
-from design.search.grid_classes import plane_key
-from design.search.refinement import Enough, _Chart, _on_the_grid, lowest_by_simplex
-from design.search.search import search
-from design.task.task import load_task
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.search import families
+from scanwright.design.search.grid_classes import plane_key
+from scanwright.design.search.refinement import Enough, _Chart, _on_the_grid, lowest_by_simplex
+from scanwright.design.search.search import search
+from scanwright.design.task.task import load_task
 
 CORNERS = np.array([[-1.2, 0.8, 0.5], [-0.7, 0.8, 0.5], [-1.2, 0.4, 0.5], [-1.2, 0.8, 0.9]])
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
-from design.catalogue.catalogue import load_catalogue
-from design.concurrency import parallel
-from design.frames import R_world_rot
-from design.objective.problem import problem_of
-from design.objective.score import quick_J, score
-from design.search import coarse, families
-from design.search.search import search
-from design.task.angle_ranges import NAMES
-from design.task.task import LoadedTask, Task, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.concurrency import parallel
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import quick_J, score
+from scanwright.design.search import coarse, families
+from scanwright.design.search.search import search
+from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.task.task import LoadedTask, Task, load_task
 
 AHEAD = {
     "weight": [{"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}],

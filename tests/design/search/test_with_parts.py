@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.density.beams import beam_directions_rot, scan_at
-from design.density.spin import ball_search
-from design.errors import BuildError
-from design.objective.ball_search import start_phases
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.search.families import Family
-from design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
-from design.shadow import AXIS_STEPS, Shadow
-from design.sphere.directions import weighted_samples
-from design.task.angle_ranges import AngleRanges
-from design.task.task import Limits, LoadedTask, Task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.density.beams import beam_directions_rot, scan_at
+from scanwright.design.density.spin import ball_search
+from scanwright.design.errors import BuildError
+from scanwright.design.objective.ball_search import start_phases
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.families import Family
+from scanwright.design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
+from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.task import Limits, LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [60, 130], "phi_deg": [-70, 70]}
 

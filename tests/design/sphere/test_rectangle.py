@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from design.catalogue.catalogue import load_catalogue
-from design.errors import TaskError
-from design.sphere.directions import weighted_samples
-from design.sphere.outline import reach_about
-from design.sphere.rectangle import edge_normals, seen_rectangle
-from design.sphere.regions import field_of
-from design.task.task import LoadedTask, Task, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import TaskError
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.sphere.rectangle import edge_normals, seen_rectangle
+from scanwright.design.sphere.regions import field_of
+from scanwright.design.task.task import LoadedTask, Task, load_task
 
 GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 5.0, "width_m": 4.0, "height_m": 0.4}
 CEILING = {"shape": "ceiling", "height_m": 0.4, "ceiling_m": 2.6, "from_m": -1.0, "to_m": 3.0, "heading_deg": 20.0}

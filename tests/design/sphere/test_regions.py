@@ -8,7 +8,7 @@ from quick_tests import samples
 from random_fields import field, random_case
 from scipy.spatial.transform import Rotation
 
-from design.sphere.outline import reach_about
+from scanwright.design.sphere.outline import reach_about
 
 
 def slow_value(direction, regions, maps, background):

@@ -7,10 +7,10 @@ import pytest
 from quick_tests import samples
 from random_fields import field, random_field, unit_vectors, walls
 
-from design.errors import NumericalError
-from design.sphere import polar_rule
-from design.sphere.polar_rule import circle_rule
-from design.sphere.total_weight import total_weight
+from scanwright.design.errors import NumericalError
+from scanwright.design.sphere import polar_rule
+from scanwright.design.sphere.polar_rule import circle_rule
+from scanwright.design.sphere.total_weight import total_weight
 
 NODES = 2187
 NO_BREAKS = np.empty(0)

@@ -5,10 +5,10 @@ import tomllib
 import numpy as np
 import pytest
 
-from design.catalogue.catalogue import SHIPPED as PRODUCTS
-from design.errors import TaskError
-from design.record import _key_lines
-from design.task.task import Task, load_task
+from scanwright.design.catalogue.catalogue import SHIPPED as PRODUCTS
+from scanwright.design.errors import TaskError
+from scanwright.design.record import _key_lines
+from scanwright.design.task.task import Task, load_task
 
 BASE = """name = "mine"
 sensor = "UTM-30LX"

@@ -5,12 +5,12 @@ import pytest
 from pydantic import ValidationError
 from quick_tests import samples
 
-from design.frames import R_rot_laser, R_world_rot
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.task.angle_ranges import AngleRanges
-from design.task.equivalent_settings import BOUNDS, equivalents_within
-from design.task.task import load_task
+from scanwright.design.frames import R_rot_laser, R_world_rot
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.equivalent_settings import BOUNDS, equivalents_within
+from scanwright.design.task.task import load_task
 
 BEYOND = [(20, 30, 145, 10), (20, 30, -40, 130), (200, 30, 20, 10), (20, -110, 20, 10), (-190, 100, 120, -95)]
 

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 from scans import simulated_scan
 
-from design.errors import TaskError
-from design.evaluation.coverage import on_surfaces, points_per_m2
-from design.objective.ball_search import start_phases
-from design.objective.problem import problem_of
-from design.scene.ray_caster import cast, load_scene
-from design.task.task import load_task
+from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.coverage import on_surfaces, points_per_m2
+from scanwright.design.objective.ball_search import start_phases
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.scene.ray_caster import cast, load_scene
+from scanwright.design.task.task import load_task
 
 ROOM = (8.0, 6.0, 3.0)  # from the origin
 SENSOR = (3.0, 2.5, 1.2)

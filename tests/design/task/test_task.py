@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imsave
 
-from design.catalogue.catalogue import SHIPPED as PRODUCTS
-from design.errors import TaskError
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.sphere.regions import field_of
-from design.task.task import load_task, shipped_tasks
+from scanwright.design.catalogue.catalogue import SHIPPED as PRODUCTS
+from scanwright.design.errors import TaskError
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.sphere.regions import field_of
+from scanwright.design.task.task import load_task, shipped_tasks
 from scanwright.pipeline.records import write_task
 
 BASE = """name = "mine"

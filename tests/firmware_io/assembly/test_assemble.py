@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from design.angles import Angles, AngleSet
-from design.errors import RecordingError
-from firmware_io.assembly.assemble import assemble_recording
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.deskew import deskew, place
-from firmware_io.assembly.turns import turn_starts
-from firmware_io.clouds.ply import read_ply
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.deskew import deskew, place
+from scanwright.firmware_io.assembly.turns import turn_starts
+from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import JointLog, Scan
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 needs_data = pytest.mark.skipif(DATA is None, reason="SCANWRIGHT_DATA names no folder with the real recordings")

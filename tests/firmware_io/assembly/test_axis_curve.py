@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_lsq_spline
 
-from firmware_io.assembly.axis_curve import SmoothAxis, axis_curve, smooth
-from firmware_io.samples import JointLog, straight
+from scanwright.firmware_io.assembly.axis_curve import SmoothAxis, axis_curve, smooth
+from scanwright.firmware_io.samples import JointLog, straight
 
 START = 1_700_000_000_000_000_000
 STEP = 2 * np.pi / 4096

@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from design.angles import Angles, AngleSet
-from design.errors import RecordingError
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.deskew import place
-from firmware_io.assembly.deskew_kernel import _sin_cos, place_block
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.clouds.ply import read_ply
-from firmware_io.poses.trajectory import Trajectory
-from firmware_io.recording.recording import RecordingWriter
-from firmware_io.samples import JointLog, Scan, blocks
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.deskew import place
+from scanwright.firmware_io.assembly.deskew_kernel import _sin_cos, place_block
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.poses.trajectory import Trajectory
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import JointLog, Scan, blocks
 
 START = 1_436_377_047_737_469_125
 angle_deg = st.floats(-180, 180)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
-from design.angles import Angles, AngleSet
-from design.errors import RecordingError
-from firmware_io.assembly.beam_outcome import between_surfaces
-from firmware_io.assembly.finish import seen_from
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.poses.trajectory import trajectory_of
-from firmware_io.samples import Scan, blocks
 from scanwright import api
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.beam_outcome import between_surfaces
+from scanwright.firmware_io.assembly.finish import seen_from
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.poses.trajectory import trajectory_of
+from scanwright.firmware_io.samples import Scan, blocks
 
 ANGLES = AngleSet(
     task="finish",

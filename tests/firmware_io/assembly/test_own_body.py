@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.own_body import OwnBody
 
 STEP_RAD = 0.01
 

@@ -10,20 +10,20 @@ from hypothesis import strategies as st
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 from benchmarks.firmware_io.streaming import turning
-from design.angles import Angles, AngleSet
-from design.errors import RecordingError
-from firmware_io.assembly import axis_window
-from firmware_io.assembly.assemble import assemble_recording
-from firmware_io.assembly.axis_curve import smooth
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.deskew_kernel import place_block
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.assembly.streaming import MOST_WAITING, Assembler
-from firmware_io.clouds.ply import read_ply
-from firmware_io.poses.trajectory import trajectory_of
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
-from firmware_io.samples import JointLog, JointSample, PoseSample, Scan, blocks
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly import axis_window
+from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.assembly.axis_curve import smooth
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.deskew_kernel import place_block
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.assembly.streaming import MOST_WAITING, Assembler
+from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.poses.trajectory import trajectory_of
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.samples import JointLog, JointSample, PoseSample, Scan, blocks
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 START = 1_700_000_000_000_000_000

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from design.angles import AngleSet
-from firmware_io.assembly.deskew import place
-from firmware_io.assembly.deskew_kernel import place_block
-from firmware_io.samples import JointLog, Scan, blocks
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.assembly.deskew import place
+from scanwright.firmware_io.assembly.deskew_kernel import place_block
+from scanwright.firmware_io.samples import JointLog, Scan, blocks
 
 
 def turn(k):

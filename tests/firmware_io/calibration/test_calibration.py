@@ -25,13 +25,13 @@ from benchmarks.firmware_io.rooms import (
     simulate,
     write,
 )
-from design.angles import load_angles
-from design.errors import RecordingError
-from firmware_io.assembly.assemble import assemble_recording
-from firmware_io.calibration.estimate import estimate
-from firmware_io.calibration.model import PARAMETERS, gather
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
+from scanwright.design.angles import load_angles
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.calibration.estimate import estimate
+from scanwright.firmware_io.calibration.model import PARAMETERS, gather
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
 
 KEYS = [parameter.name for parameter in PARAMETERS]
 TRUTH = Truth(*np.radians([2.0, -1.0]), 0.01, -0.008, 0.005, *np.radians([0.2, -0.3, 0.1, 0.05]))

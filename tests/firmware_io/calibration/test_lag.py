@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.errors import RecordingError
-from firmware_io.calibration.lag import lag_curve
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.calibration.lag import lag_curve
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.samples import JointLog, Scan
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 needs_data = pytest.mark.skipif(DATA is None, reason="SCANWRIGHT_DATA names no folder with the real recordings")

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.angles import Angles, AngleSet
-from firmware_io.assembly.beam_outcome import Verdict
-from firmware_io.assembly.deskew import deskew, place
-from firmware_io.assembly.own_body import OwnBody
-from firmware_io.calibration.model import (
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.firmware_io.assembly.beam_outcome import Verdict
+from scanwright.firmware_io.assembly.deskew import deskew, place
+from scanwright.firmware_io.assembly.own_body import OwnBody
+from scanwright.firmware_io.calibration.model import (
     BACKLASH,
     COUNT,
     LAG,
@@ -23,9 +23,9 @@ from firmware_io.calibration.model import (
     play_rad,
     start_vector,
 )
-from firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
-from firmware_io.calibration.tiles import flat_tiles
-from firmware_io.samples import JointLog, Scan, straight
+from scanwright.firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
+from scanwright.firmware_io.calibration.tiles import flat_tiles
+from scanwright.firmware_io.samples import JointLog, Scan, straight
 
 START = 1_700_000_000_000_000_000
 SIZES = np.array([0.1, 0.1, 0.05, 0.05, 0.02, 0.02, 0.02, 0.02, 0.02, 0.03, 0.02])

@@ -9,15 +9,15 @@ from scipy.stats import chi2
 from benchmarks.firmware_io.calibration import designed, faulty, mount_of
 from benchmarks.firmware_io.calibration_errors import BEAMS, STEP_DEG, case
 from benchmarks.firmware_io.rooms import FURNISHED, NAMES, Setup, Truth, Unrest, simulate, write
-from design.angles import STANDARD_DEG
-from firmware_io.calibration.calibrate import calibrate_recordings
-from firmware_io.calibration.entropy import _areas, _between, witness
-from firmware_io.calibration.estimate import estimate
-from firmware_io.calibration.model import beam_rays, gather, start_vector
-from firmware_io.calibration.report import lines
-from firmware_io.calibration.tiles import fan_side
-from firmware_io.calibration.unrest.second_looks import second_looks
-from firmware_io.recording.recording import open_recording
+from scanwright.design.angles import STANDARD_DEG
+from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
+from scanwright.firmware_io.calibration.entropy import _areas, _between, witness
+from scanwright.firmware_io.calibration.estimate import estimate
+from scanwright.firmware_io.calibration.model import beam_rays, gather, start_vector
+from scanwright.firmware_io.calibration.report import lines
+from scanwright.firmware_io.calibration.tiles import fan_side
+from scanwright.firmware_io.calibration.unrest.second_looks import second_looks
+from scanwright.firmware_io.recording.recording import open_recording
 
 ALPHA_ROT, BETA_ROT, ALPHA_LASER, BETA_LASER = STANDARD_DEG["pitching"]
 PITCHING = Setup(

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.errors import RecordingError
-from firmware_io.clouds.filters import normals, one_to_a_voxel, outliers
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.filters import normals, one_to_a_voxel, outliers
 
 counts = st.integers(1, 60)
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from pypcd4 import Encoding, PointCloud
 
-from design import frames
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
-from firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.design import frames
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
 FORMATS = ["ply", "pcd", "las", "laz", "e57", "npz", "xyz"]
 EXACT = ["ply", "pcd", "e57", "npz", "xyz"]

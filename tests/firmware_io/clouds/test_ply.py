@@ -6,9 +6,9 @@ import trimesh
 from matplotlib.image import imread
 
 from benchmarks.firmware_io.cloud_picture import cloud_picture
-from design.errors import RecordingError
-from firmware_io.assembly.cloud_rows import cloud_fields
-from firmware_io.clouds.ply import PlyWriter, read_ply
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.cloud_rows import cloud_fields
+from scanwright.firmware_io.clouds.ply import PlyWriter, read_ply
 
 FIELDS = cloud_fields(has_intensity=True)
 

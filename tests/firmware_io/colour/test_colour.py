@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, START_NS, Setup, Simulated, Truth, cast, simulate, write
-from design.camera import Camera
-from firmware_io.clouds.ply import read_header, read_ply
+from scanwright.design.camera import Camera
+from scanwright.firmware_io.clouds.ply import read_header, read_ply
 
 SETUP = Setup(beams=216, sweeps=((50.0, 360.0),), noise_m=0.01)
 SIZE = (400, 300)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from design.errors import ProtocolError
-from firmware_io.lidar.sick import cola
-from firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
-from firmware_io.lidar.sick.scan_data import Channel, ScanData, scan_data, telegram_of
-from firmware_io.lidar.sick.values import Reader
+from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.lidar.sick import cola
+from scanwright.firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
+from scanwright.firmware_io.lidar.sick.scan_data import Channel, ScanData, scan_data, telegram_of
+from scanwright.firmware_io.lidar.sick.values import Reader
 
 HEAD_TIM = (
     "sSN LMDscandata 1 1 107375C 0 0 E784 E789 3D611E4A 3D612D1F 0 0 1 0 0 5DC 36 0 1 DIST1 3F800000 00000000 FFF92230 "

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.errors import DeviceError
-from firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
-from firmware_io.lidar.tick_line import StampLine
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
+from scanwright.firmware_io.lidar.tick_line import StampLine
 
 DELAY_NS = 21_000_000
 

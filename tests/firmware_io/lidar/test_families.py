@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError
-from firmware_io.lidar import families, sensor_line
-from firmware_io.lidar.families import family_of, open_lidar
-from firmware_io.lidar.ldrobot import driver as ldrobot
-from firmware_io.lidar.lms2xx import driver as lms2xx
-from firmware_io.lidar.scip import dialogue as scip_dialogue
-from firmware_io.lidar.sick import dialogue as sick_dialogue
-from firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
-from firmware_io.lidar.slamtec import driver as slamtec
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.lidar import families, sensor_line
+from scanwright.firmware_io.lidar.families import family_of, open_lidar
+from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
+from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
+from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
+from scanwright.firmware_io.lidar.sick import dialogue as sick_dialogue
+from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
+from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 
 
 @pytest.fixture(autouse=True)

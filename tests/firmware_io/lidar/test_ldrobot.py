@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
-from design.catalogue.catalogue import load_catalogue
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.lidar.families import family_of, open_lidar
-from firmware_io.lidar.ldrobot import driver, protocol
-from firmware_io.twins import ldrobot as twins
-from firmware_io.twins.ldrobot import LdrobotTwin
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.families import family_of, open_lidar
+from scanwright.firmware_io.lidar.ldrobot import driver, protocol
+from scanwright.firmware_io.twins import ldrobot as twins
+from scanwright.firmware_io.twins.ldrobot import LdrobotTwin
 
 # A packet that the maker's documents take apart.
 EXAMPLE = bytes.fromhex(

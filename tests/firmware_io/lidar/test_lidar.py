@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from design.errors import DeviceError, DeviceTimeoutError
-from firmware_io.lidar import byte_stream, sensor_line
-from firmware_io.lidar.scip import dialogue, protocol
-from firmware_io.lidar.scip.driver import ScipLidar, open_scip
-from firmware_io.lidar.scip.raw_scan import to_laser_scan
-from firmware_io.twins import hokuyo_models, lidar_machine
-from firmware_io.twins.lidar import LidarTwin
+from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.firmware_io.lidar import byte_stream, sensor_line
+from scanwright.firmware_io.lidar.scip import dialogue, protocol
+from scanwright.firmware_io.lidar.scip.driver import ScipLidar, open_scip
+from scanwright.firmware_io.lidar.scip.raw_scan import to_laser_scan
+from scanwright.firmware_io.twins import hokuyo_models, lidar_machine
+from scanwright.firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
 

@@ -8,8 +8,8 @@ from hokuyolx import HokuyoLX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.errors import ProtocolError, ScanwrightError
-from firmware_io.lidar.scip import measurement, parameters, protocol
+from scanwright.design.errors import ProtocolError, ScanwrightError
+from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
 
 CAPTURES = {
     "urg_04lx.rx": (10, 6968830, 682, 0, [392, 392, 391, 385, 381], 4166),

@@ -10,11 +10,11 @@ from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from patience import until
 
-from design.catalogue.catalogue import load_catalogue
-from design.errors import DeviceError, ProtocolError
-from firmware_io.lidar.families import open_lidar
-from firmware_io.lidar.slamtec import dialogue, driver, protocol
-from firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import DeviceError, ProtocolError
+from scanwright.firmware_io.lidar.families import open_lidar
+from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
+from scanwright.firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
 
 # What the maker's protocol manual and SDK write.
 REQUESTS = [

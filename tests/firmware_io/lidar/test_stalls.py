@@ -5,10 +5,10 @@ import pytest
 from quick_tests import samples
 
 from benchmarks.firmware_io.devices.stalls import BUFFER_BYTES, MODELS, ROUNDED_MS, off_ms, random_stalls, scans_of
-from design.errors import DeviceTimeoutError
-from firmware_io.lidar import sensor_line
-from firmware_io.lidar.slamtec import protocol
-from firmware_io.lidar.slamtec.point_count import PointCount
+from scanwright.design.errors import DeviceTimeoutError
+from scanwright.firmware_io.lidar import sensor_line
+from scanwright.firmware_io.lidar.slamtec import protocol
+from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
 
 STALLS = 3
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_io.lidar.arrival_line import ArrivalLine
-from firmware_io.lidar.turn import Points, TurnCutter, TurnQueue
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.turn import Points, TurnCutter, TurnQueue
 
 
 def points(angle_deg, first=0):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.firmware_io.mapping.walking_person import Session, shares
-from design.errors import RecordingError
-from firmware_io.mapping.seen_through import Stand, seen_through
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
 
 PLACES = ((0.0, 0.0, 0.0), (0.8, 0.5, 0.05), (-0.6, 0.3, 0.0), (0.2, -0.6, 0.0), (1.2, -0.2, 0.0))
 

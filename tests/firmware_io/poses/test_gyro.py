@@ -6,10 +6,10 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from design.errors import RecordingError
-from firmware_io.poses.gyro import Gyro, oriented
-from firmware_io.poses.gyro_files import imu_mount, load_gyro
-from firmware_io.poses.trajectory import Trajectory
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.poses.gyro import Gyro, oriented
+from scanwright.firmware_io.poses.gyro_files import imu_mount, load_gyro
+from scanwright.firmware_io.poses.trajectory import Trajectory
 
 START = 1_700_000_000_000_000_000
 SECONDS = 10.0

@@ -8,9 +8,9 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from design.errors import RecordingError
-from firmware_io.poses.pose_files import load_trajectory
-from firmware_io.poses.trajectory import Trajectory
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.poses.pose_files import load_trajectory
+from scanwright.firmware_io.poses.trajectory import Trajectory
 
 START = 1_436_377_047_737_469_125
 TUM = """# timestamp tx ty tz qx qy qz qw

@@ -10,10 +10,10 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from design.errors import RecordingError
-from firmware_io.recording.angle_sources import FrameSource, is_table, parse_frames, read_table, turned_rad
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.angle_sources import FrameSource, is_table, parse_frames, read_table, turned_rad
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
 
 SECOND = 1_000_000_000
 START = 1_436_377_047 * SECOND

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from firmware_io.recording.bag_clocks import held_log
-from firmware_io.samples import JointLog
+from scanwright.firmware_io.recording.bag_clocks import held_log
+from scanwright.firmware_io.samples import JointLog
 
 
 def test_a_scan_that_is_cut_short_ends_before_the_next_which_keeps_both_its_samples():

@@ -8,9 +8,9 @@ import pytest
 
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import RecordingWriter, open_recording
-from firmware_io.samples import Scan
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.samples import Scan
 
 SETUP = Setup(beams=30, sweeps=((180.0, 90.0),))
 

@@ -12,10 +12,10 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from design.errors import RecordingError
-from firmware_io.poses.pose_files import load_trajectory
-from firmware_io.recording.importer import import_bag
-from firmware_io.recording.recording import open_recording
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.poses.pose_files import load_trajectory
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
 needs_data = pytest.mark.skipif(DATA is None, reason="SCANWRIGHT_DATA names no folder with the real recordings")

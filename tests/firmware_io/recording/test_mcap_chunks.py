@@ -11,9 +11,9 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from design.errors import RecordingError
-from firmware_io.recording import ros_messages
-from firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
 
 TOPICS = ("/a", "/b", "/c")
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
-from firmware_io.recording import ros_messages
-from firmware_io.recording.message_batches import blocks_in, joints_in, outlines_in
-from firmware_io.samples import Scan
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in, outlines_in
+from scanwright.firmware_io.samples import Scan
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TIMES = st.integers(0, 2**31 * 10**9 - 1)

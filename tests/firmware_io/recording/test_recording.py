@@ -14,10 +14,10 @@ from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from design.errors import RecordingError
-from firmware_io.recording import ros_messages
-from firmware_io.recording.recording import RecordingWriter, open_recording
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.samples import JointLog, Scan
 
 float32 = st.floats(-1e3, 1e3, width=32)
 stamps = st.integers(0, 2**31 * 10**9 - 1)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from design.errors import RecordingError
-from firmware_io.recording.recording import MessageWriter, open_recording
-from firmware_io.recording.repair.repair import repair, repaired_place
-from firmware_io.samples import Scan
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.recording import MessageWriter, open_recording
+from scanwright.firmware_io.recording.repair.repair import repair, repaired_place
+from scanwright.firmware_io.samples import Scan
 
 EPOCH_NS = 1_700_000_000 * 10**9
 PER_CHUNK = 6

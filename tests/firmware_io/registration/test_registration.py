@@ -13,19 +13,19 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from benchmarks.firmware_io.registration import building, room, scan, shell
-from design import frames
-from design.errors import RecordingError
-from firmware_io.clouds.cloud import Cloud, pose_matrix
-from firmware_io.clouds.formats import read_clouds, write_clouds
-from firmware_io.registration.cube_map import cells_of, depth_map, solid_angles_sr
-from firmware_io.registration.graph import Edge, solve_graph
-from firmware_io.registration.merge import merge
-from firmware_io.registration.pairwise import align
-from firmware_io.registration.poses import read_poses, write_poses
-from firmware_io.registration.register import register
-from firmware_io.registration.sensor_view import make_view
-from firmware_io.registration.start import find_start
-from firmware_io.registration.thin import beam_step_rad, line_gaps_rad, thin, voxel_means
+from scanwright.design import frames
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.firmware_io.registration.cube_map import cells_of, depth_map, solid_angles_sr
+from scanwright.firmware_io.registration.graph import Edge, solve_graph
+from scanwright.firmware_io.registration.merge import merge
+from scanwright.firmware_io.registration.pairwise import align
+from scanwright.firmware_io.registration.poses import read_poses, write_poses
+from scanwright.firmware_io.registration.register import register
+from scanwright.firmware_io.registration.sensor_view import make_view
+from scanwright.firmware_io.registration.start import find_start
+from scanwright.firmware_io.registration.thin import beam_step_rad, line_gaps_rad, thin, voxel_means
 
 
 def pose(yaw_deg, x, y, z=1.0, tilt_deg=0.0):

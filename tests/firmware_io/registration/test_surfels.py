@@ -8,14 +8,14 @@ from scipy.stats import chi2
 
 from benchmarks.firmware_io.registration import motion, room, scan, shell
 from benchmarks.firmware_io.registration_errors import SIGMAS, faulty_scan, one_pair, two_views
-from design import frames
-from design.angles import Angles, AngleSet
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import write_clouds
-from firmware_io.registration.pairwise import _sandwich, align
-from firmware_io.registration.sensor_view import make_view
-from firmware_io.registration.surfels.adjust import adjust
-from firmware_io.registration.surfels.cells import find_cells
+from scanwright.design import frames
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import write_clouds
+from scanwright.firmware_io.registration.pairwise import _sandwich, align
+from scanwright.firmware_io.registration.sensor_view import make_view
+from scanwright.firmware_io.registration.surfels.adjust import adjust
+from scanwright.firmware_io.registration.surfels.cells import find_cells
 
 LINES, BEAMS = 60, 181
 

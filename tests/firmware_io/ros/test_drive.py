@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
-from design.angles import Angles, AngleSet
-from design.errors import DeviceError, RecordingError
-from design.motion import Spin
-from firmware_io.assembly.streaming import Assembler
-from firmware_io.ros import drive as driving
-from firmware_io.ros.point_rows import POINT, point_rows
-from firmware_io.ros.replay import replay
-from firmware_io.samples import JointSample
-from firmware_io.scan.plan import ScanPlan
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import DeviceError, RecordingError
+from scanwright.design.motion import Spin
+from scanwright.firmware_io.assembly.streaming import Assembler
+from scanwright.firmware_io.ros import drive as driving
+from scanwright.firmware_io.ros.point_rows import POINT, point_rows
+from scanwright.firmware_io.ros.replay import replay
+from scanwright.firmware_io.samples import JointSample
+from scanwright.firmware_io.scan.plan import ScanPlan
 
 ANGLES = AngleSet(
     task="ros",

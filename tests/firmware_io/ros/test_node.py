@@ -15,9 +15,9 @@ import pytest
 from patience import BOUND_S, until
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
-from design.angles import Angles, AngleSet
-from firmware_io.assembly.assemble import assemble_recording
-from firmware_io.clouds.ply import read_ply
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.clouds.ply import read_ply
 
 ROS = os.environ.get("SCANWRIGHT_ROS")
 HERE = Path(__file__).parent
@@ -151,8 +151,8 @@ def test_a_frame_of_tf_is_the_pose_that_it_was_made_of(domain):
     """`tf2_msgs` is in no wheel: what `/tf` would hold is looked at, not sent."""
     code = """if True:
         import numpy as np
-        from design import frames
-        from firmware_io.ros.messages import transform
+        from scanwright.design import frames
+        from scanwright.firmware_io.ros.messages import transform
         T = frames.rigid(frames.Rz(0.3) @ frames.Rx(-2.0), [1.0, 2.0, 3.0])
         said = transform("rot", "laser", T, 1_700_000_000_123_456_789)
         q, t = said.transform.rotation, said.transform.translation

@@ -8,9 +8,9 @@ import pytest
 import yourdfpy
 from scipy.spatial.transform import Rotation
 
-from design.angles import Angles, AngleSet, angles_in_use
-from design.errors import RecordingError
-from firmware_io.ros.robot_frames import (
+from scanwright.design.angles import Angles, AngleSet, angles_in_use
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.ros.robot_frames import (
     calibrated_urdf_place,
     fixed_frames,
     what_changed,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from design.angles import Angles, AngleSet
-from firmware_io.assembly.streaming import ScanPoints
-from firmware_io.assembly.turns import turn_starts
-from firmware_io.ros import turns
-from firmware_io.ros.point_rows import in_rot, turn_rows
-from firmware_io.ros.turns import Turns
-from firmware_io.samples import JointLog, Scan
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.firmware_io.assembly.streaming import ScanPoints
+from scanwright.firmware_io.assembly.turns import turn_starts
+from scanwright.firmware_io.ros import turns
+from scanwright.firmware_io.ros.point_rows import in_rot, turn_rows
+from scanwright.firmware_io.ros.turns import Turns
+from scanwright.firmware_io.samples import JointLog, Scan
 
 STEP_NS = 25_000_000
 ANGLES = AngleSet(

@@ -21,26 +21,26 @@ from hypothesis import strategies as st
 from patience import until
 from quick_tests import samples
 
-from design.angles import AngleSet
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from design.motion import Spin, StopAndGo, Sweep
-from design.scene.ray_caster import cast
-from firmware_io.assembly.axis_curve import axis_curve
-from firmware_io.clouds.ply import read_ply
-from firmware_io.lidar.scip import dialogue
-from firmware_io.lidar.sick.scan_data import DIRT_WARNING
-from firmware_io.recording.recording import open_recording
-from firmware_io.recording.repair.repair import repair
-from firmware_io.samples import JointLog
-from firmware_io.scan import acquire, axis_thread, doctor, lidar_scans
-from firmware_io.scan.plan import plan_scan
-from firmware_io.scan.setpoints import course
-from firmware_io.servo.progress import ServoState
-from firmware_io.servo.servo import open_servo
-from firmware_io.twins.scanner import emulated_scanner, room
-from firmware_io.twins.servo.twin import ServoTwin
+from scanwright.design.angles import AngleSet
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from scanwright.design.motion import Spin, StopAndGo, Sweep
+from scanwright.design.scene.ray_caster import cast
+from scanwright.firmware_io.assembly.axis_curve import axis_curve
+from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.lidar.scip import dialogue
+from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING
+from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.recording.repair.repair import repair
+from scanwright.firmware_io.samples import JointLog
+from scanwright.firmware_io.scan import acquire, axis_thread, doctor, lidar_scans
+from scanwright.firmware_io.scan.plan import plan_scan
+from scanwright.firmware_io.scan.setpoints import course
+from scanwright.firmware_io.servo.progress import ServoState
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}
@@ -202,7 +202,7 @@ BLIND = angle_set(servo="AX-12A")
     ],
 )
 def test_what_cannot_be_scanned_is_one_line(tmp_path, command, monkeypatch, angles, words, says):
-    monkeypatch.setattr("firmware_io.device_ports.list_ports.comports", lambda: [])
+    monkeypatch.setattr("scanwright.firmware_io.device_ports.list_ports.comports", lambda: [])
     if angles is not None:
         (tmp_path / "angles.json").write_text(angles.to_json())
     code, _, complaints = command("scan", tmp_path, *words)
@@ -494,7 +494,7 @@ def test_scan_and_doctor_tell_a_dirty_window(tmp_path, command, monkeypatch):
 
 def test_the_doctor_says_what_is_wrong_and_the_remedy(twins, command, monkeypatch):
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.1)
-    monkeypatch.setattr("firmware_io.device_ports.list_ports.comports", lambda: [])
+    monkeypatch.setattr("scanwright.firmware_io.device_ports.list_ports.comports", lambda: [])
     assert command("doctor")[0] == 1
     code, said, _ = command("doctor", "--lidar", twins.ports.servo, "--servo", "no-such-port")
     assert code == 1

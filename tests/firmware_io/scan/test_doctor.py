@@ -11,13 +11,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from design.angles import AngleSet
-from firmware_io import device_ports, serial_port
-from firmware_io.scan import doctor
-from firmware_io.servo.families import all_tables
-from firmware_io.twins.scanner import emulated_scanner, room
-from firmware_io.twins.servo.dynamixel_packets import take
-from firmware_io.twins.servo.twin import ServoTwin
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io import device_ports, serial_port
+from scanwright.firmware_io.scan import doctor
+from scanwright.firmware_io.servo.families import all_tables
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.servo.dynamixel_packets import take
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 PING, READ, WRITE = 1, 2, 3
 
@@ -223,7 +223,7 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
 
 
 def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
-    from firmware_io.servo.fitness import settable
+    from scanwright.firmware_io.servo.fitness import settable
 
     for table in all_tables():
         names = settable(table)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from design.errors import RecordingError
-from firmware_io.recording.mcap_chunks import CHUNK_S
-from firmware_io.recording.recording import MessageWriter, open_recording
-from firmware_io.recording.repair.repair import repair, repaired_place
-from firmware_io.samples import Scan
-from firmware_io.scan.recorder import Recorder
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.mcap_chunks import CHUNK_S
+from scanwright.firmware_io.recording.recording import MessageWriter, open_recording
+from scanwright.firmware_io.recording.repair.repair import repair, repaired_place
+from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.recorder import Recorder
 
 
 def a_scan(stamp_ns, beams=5):
@@ -74,7 +74,7 @@ def test_a_recording_is_never_written_over(tmp_path):
 RECORD = """
 import sys, time
 from pathlib import Path
-from firmware_io.scan.recorder import Recorder
+from scanwright.firmware_io.scan.recorder import Recorder
 sys.path.insert(0, sys.argv[2])
 from test_recorder import a_scan
 with Recorder(Path(sys.argv[1]), {}, {}) as recorder:

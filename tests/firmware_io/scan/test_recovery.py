@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from virtual_line import VirtualLine
 
-from design.errors import DeviceError, DeviceFaultError
-from firmware_io.lidar import sensor_line
-from firmware_io.lidar.families import FAMILIES, family_of, open_lidar
-from firmware_io.lidar.ldrobot import driver as ldrobot
-from firmware_io.lidar.lms2xx import driver as lms2xx
-from firmware_io.lidar.scip import dialogue as scip_dialogue
-from firmware_io.lidar.scip import driver as scip
-from firmware_io.lidar.sick import dialogue as cola
-from firmware_io.lidar.sick import driver as sick
-from firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
-from firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
-from firmware_io.lidar.slamtec import driver as slamtec
-from firmware_io.scan import doctor, lidar_scans
+from scanwright.design.errors import DeviceError, DeviceFaultError
+from scanwright.firmware_io.lidar import sensor_line
+from scanwright.firmware_io.lidar.families import FAMILIES, family_of, open_lidar
+from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
+from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
+from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
+from scanwright.firmware_io.lidar.scip import driver as scip
+from scanwright.firmware_io.lidar.sick import dialogue as cola
+from scanwright.firmware_io.lidar.sick import driver as sick
+from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
+from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
+from scanwright.firmware_io.lidar.slamtec import driver as slamtec
+from scanwright.firmware_io.scan import doctor, lidar_scans
 
 MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS 200")
 MOST_LOST_S = 1.0

@@ -2,8 +2,8 @@
 
 import pytest
 
-from firmware_io.servo.families import all_tables
-from firmware_io.servo.find import find_servo, open_bus
+from scanwright.firmware_io.servo.families import all_tables
+from scanwright.firmware_io.servo.find import find_servo, open_bus
 
 FAMILIES = [("MX-64R", "1.0"), ("XL430-W250", "2.0"), ("STS3215", "STS")]
 

@@ -7,20 +7,20 @@ from types import SimpleNamespace
 import pytest
 import typer
 
-from design.angles import AngleSet
-from design.errors import DeviceError
-from firmware_io.device_ports import announced
-from firmware_io.ros import drive as ros_drive
-from firmware_io.servo import servo as servo_driver
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.fitness import ServoSetupError
-from firmware_io.servo.servo import open_servo
-from firmware_io.servo.settings import set_up
-from firmware_io.twins.scanner import emulated_scanner, room
-from firmware_io.twins.servo.machine import Request
-from firmware_io.twins.servo.twin import ServoTwin
 from scanwright.cli import servo_setup
 from scanwright.cli.servo_setup import asking_first
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.device_ports import announced
+from scanwright.firmware_io.ros import drive as ros_drive
+from scanwright.firmware_io.servo import servo as servo_driver
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.fitness import ServoSetupError
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.servo.settings import set_up
+from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.servo.machine import Request
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 MODELS = [
     ("AX-12A", "1.0"),

@@ -1,8 +1,8 @@
 """The families of servos, and their products."""
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo import families
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.servo import families
 
 
 def test_every_model_has_a_product():

@@ -6,19 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo.bus import bus as servo_bus
-from firmware_io.servo.bus import serial_line
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.feetech.packets import STS, begun, request
-from firmware_io.servo.feetech.tables import TABLES
-from firmware_io.twins.servo import feetech_packets
-from firmware_io.twins.servo.machine import answers
-from firmware_io.twins.servo.models import machine_of
-from firmware_io.twins.servo_plant import Load
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo.bus import bus as servo_bus
+from scanwright.firmware_io.servo.bus import serial_line
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.feetech.packets import STS, begun, request
+from scanwright.firmware_io.servo.feetech.tables import TABLES
+from scanwright.firmware_io.twins.servo import feetech_packets
+from scanwright.firmware_io.twins.servo.machine import answers
+from scanwright.firmware_io.twins.servo.models import machine_of
+from scanwright.firmware_io.twins.servo_plant import Load
 
 (STS3215,) = TABLES
 

@@ -7,15 +7,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from design.angles import AngleSet
-from design.errors import DeviceError, DeviceTimeoutError
-from design.motion import Spin
-from firmware_io.scan import acquire, axis_thread, lidar_scans
-from firmware_io.scan.axis_thread import turning_servo
-from firmware_io.servo import guard
-from firmware_io.servo.progress import ServoState
-from firmware_io.servo.servo import open_servo
-from firmware_io.twins.servo.twin import ServoTwin
+from scanwright.design.angles import AngleSet
+from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.design.motion import Spin
+from scanwright.firmware_io.scan import acquire, axis_thread, lidar_scans
+from scanwright.firmware_io.scan.axis_thread import turning_servo
+from scanwright.firmware_io.servo import guard
+from scanwright.firmware_io.servo.progress import ServoState
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
 UNHEARD = "could not be stopped: take its power"

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from firmware_io.servo.dynamixel.tables import TABLES
+from scanwright.firmware_io.servo.dynamixel.tables import TABLES
 
 RPM = math.radians(360) / 60
 STEP_12_BIT = 2 * math.pi / 4096

@@ -14,21 +14,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import until
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo import guard
-from firmware_io.servo.bus import bus as servo_bus
-from firmware_io.servo.bus import serial_line
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.bus.registers import RPM, Register
-from firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
-from firmware_io.servo.dynamixel.tables import TABLES
-from firmware_io.servo.find import find_servo
-from firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
-from firmware_io.servo.reading import nearest_turn
-from firmware_io.servo.servo import open_servo
-from firmware_io.twins.servo.dynamixel_packets import packet_2, status
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo import guard
+from scanwright.firmware_io.servo.bus import bus as servo_bus
+from scanwright.firmware_io.servo.bus import serial_line
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.bus.registers import RPM, Register
+from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
+from scanwright.firmware_io.servo.dynamixel.tables import TABLES
+from scanwright.firmware_io.servo.find import find_servo
+from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
+from scanwright.firmware_io.servo.reading import nearest_turn
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.twins.servo.dynamixel_packets import packet_2, status
 
 REGISTERS = [
     getattr(table, name) for table in TABLES for name in ("wheel_speed", "joint_speed", "goal", "load", "torque")

@@ -11,24 +11,24 @@ from pytrinamic.connections import SerialTmclInterface
 from pytrinamic.modules import TMCM1140
 from pytrinamic.tmcl import TMCLReplyStatusError
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
-from firmware_io.servo import servo as servo_driver
-from firmware_io.servo.bus import bus as servo_bus
-from firmware_io.servo.bus import serial_line
-from firmware_io.servo.bus.bus import ServoBus
-from firmware_io.servo.bus.packet_format import Status
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.servo import open_servo
-from firmware_io.servo.tmcl import packets
-from firmware_io.servo.tmcl.packets import AXIS, GLOBAL, INPUT, MOVE_TO, ROTATE_RIGHT, TMCL, USER
-from firmware_io.servo.tmcl.tables import TABLES
-from firmware_io.twins.servo.machine import answers
-from firmware_io.twins.servo.models import machine_of
-from firmware_io.twins.servo.tmcl import datagrams
-from firmware_io.twins.servo.twin import ServoTwin
-from firmware_io.twins.servo_plant import Load
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.servo import servo as servo_driver
+from scanwright.firmware_io.servo.bus import bus as servo_bus
+from scanwright.firmware_io.servo.bus import serial_line
+from scanwright.firmware_io.servo.bus.bus import ServoBus
+from scanwright.firmware_io.servo.bus.packet_format import Status
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.servo.tmcl import packets
+from scanwright.firmware_io.servo.tmcl.packets import AXIS, GLOBAL, INPUT, MOVE_TO, ROTATE_RIGHT, TMCL, USER
+from scanwright.firmware_io.servo.tmcl.tables import TABLES
+from scanwright.firmware_io.twins.servo.machine import answers
+from scanwright.firmware_io.twins.servo.models import machine_of
+from scanwright.firmware_io.twins.servo.tmcl import datagrams
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.servo_plant import Load
 
 (TABLE,) = TABLES
 MODEL = "PD42-3-1140"

@@ -18,17 +18,17 @@ from hypothesis import strategies as st
 from patience import until
 from pyax12.connection import Connection
 
-from design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from firmware_io import serial_port
-from firmware_io.servo import servo as servo_driver
-from firmware_io.servo.bus.registers import Register
-from firmware_io.servo.dynamixel.tables import TABLES
-from firmware_io.servo.fitness import ServoSetupError
-from firmware_io.twins.servo.dynamixel_packets import crc16, packet_2, status, take
-from firmware_io.twins.servo.machine import answers
-from firmware_io.twins.servo.models import machine_of
-from firmware_io.twins.servo.twin import ServoTwin
-from firmware_io.twins.servo_plant import Load
+from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from scanwright.firmware_io import serial_port
+from scanwright.firmware_io.servo import servo as servo_driver
+from scanwright.firmware_io.servo.bus.registers import Register
+from scanwright.firmware_io.servo.dynamixel.tables import TABLES
+from scanwright.firmware_io.servo.fitness import ServoSetupError
+from scanwright.firmware_io.twins.servo.dynamixel_packets import crc16, packet_2, status, take
+from scanwright.firmware_io.twins.servo.machine import answers
+from scanwright.firmware_io.twins.servo.models import machine_of
+from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.servo_plant import Load
 
 MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
 MODELS += [("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
@@ -570,7 +570,7 @@ def test_it_stands_however_the_program_leaves(kind):
 PROGRAM = """
 import sys
 from pathlib import Path
-from firmware_io.servo.servo import open_servo
+from scanwright.firmware_io.servo.servo import open_servo
 with open_servo(sys.argv[1], servo_id=1, undo_folder=Path()) as servo:
     servo.spin(3.0)
     print("turning", flush=True)

@@ -12,9 +12,9 @@ import pytest
 import trimesh
 
 import scanwright
-from design.angles import Angles, AngleSet
-from design.task.task import SHIPPED, load_task
 from scanwright.cli import app
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.task.task import SHIPPED, load_task
 from scanwright.pipeline.build import Build
 
 GROUND = (SHIPPED / "ground_ahead.toml").read_text()
@@ -233,7 +233,7 @@ def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(com
 
 
 def test_a_bug_shows_its_traceback(command, monkeypatch):
-    monkeypatch.setattr("design.catalogue.catalogue.load_catalogue", lambda: 1 / 0)
+    monkeypatch.setattr("scanwright.design.catalogue.catalogue.load_catalogue", lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         command("catalogue")
 

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 import scanwright as sw
-from design.angles import AngleSet
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
 ANGLES = {
     "schema": "scanwright/angles/1",

@@ -9,11 +9,11 @@ import sys
 
 import pytest
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Lidar, Servo
-from design.errors import TaskError
-from design.task.shapes import CeilingRegion, GroundRegion, WallRegion
-from design.task.task import load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.errors import TaskError
+from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
 from scanwright.pipeline.wishes import SEEN
 

@@ -11,10 +11,10 @@ import pytest
 
 from benchmarks.scanwright.wrong_inputs.accidents import damage, number
 from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, furnish
-from design.errors import TaskError
-from firmware_io.clouds.cloud import Cloud
-from firmware_io.clouds.formats import read_clouds, write_clouds
-from firmware_io.twins.world import range_model
+from scanwright.design.errors import TaskError
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.firmware_io.twins.world import range_model
 
 LONG = "x" * 300
 
@@ -97,8 +97,8 @@ def test_turns_without_end(refused):
 
 @pytest.mark.parametrize("noise", [np.inf, np.nan, -1.0])
 def test_noise_without_end(noise):
-    from design.catalogue.catalogue import load_catalogue
-    from design.catalogue.products import Lidar
+    from scanwright.design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.products import Lidar
 
     with pytest.raises(TaskError, match=r"noise (inf|nan|-1\.0) mm: 0 to 100000"):
         range_model(load_catalogue().get("UTM-30LX", Lidar), noise)

@@ -20,12 +20,12 @@ from rosbags.typesys import Stores, get_typestore
 from websockets.sync.client import connect
 
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
-from design.angles import Angles, AngleSet
-from design.errors import DeviceError, RecordingError, TaskError
-from firmware_io.assembly.deskew import deskew
-from firmware_io.recording.recording import RecordingWriter, open_recording
-from firmware_io.samples import straight
-from firmware_io.scan.live_feed import Batch
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import DeviceError, RecordingError, TaskError
+from scanwright.firmware_io.assembly.deskew import deskew
+from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.samples import straight
+from scanwright.firmware_io.scan.live_feed import Batch
 from scanwright.live.foxglove_channels import FoxgloveChannels
 from scanwright.live.foxglove_server import BACKLOG, foxglove_server
 from scanwright.live.foxglove_view import mcap_log, tell, view_recording, write_for_foxglove

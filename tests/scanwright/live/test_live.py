@@ -16,15 +16,15 @@ from patience import until
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
-from design.angles import Angles, AngleSet
-from design.errors import DeviceError, UnsafeError, UnsafeNote
-from firmware_io.assembly.deskew import deskew
-from firmware_io.clouds.formats import read_clouds
-from firmware_io.samples import JointLog, Scan
-from firmware_io.scan import scan_end
-from firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
 from scanwright.cli import devices
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import DeviceError, UnsafeError, UnsafeNote
+from scanwright.firmware_io.assembly.deskew import deskew
+from scanwright.firmware_io.clouds.formats import read_clouds
+from scanwright.firmware_io.samples import JointLog, Scan
+from scanwright.firmware_io.scan import scan_end
+from scanwright.firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
+from scanwright.firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
 from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
@@ -226,8 +226,8 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
 
     seen = Seen()
     plan = SimpleNamespace(lines=list, recording=Path(__file__))
-    monkeypatch.setattr("firmware_io.scan.plan.plan_scan", lambda *_, **__: plan)
-    monkeypatch.setattr("firmware_io.scan.acquire.acquire", acquire)
+    monkeypatch.setattr("scanwright.firmware_io.scan.plan.plan_scan", lambda *_, **__: plan)
+    monkeypatch.setattr("scanwright.firmware_io.scan.acquire.acquire", acquire)
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
     with pytest.raises(typer.Exit) as ended:
         devices.scan(Path("out"))

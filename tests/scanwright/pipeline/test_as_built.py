@@ -9,7 +9,7 @@ import pytest
 from quick_tests import samples
 
 import scanwright.api as sw
-from design.task.task import shipped_tasks
+from scanwright.design.task.task import shipped_tasks
 from scanwright.pipeline.built import is_build_folder, open_built
 
 

@@ -15,12 +15,12 @@ from imports import ROOT
 from patience import BOUND_S
 
 import scanwright.api as sw
-from cad.findings import PartFinding
-from design.angles import load_angles
-from design.errors import BuildError
-from design.search.optimum import find_optimum
-from design.task.task import load_task
+from scanwright.cad.findings import PartFinding
 from scanwright.cli.app import run as scanwright_command
+from scanwright.design.angles import load_angles
+from scanwright.design.errors import BuildError
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.task.task import load_task
 from scanwright.pipeline import build as pipeline
 from scanwright.pipeline.build import Build, Made
 from scanwright.pipeline.folder import fresh_folder
@@ -212,9 +212,9 @@ def test_ctrl_c_waits_until_all_files_are_moved(tmp_path, monkeypatch):
 
 REBUILD = """
 import sys
-from cad.assembly.assembly import alone
-from cad.files.step import step_text
-from cad.solids import box
+from scanwright.cad.assembly.assembly import alone
+from scanwright.cad.files.step import step_text
+from scanwright.cad.solids import box
 from scanwright.cli.app import run
 step_text(alone("box", box((0, 0, 0), (1, 1, 1)), (1.0, 0.0, 0.0)), "box")  # what is written later must not count on
 if __name__ == "__main__":

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from cad.checks.run import run_checks
-from cad.files.bom import items_of
-from cad.layout.all_joints import joints_of
-from cad.layout.layout import config_hash
 from scanwright import api
+from scanwright.cad.checks.run import run_checks
+from scanwright.cad.files.bom import items_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.layout import config_hash
 
 
 @pytest.fixture(scope="module")

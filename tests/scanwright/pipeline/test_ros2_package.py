@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from patience import BOUND_S
 
-from design.angles import Angles, AngleSet, load_angles
-from firmware_io.ros.robot_frames import description, fixed_frames
+from scanwright.design.angles import Angles, AngleSet, load_angles
+from scanwright.firmware_io.ros.robot_frames import description, fixed_frames
 from scanwright.pipeline.ros2 import description_launch, node
 from scanwright.pipeline.ros2.package import package_name, write_package
 

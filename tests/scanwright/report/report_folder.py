@@ -13,11 +13,11 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from design.angles import STANDARD_DEG, Angles, AngleSet
-from design.evaluation.picture_files import save_picture
-from design.left_out import LeftOut
-from design.shadow import AXIS_STEPS, Shadow, own_body_bytes
-from design.task.task import load_task
+from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet
+from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.left_out import LeftOut
+from scanwright.design.shadow import AXIS_STEPS, Shadow, own_body_bytes
+from scanwright.design.task.task import load_task
 from scanwright.pipeline import records as writer
 from scanwright.pipeline.manifest import write_json, write_manifest
 from scanwright.pipeline.records import write_report

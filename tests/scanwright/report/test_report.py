@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_folder import ANGLES, EVIL, Page, drawn, own_body, sphere
 
-from design.objective.holes import percent
-from design.objective.problem import NODES, problem_of
-from design.objective.score import quick_J, score
-from design.shadow import AXIS_STEPS, load_own_body
-from design.task.task import Limits, load_task
+from scanwright.design.objective.holes import percent
+from scanwright.design.objective.problem import NODES, problem_of
+from scanwright.design.objective.score import quick_J, score
+from scanwright.design.shadow import AXIS_STEPS, load_own_body
+from scanwright.design.task.task import Limits, load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import page as report_page
 from scanwright.report.answer import answer, problem_as_built

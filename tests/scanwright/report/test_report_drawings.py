@@ -8,9 +8,9 @@ import pytest
 from matplotlib import colormaps
 from report_folder import ANGLES, AXES, Page, cell, drawn, own_body, picture, sphere
 
-from design.frames import R_world_rot
-from design.motion import Sweep
-from design.task.task import load_task
+from scanwright.design.frames import R_world_rot
+from scanwright.design.motion import Sweep
+from scanwright.design.task.task import load_task
 from scanwright.report.answer import hidden_by
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
 from scanwright.report.density_sphere import SHADES

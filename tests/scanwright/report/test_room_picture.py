@@ -11,10 +11,10 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 from PIL import Image
 
-from design.angles import Angles, AngleSet
-from design.evaluation.coverage import mean_density_at
-from design.objective.problem import problem_of
-from design.task.task import load_task
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.task.task import load_task
 from scanwright.report.check_pictures import PlacedBody
 from scanwright.report.cut_room import Room, pinhole_behind, room_about, walls_behind
 from scanwright.report.density_sphere import DensitySphere, density_sphere

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from design.angles import Angles, AngleSet
-from design.evaluation.metres import on_planes
-from design.motion import StopAndGo, Sweep
-from design.task.task import load_task
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.motion import StopAndGo, Sweep
+from scanwright.design.task.task import load_task
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.sentences import sentences, turns
 

@@ -10,7 +10,7 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from design.errors import TaskError
+from scanwright.design.errors import TaskError
 from scanwright.serving.handshake import MOST_VISITORS
 from scanwright.serving.page_server import guarded_server
 

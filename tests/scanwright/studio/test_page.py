@@ -12,8 +12,8 @@ import pytest
 import viser.transforms
 from matplotlib.image import imread
 
-from design.search.optimum import find_optimum
-from design.task.task import load_task
+from scanwright.design.search.optimum import find_optimum
+from scanwright.design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
 from scanwright.serving.style import ramp
 from scanwright.studio.page import Studio

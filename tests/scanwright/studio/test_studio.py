@@ -13,13 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.errors import BuildError, TaskError
-from design.evaluation.metres import on_planes
-from design.objective.problem import problem_of
-from design.objective.score import score
-from design.sphere.directions import spiral
-from design.task.task import load_task
-from firmware_io.twins.world import furnished_room
+from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.sphere.directions import spiral
+from scanwright.design.task.task import load_task
+from scanwright.firmware_io.twins.world import furnished_room
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
@@ -162,7 +162,7 @@ def test_what_a_scan_leaves_on_the_ground_is_told_in_metres_when_the_hand_rests(
 
 
 def test_colours_are_pale_exactly_where_no_beam_comes(loaded):
-    from design.evaluation.coverage import mean_density_at
+    from scanwright.design.evaluation.coverage import mean_density_at
 
     problem, directions = problem_of(loaded), hexagons().directions
     highest = highest_density(problem, SETTING.angles_rad)

@@ -34,12 +34,12 @@ def agrees_with_the_parts(row, task):
     """The numbers of a row by other ways: weighed solid by solid, J of the beams that get past the parts."""
     import numpy as np
 
-    from cad.assembly.shadow import PartsWorkshop
-    from design.angles import Angles, AngleSet
-    from design.objective.problem import problem_of
-    from design.objective.score import score
-    from design.scanner import scanner_of
-    from design.task.task import load_task
+    from scanwright.cad.assembly.shadow import PartsWorkshop
+    from scanwright.design.angles import Angles, AngleSet
+    from scanwright.design.objective.problem import problem_of
+    from scanwright.design.objective.score import score
+    from scanwright.design.scanner import scanner_of
+    from scanwright.design.task.task import load_task
 
     loaded = load_task(Path(task))
     angles = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=-60)

@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
-from design.catalogue.catalogue import load_catalogue
-from design.errors import TaskError
-from design.task.named_record import names_in
-from design.task.task import SHIPPED as TASKS
-from design.task.task import Limits, load_task
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import TaskError
+from scanwright.design.task.named_record import names_in
+from scanwright.design.task.task import SHIPPED as TASKS
+from scanwright.design.task.task import Limits, load_task
 from scanwright.study.candidate import addresses, bounds_of, record_digest, search_record, winner_task
 from scanwright.study.crossing import Crossing, _with_period
 from scanwright.study.front import COLUMNS, Front, costs

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.scanwright.study.invented import die, invented_judge, invented_search, invented_study
 from benchmarks.scanwright.study.kills import TABLES, disturbed, site
-from design.errors import BuildError
+from scanwright.design.errors import BuildError
 from scanwright.study import workers
 from scanwright.study.crossing import Crossing
 from scanwright.study.results import Results, address, open_results, program

@@ -5,7 +5,7 @@ Written from the tables "TMCL command format" and "TMCL reply format" of the mak
 
 from __future__ import annotations
 
-from firmware_io.twins.servo.machine import Request
+from scanwright.firmware_io.twins.servo.machine import Request
 
 STRING = -1  # the status of a version as a text, which has no status and no sum
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from design.catalogue.catalogue import load_catalogue
-from design.catalogue.products import Servo
-from firmware_io.servo.bus.registers import ControlTable
-from firmware_io.twins.dynamics import HornMotion
-from firmware_io.twins.servo.machine import Request
-from firmware_io.twins.servo.tmcl.datagrams import STRING, reply, take
-from firmware_io.twins.servo.tmcl.parameters import (
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.servo.bus.registers import ControlTable
+from scanwright.firmware_io.twins.dynamics import HornMotion
+from scanwright.firmware_io.twins.servo.machine import Request
+from scanwright.firmware_io.twins.servo.tmcl.datagrams import STRING, reply, take
+from scanwright.firmware_io.twins.servo.tmcl.parameters import (
     AXIS_READINGS,
     AXIS_SETTINGS,
     BAUDS,
@@ -29,8 +29,8 @@ from firmware_io.twins.servo.tmcl.parameters import (
     USER_VARIABLES,
     from_the_factory,
 )
-from firmware_io.twins.servo.tmcl.steps import COUNTS, Steps, encoder_count
-from firmware_io.twins.servo_plant import Actuation, Load, plant_of
+from scanwright.firmware_io.twins.servo.tmcl.steps import COUNTS, Steps, encoder_count
+from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _DONE, _UNKNOWN, _TYPE, _VALUE, _ABSENT = 100, 2, 3, 4, 6
 _BOOT_S, _LEAST_V = 0.5, 9.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from firmware_io.twins.servo_plant import walked_rad
+from scanwright.firmware_io.twins.servo_plant import walked_rad
 
 COUNTS = 1024  # of the encoder
 
