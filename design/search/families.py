@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, count
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +16,7 @@ from design.frames import R_world_rot
 from design.objective.problem import NODES, Problem
 from design.objective.score import Score
 from design.objective.tolerance import worst_within
-from design.search.coarse import Landscape
+from design.search.coarse import Landscape, Progress
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
 from design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
@@ -202,8 +203,10 @@ def refine_leaders(
     leaders: list[Leader],
     required: Requirements,
     rounds: int = len(REFINE_ROUNDS),
+    progress: Progress = lambda _: None,
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
+    start, done = time.perf_counter(), count(1)
     different = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
     ordered = sorted(different.values(), key=lambda pair: pair[0].J)
 
@@ -211,7 +214,11 @@ def refine_leaders(
         leader = ordered[k][1]
         its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
         refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
-        return allowed_setting(refined, leader.angles_deg, required)
+        allowed = allowed_setting(refined, leader.angles_deg, required)
+        ready = next(done)
+        left_s = (time.perf_counter() - start) * (len(apart) - ready) / ready
+        progress(f"refined {ready} of {max(ready, len(apart))} minima, about {max(0.0, left_s):.0f} s left")
+        return allowed
 
     # all at once, but those that are in the winner's valley already
     apart = [

@@ -95,7 +95,7 @@ def search(
             _landscape(problem, coarse, progress, found.asked, avoid, effort)[0], *coarse, mirrors, required
         )
     progress("refining the minima")
-    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds)
+    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds, progress)
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
     return SearchResult(

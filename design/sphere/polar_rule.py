@@ -34,6 +34,7 @@ from design.sphere.total_weight import total_weight
 
 GRID = 180  # segments of a region of many edges, for those who ask for all of its breaks
 MANY_CORNERS = 64  # above this segments between corners would cost more nodes than the bends
+NEARER = 4.0  # three times the nodes of a rule of order 1.3; of smooth pieces it is 2
 PER_NODE = 256  # directions for each node of a region of many edges or corners
 MOST_DIRECTIONS = 2_000_000
 WEIGHT_OFF = 1e-3  # share of the integral of the weight that the sum over the nodes may be off by
@@ -49,12 +50,14 @@ class PolarRule:
         fine: what each node adds to `int w dO`, shape (n,).
         coarse: the same for the rule with a third of the nodes: zero on two of three, shape (n,).
         segment: the segment that each node belongs to, shape (n,).
+        nearer: how many times nearer than the coarse rule the fine one is, at least, on smooth pieces.
     """
 
     polar_rad: Float[ndarray, " n"]
     fine: Float[ndarray, " n"]
     coarse: Float[ndarray, " n"]
     segment: Int64[ndarray, " n"]
+    nearer: float = 1.0
 
     def own_error(self) -> float:
         """What its sum of weights is off by as its nodes are few, from the rule with a third of them."""
@@ -92,7 +95,7 @@ def _rule_on(field: Field, axis: Vector, ends: Float[ndarray, "segments 2"], nod
     width = length / 2 * np.sin(s) * step
     means, _ = field.on_circles(axis, t)
     fine = width * 2 * np.pi * np.sin(t) * means
-    return PolarRule(t, fine, np.where(k % 3 == 1, 3 * fine, 0.0), segment)
+    return PolarRule(t, fine, np.where(k % 3 == 1, 3 * fine, 0.0), segment, NEARER)
 
 
 def _sampled_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"], nodes: int) -> PolarRule:
