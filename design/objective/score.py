@@ -151,7 +151,7 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
         return zones(polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
 
     z = seen(rule.polar_rad)
-    if stated and moment.share > 0:
+    if stated and not problem.grid_step_deg:  # of the paper's grid nothing between the nodes counts
         z = replace(z, least=_with_lower(seen, rule, z))
     blind = np.zeros(len(rule.polar_rad), dtype=bool)
     for low, high in problem.blind_zones(polar):
