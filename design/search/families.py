@@ -19,7 +19,7 @@ from design.objective.tolerance import worst_within
 from design.search.coarse import Landscape, Progress
 from design.search.constraints import Requirements
 from design.search.grid_classes import Folded
-from design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
+from design.search.refinement import INDIFFERENT, REFINE_ROUNDS, allowed_setting, refined_setting
 from design.task.angle_ranges import AngleRanges
 
 FAMILIES = 10
@@ -235,7 +235,7 @@ def refine_leaders(
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
             refined, again = at_once.get(k) or minimum(k)
             # the rounder angles of the grid are as good
-            if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
+            if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
             elif not any(_same_valley(refined, again.J, better) for better in families):
                 families.append(_family(refined, again, leader))
