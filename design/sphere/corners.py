@@ -12,7 +12,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Vector
 from scanwright.design.sphere.regions import Field, cross, frames_about
 
-LOOKS_AROUND, LOOK_RAD = 12, 1e-5  # at what lies around a point of an edge
+LOOKS_AROUND, LOOK_RAD = 12, 2e-7  # at what lies around a point of an edge
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
 MOST_CORNERED = 256  # edges of bands and cones whose corners are looked for: pairs of them
 
