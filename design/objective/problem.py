@@ -34,6 +34,7 @@ class Problem:
         bearings_rad: of the beams, shape (beams,).
         lines: of one full turn; of a sweep, as many as one period has, the widest step apart.
         sweep: the trajectory, where the servo sweeps.
+        scan_rate_hz: scans of the lidar in a second.
         ball_rad: ball radius.
         objective: what is minimised.
         grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
@@ -45,6 +46,7 @@ class Problem:
     bearings_rad: Float[ndarray, " beams"]
     lines: ScanLines
     sweep: SweepLines | None
+    scan_rate_hz: float
     ball_rad: float
     objective: Objective
     grid_step_deg: float | None
@@ -121,6 +123,7 @@ def problem_of(loaded: LoadedTask) -> Problem:
         bearings_rad=lidar.bearings_rad(),
         lines=motion_lines(motion, lidar.scan_rate_hz),
         sweep=None,
+        scan_rate_hz=lidar.scan_rate_hz,
         ball_rad=float(np.radians(density.ball_radius_deg)),
         objective=objective_of(loaded, field),
         grid_step_deg=step_deg,
@@ -134,7 +137,8 @@ def with_scanner(problem: Problem, lidar: Lidar, motion: Motion | Shortest) -> P
     """The same weights and objective, seen by another lidar on another motion."""
     rate_hz = lidar.scan_rate_hz
     sweep = SweepLines(motion, rate_hz) if isinstance(motion, Sweep) else None
-    return problem.with_beams(lidar.bearings_rad(), motion_lines(motion, rate_hz), sweep)
+    seen = problem.with_beams(lidar.bearings_rad(), motion_lines(motion, rate_hz), sweep)
+    return replace(seen, scan_rate_hz=rate_hz)
 
 
 def motion_lines(motion: Motion | Shortest, scan_rate_hz: float) -> ScanLines:

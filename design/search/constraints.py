@@ -17,11 +17,13 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Ints, Mask, Setting
 from scanwright.design.concurrency.blocked_product import product
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.frames import R_rot_laser
+from scanwright.design.frames import R_rot_laser, R_world_rot
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, score, score_on
 from scanwright.design.search.limits import planes_keep
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.sphere.polar_rule import has_all_breaks
 from scanwright.design.task.task import Limits
 
 TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
@@ -115,12 +117,21 @@ class Requirements:
         if named not in self._known:
             self._known[named] = score(self.problem, np.radians(angles_deg))
         found = self._known[named]
-        return found if self.keeps(found, angles_deg) else None
+        return found if self.keeps(found, angles_deg) and self._reaches_all(np.radians(angles_deg)) else None
 
     def J(self, angles_deg: Setting, nodes: int) -> float:
         """J on a number of nodes; inf where the setting is refused."""
         found = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
         return found.J if self.keeps(found, angles_deg) else np.inf
+
+    def _reaches_all(self, angles_rad: Setting) -> bool:
+        """Whether a fan reaches all of a region of many edges: between directions that stand for it is some of it."""
+        problem = self.problem
+        if not self.avoid_holes or problem.sweep is not None or has_all_breaks(problem.field):
+            return True
+        axis = R_world_rot(angles_rad[0], angles_rad[1])[None, :, 2]
+        both = NoHole(fan_reach(problem, angles_rad[None, 2:]), reach_about(problem.field, axis))
+        return not both.broken(slice(None), slice(None))[0].any()
 
     def keeps(self, found: Score, angles_deg: Setting) -> bool:
         """Whether a scored setting keeps the limits and, where they are to be avoided, has no hole."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, count
 
 import numpy as np
 from jaxtyping import Float
@@ -15,10 +16,10 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_within
-from scanwright.design.search.coarse import Landscape
+from scanwright.design.search.coarse import Landscape, Progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.refinement import REFINE_ROUNDS, allowed_setting, refined_setting
+from scanwright.design.search.refinement import INDIFFERENT, REFINE_ROUNDS, allowed_setting, refined_setting
 from scanwright.design.task.angle_ranges import AngleRanges
 
 FAMILIES = 10
@@ -202,8 +203,10 @@ def refine_leaders(
     leaders: list[Leader],
     required: Requirements,
     rounds: int = len(REFINE_ROUNDS),
+    progress: Progress = lambda _: None,
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
+    start, done = time.perf_counter(), count(1)
     different = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
     ordered = sorted(different.values(), key=lambda pair: pair[0].J)
 
@@ -211,7 +214,11 @@ def refine_leaders(
         leader = ordered[k][1]
         its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
         refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
-        return allowed_setting(refined, leader.angles_deg, required)
+        allowed = allowed_setting(refined, leader.angles_deg, required)
+        ready = next(done)
+        left_s = (time.perf_counter() - start) * (len(apart) - ready) / ready
+        progress(f"refined {ready} of {max(ready, len(apart))} minima, about {max(0.0, left_s):.0f} s left")
+        return allowed
 
     # all at once, but those that are in the winner's valley already
     apart = [
@@ -228,7 +235,7 @@ def refine_leaders(
         if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
             refined, again = at_once.get(k) or minimum(k)
             # the rounder angles of the grid are as good
-            if again is None or (again.J + again.J_error >= exact.J and not ranges.tolerance_deg):
+            if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
                 families.append(_family(leader.angles_deg, exact, leader))
             elif not any(_same_valley(refined, again.J, better) for better in families):
                 families.append(_family(refined, again, leader))

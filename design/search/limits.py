@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import Problem
@@ -40,6 +41,25 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
     if not keep.any():
         raise TaskError("limits: no scan plane keeps max_line_gap_deg and max_blind_cone_deg at once")
     return _only(planes, keep)
+
+
+def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str:
+    """Why limits on the scan plane leave parts of the region blind, from the best setting without that sees all."""
+    planes_rad = np.radians(angles_deg[None, 2:])
+    gap_deg, cone_deg = float(line_gaps_deg(problem, planes_rad)[0]), float(blind_cones_deg(problem, planes_rad)[0])
+    setting = ", ".join(f"{angle:g}" for angle in angles_deg)
+    if limits.max_line_gap_deg is not None and gap_deg > limits.max_line_gap_deg:
+        limit = f"max_line_gap_deg = {limits.max_line_gap_deg:g}"
+        lines = np.ceil(2 * np.pi / problem.lines.step_rad * gap_deg / limits.max_line_gap_deg - 1e-9)
+        period = f"{lines:.0f} lines in a turn, a period_s of {lines / problem.scan_rate_hz:.6g}"
+        cure = f"lines {gap_deg:.3g} deg apart: the limit takes {period}"
+    else:
+        limit = f"max_blind_cone_deg = {limits.max_blind_cone_deg:g}"
+        cure = f"a blind cone of {cone_deg:.3g} deg that the region does not reach"
+    return (
+        f"limits.{limit}: every scan plane that keeps it leaves a part of the region blind; ({setting}) sees all of it "
+        f'and has {cure}; change the limit, or set angles.holes = "allow"'
+    )
 
 
 def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Limits) -> Bool[ndarray, " n"]:

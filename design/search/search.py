@@ -19,7 +19,7 @@ from scanwright.design.search.coarse_sweep import swept_landscape
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
 from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
-from scanwright.design.search.limits import allowed_planes
+from scanwright.design.search.limits import allowed_planes, blinding_words
 from scanwright.design.search.mounts.preference import simplest_first
 from scanwright.design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
@@ -71,7 +71,8 @@ def search(
     """Find the best families of settings in the ranges of a task that keep its limits and, if they can, have no hole.
 
     Raises:
-        TaskError: no direction has a weight, or no setting keeps the limits.
+        TaskError: no direction has a weight, no setting keeps the limits, or they leave only settings with a hole and
+            without them there are others.
     """
     start = time.perf_counter()
     mirrors = mirrors_of(problem.bearings_rad)[: None if problem.sweep is None else 1]
@@ -82,6 +83,7 @@ def search(
     required = Requirements(problem, limits, avoid)
     found = _best(required, fine, progress, effort)
     if avoid and found.leader is None:  # nothing is free of holes: the lowest J of all
+        _refuse_limits_that_blind(required, ranges, progress, effort)
         least_blind = _least_blind(problem, found.land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
         avoid, required = False, replace(required, avoid_holes=False)
@@ -97,7 +99,7 @@ def search(
             _landscape(problem, coarse, progress, found.asked, avoid, effort)[0], *coarse, mirrors, required
         )
     progress("refining the minima")
-    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds)
+    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds, progress)
     simple = ranges.prefer == "simple"
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
@@ -145,6 +147,20 @@ def _best(required: Requirements, grid: Grid, progress: Progress, effort: Effort
         land, exact = _landscape(problem, grid, progress, asked, avoid, effort)
         leader = best_leader(land, *grid, required)
     return _Best(land, exact, asked, leader)
+
+
+def _refuse_limits_that_blind(required: Requirements, ranges: AngleRanges, progress: Progress, effort: Effort) -> None:
+    """Nothing, unless the limits on scan planes forbid settings that see all of the region.
+
+    Raises:
+        TaskError: they do.
+    """
+    limits = required.limits.model_copy(update={"max_line_gap_deg": None, "max_blind_cone_deg": None})
+    if limits == required.limits:
+        return
+    free = _best(replace(required, limits=limits), _grid(required.problem, ranges, limits), progress, effort)
+    if free.leader is not None:
+        raise TaskError(blinding_words(required.problem, required.limits, free.leader.angles_deg))
 
 
 def _grid(problem: Problem, ranges: AngleRanges, limits: Limits) -> Grid:

@@ -13,7 +13,7 @@ from scanwright.design.arrays import Vector
 from scanwright.design.sphere.regions import Field, cross, frames_about
 
 LOOKS_AROUND = 12  # at what lies around a point of an edge
-LOOK_RAD = 2e-6  # how far from it: regions are 0.001 deg thick at least, what masks leave of them may be less
+LOOK_RAD = 2e-7  # how far from it: what masks leave of a region may be as thin; 1e-8 would lose tiny cones to `EDGE`
 MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
 MOST_CORNERED = 256  # edges of bands and cones whose corners are looked for: pairs of them
 

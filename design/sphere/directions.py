@@ -57,19 +57,19 @@ def equal_angle_grid(step_deg: float) -> Float[ndarray, "n 3"]:
 def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: float = 0.5) -> Samples:
     """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
 
-    Every painted region is covered by itself, in what those before it leave: however small one is, it gets its share.
+    Every painted region is covered by itself, so however small one is, it gets its share. If several regions hold a
+    direction, it stands for the solid angle that the directions of all of them leave it.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    patches = len(field.patches)
-    found = [_in_patch(field, k, wanted // patches + 1, turn_rad, shift) for k in range(patches)]
-    if not any(len(samples.weights) for samples in found):
+    each = wanted // max(1, len(field.patches)) + 1
+    found = [_in_patch(field, k, each, turn_rad, shift) for k in range(len(field.patches))]
+    if not any(len(samples.weights) for samples, _ in found):
         raise TaskError(NO_WEIGHT)
-    return Samples(
-        np.concatenate([samples.directions for samples in found]),
-        np.concatenate([samples.weights for samples in found]),
-    )
+    directions = np.concatenate([samples.directions for samples, _ in found])
+    weights = np.concatenate([samples.weights for samples, _ in found])
+    return Samples(directions, weights / field.summed_at(directions, np.array([per_sr for _, per_sr in found])))
 
 
 def require_weight(field: Field) -> None:
@@ -79,7 +79,7 @@ def require_weight(field: Field) -> None:
         TaskError: no direction has a weight.
     """
     patches = len(field.patches)
-    if not any(len(_in_patch(field, k, A_FEW // patches + 1, 0.0, 0.5).weights) for k in range(patches)):
+    if not any(len(_in_patch(field, k, A_FEW // patches + 1, 0.0, 0.5)[0].weights) for k in range(patches)):
         raise TaskError(NO_WEIGHT)
 
 
@@ -111,17 +111,20 @@ def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: in
     return weighted_samples(field, wanted + 17 * index, turn_rad=float(index), shift=(0.5 + index / GOLDEN) % 1)
 
 
-def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: float) -> Samples:
-    """Weighted directions in one patch and in none before it; denser until there are enough, or it is given up."""
+def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: float) -> tuple[Samples, float]:
+    """Weighted directions in one patch with their weights, and how many the patch has for each steradian.
+
+    They are made denser until there are enough, or the patch is given up.
+    """
     count = wanted
     while True:
         directions, solid_angle = _spread(field, index, count, turn_rad, shift)
         if not solid_angle > 0:
-            return Samples(np.empty((0, 3)), np.empty(0))
-        weights = np.where(field.patch_at(directions) == index, field.weight_at(directions), 0.0)
+            return Samples(np.empty((0, 3)), np.empty(0)), 0.0
+        weights = field.weight_at(directions)
         hits = int((weights > 0).sum())
         if hits >= wanted or count >= MOST_LOOKS:
-            return Samples(directions[weights > 0], weights[weights > 0] * (solid_angle / count))
+            return Samples(directions[weights > 0], weights[weights > 0]), count / solid_angle
         count = min(MOST_LOOKS, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
 
 

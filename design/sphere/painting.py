@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from scanwright.design.arrays import Array, Ints, Mask
+from scanwright.design.arrays import Array, Mask
 
 ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""
@@ -73,16 +73,14 @@ def masked_at(directions: Array, rows: Array, tables: Array) -> Mask:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def first_patch(directions: Array, rows: Array, tables: Array) -> Ints:
-    """The first row that holds each direction with a value above 0, (directions,); their number where none does."""
-    out = np.empty(directions.shape[0], np.int64)
+def summed_over(directions: Array, rows: Array, tables: Array, of_rows: Array) -> Array:
+    """Sum of `of_rows` over the rows that hold each direction with a value above 0, (directions,)."""
+    out = np.zeros(directions.shape[0])
     for i in range(directions.shape[0]):
-        out[i] = rows.shape[0]
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         for k in range(rows.shape[0]):
             if _holds(x, y, z, rows[k]) and _of_cell(x, y, z, rows[k], tables) > 0.0:
-                out[i] = k
-                break
+                out[i] += of_rows[k]
     return out
 
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Vector
@@ -28,8 +28,8 @@ from scanwright.design.sphere.painting import (
     POLYGON,
     VALUE,
     circle_means,
-    first_patch,
     masked_at,
+    summed_over,
     values_at,
 )
 from scanwright.design.sphere.rectangle import edge_normals
@@ -103,9 +103,9 @@ class Field:
         rows = self.weight.rows[self.weight.rows[:, VALUE] > 0]
         return rows if self.background == 0 else np.vstack([rows, _row(ALL, [], self.background)])
 
-    def patch_at(self, directions: Float[ndarray, "n 3"]) -> Int[ndarray, " n"]:
-        """The first of `patches` that holds each direction; their number where none does. Shape (n,)."""
-        return first_patch(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables)
+    def summed_at(self, directions: Float[ndarray, "n 3"], of_patches: Float[ndarray, " patches"]) -> Array:
+        """Sum over those of `patches` that hold each direction (n, 3) of what each of them has, shape (n,)."""
+        return summed_over(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables, of_patches)
 
     def on_circles(
         self, axis: Vector, polar_rad: Float[ndarray, " n"]

@@ -232,6 +232,19 @@ def test_g_of_the_true_counts_is_worse_where_lines_leave_gaps():
     assert fast.J - fast.J_lower > 0.1
 
 
+@pytest.mark.parametrize("seed", [13, 166, 198, 217, 261, 315])
+def test_a_count_that_is_lower_between_nodes_is_found(seed):
+    """Thirty times the nodes find none that is lower."""
+    rng = np.random.default_rng(seed)
+    period_s, ball_deg, axis = float(np.round(rng.uniform(2, 6), 1)), rng.uniform(3, 8), rng.normal(size=3).tolist()
+    region = {"shape": "cone", "axis": axis, "half_angle_deg": rng.uniform(5, 30)}
+    p = problem([region], period_s=period_s, ball_radius_deg=ball_deg)
+    p = p.with_beams(p.bearings_rad[::12], p.lines)
+    setting = rng.uniform(-1.5, 1.5, 4)
+    assert score_on(p, setting, 729).least <= score_on(p, setting, 20_000, stated=False).least
+    assert score_on(p, setting, 729).least < score_on(p, setting, 729, stated=False).least
+
+
 def test_quick_J_is_the_same_J():
     p, setting = random_pair(7)
     assert quick_J(p, setting, NODES) == score_on(p, setting, NODES).J

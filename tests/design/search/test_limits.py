@@ -1,5 +1,6 @@
 """Limits of a task, the shortest period that keeps them, and the optimum that bears a sloppy mount."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.ball_search import start_phases
 from scanwright.design.objective.problem import problem_of
-from scanwright.design.objective.score import quick_J
+from scanwright.design.objective.score import quick_J, score
 from scanwright.design.objective.tolerance import rise_words, sensitivity, worst_within
 from scanwright.design.search import families
 from scanwright.design.search import search as search_module
@@ -88,6 +89,21 @@ def test_limits_that_nothing_keeps_say_what_can_be_had(limits, words):
     task = loaded()
     with pytest.raises(TaskError, match=words):
         search(problem_of(task), task.task.angles, limits=Limits.model_validate(limits))
+
+
+@pytest.mark.parametrize("period_s", [5.0, 11.3])
+def test_a_gap_limit_that_leaves_holes_names_the_period_without_them(period_s):
+    """With that period the setting that is named keeps the limit, and some line less breaks it."""
+    limits = Limits(max_line_gap_deg=0.4)
+    task = loaded(motion={"period_s": period_s}, angles=ANGLES | {"alpha_laser_deg": [-80, 0]})
+    with pytest.raises(TaskError, match=r"max_line_gap_deg = 0.4: .* has lines .* a period_s of \d") as refused:
+        search(problem_of(task), task.task.angles, limits=limits)
+    told = re.search(r"blind; \((.*)\) sees .* period_s of ([\d.]+);", str(refused.value))
+    setting, longer_s = np.radians([float(angle) for angle in told[1].split(",")]), float(told[2])
+    for longer, keeps in ((longer_s, True), (longer_s - 1 / 40, False)):
+        slow = problem_of(loaded(motion={"period_s": longer}))
+        assert (gaps(slow, setting).line_gap_deg <= 0.4 + 1e-9) == keeps
+    assert score(problem_of(task), setting).blind_weight < 1e-9
 
 
 def test_the_shortest_period_keeps_its_limit_in_simulated_scans():

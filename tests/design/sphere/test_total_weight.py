@@ -61,3 +61,12 @@ def test_masks_unite_in_any_order(seed):
         np.testing.assert_array_equal(united.masked_at(directions), np.any(alone, axis=0))
     merged = field([], [masks[0][0]], [np.maximum(*tables)])
     np.testing.assert_array_equal(merged.masked_at(directions), alone[0] | alone[1])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ring_of_a_thousandth_of_a_degree_is_seen_about_any_axis(seed):
+    rng = np.random.default_rng(seed)
+    cone = {"shape": "cone", "axis": unit_vectors(rng, 1)[0].tolist(), "half_angle_deg": rng.uniform(10, 80)}
+    f = field([cone], [cone | {"half_angle_deg": cone["half_angle_deg"] - 0.001}])
+    for axis in np.vstack([unit_vectors(rng, 2), cone["axis"]]):
+        assert circle_rule(f, axis, NO_BREAKS, 243).fine.sum() == pytest.approx(total_weight(f), rel=2e-3)
