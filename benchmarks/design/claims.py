@@ -35,7 +35,8 @@ from design.objective.score import Score, score
 from design.task.task import load_task, shipped_tasks
 
 SMALL_ERROR = 1e-3  # what most scores state at the default
-FEW, MANY = 2**12, 2**18  # directions of one set of the count: at first, and at most
+FEW = 2**12  # directions of one set of the count at first
+MOST_WORK = 2e6  # directions of one set times the beams that are near to one, at most
 SURELY_SEEN = 1e-3  # share of the directions that have a weight: more than that the program must find, too
 
 
@@ -83,14 +84,16 @@ class Claim:
         return f"{kinds}: {self.score} {self.refusal}, counted {self.truth}, {self.drawn.angles_deg}, {beams}, {task}"
 
 
-def random_claim(rng: np.random.Generator, folder: Path, field: str | None = None, most: int = MANY) -> Claim:
+def random_claim(
+    rng: np.random.Generator, folder: Path, field: str | None = None, most_work: float = MOST_WORK
+) -> Claim:
     """A random task, one of its settings, what the program says of it, and what a count says.
 
     Args:
         rng: what it is drawn from.
         folder: where the files of the task are written.
         field: kind of its weights, of `random_tasks.FIELDS`; any if None.
-        most: directions of one set of the count.
+        most_work: of the count: directions of one set times beams near to each.
     """
     drawn = random_task(rng, folder, field)
     start = perf_counter()
@@ -102,16 +105,19 @@ def random_claim(rng: np.random.Generator, folder: Path, field: str | None = Non
     except ScanwrightError as error:
         refusal = str(error)
     middle = perf_counter()
-    truth = _counted(drawn, bearings, int(rng.integers(1 << 30)), np.inf if found is None else found.J_error, most)
+    truth = _counted(drawn, bearings, int(rng.integers(1 << 30)), np.inf if found is None else found.J_error, most_work)
     return Claim(drawn, found, truth, refusal, (middle - start, perf_counter() - middle))
 
 
-def _counted(drawn: RandomTask, bearings_rad: Array, seed: int, asked: float, most: int) -> Counted | None:
-    """The count, on as many directions as three of its standard errors need to be within an error, or `most`.
+def _counted(drawn: RandomTask, bearings_rad: Array, seed: int, asked: float, most_work: float) -> Counted | None:
+    """The count, on as many directions as three of its standard errors need to be within an error, or the work allows.
 
     None if it finds no weight; or hardly any where the program, which an infinite error stands for, finds none.
     """
     own, points = drawn.own_tables(), FEW
+    ball_deg = drawn.loaded.task.density.ball_radius_deg
+    near = max(4.0, len(bearings_rad) * min(1.0, ball_deg / 60))  # of a fan that stands askew
+    most = max(FEW, int(most_work / near))
     while True:
         try:
             found = counted_J(own, drawn.angles_rad, seed, points, bearings_rad)

@@ -22,8 +22,10 @@ from design.objective.drawn_regions import Layer, Nodes, drawn_in, layers_of, no
 from design.sphere.directions import EMPTY
 from design.task.task import LoadedTask
 
-SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
+SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
+SMALL_RAD = 1e-3  # of a ball
+PILOT, LEAST = 2**10, 2**7  # directions drawn in each region to see how much weight it has; and of the count, at least
 PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
 
 
@@ -51,8 +53,8 @@ def counted_J(
         loaded: the task.
         angles_rad: the setting.
         seed: of the scramblings.
-        points: directions that each scrambling draws in every region, a power of two; of the paper's grid all nodes
-            are taken, with as many start phases as make up that number.
+        points: about how many directions each scrambling draws, in each region by its share of the weight; of the
+            paper's grid all nodes are taken, with as many start phases as make up that number.
         bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
 
     Raises:
@@ -81,10 +83,11 @@ def counted_J(
     drawing = drawn_in(layers)
     if not drawing or (nodes is not None and not len(nodes.value)):
         raise TaskError(EMPTY)
+    numbers = _numbers(layers, points, seed) if nodes is None else []
     for k in range(SETS):
         rng = np.random.default_rng([seed, k])
         if nodes is None:
-            cubes = [qmc.Sobol(3, rng=rng).random(points) for _ in drawing]
+            cubes = [qmc.Sobol(3, rng=rng).random(n) for n in numbers]
         else:
             cubes = _phases_at(nodes, max(1, points // len(nodes.value)), rng)
         counts, value, area, required = counted(cubes)
@@ -111,6 +114,16 @@ def counted_J(
         each = np.array([_joined(objective, m) for m in moments])
         J_error = float(3 * np.std(each, ddof=1) / SETS**0.5)
     return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
+
+
+def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) -> list[int]:
+    """How many directions to draw in each region: by its share of the weight, and a power of two, as Sobol points are."""
+    regions = len(drawn_in(layers))
+    rng = np.random.default_rng([seed, SETS])
+    _, value, area, _, _ = _weighted(layers, [qmc.Sobol(3, rng=rng).random(PILOT) for _ in range(regions)])
+    weight = (value * area).reshape(regions, PILOT).sum(axis=1)
+    share = weight / weight.sum() if weight.sum() > 0 else np.full(regions, 1 / regions)
+    return [int(2 ** np.ceil(np.log2(max(LEAST, points * one)))) for one in share]
 
 
 def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.random.Generator) -> list[Array]:
@@ -184,25 +197,29 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
     return np.concatenate(listed), np.cumsum([0, *(len(one) for one in listed)]), repeats, span
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _counts(
     directions: Array, beams: Array, turned: Array, listed: Ints, lines: Array, first: Ints, ball: float
 ) -> Ints:
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
+    flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn = 2 * np.pi
     for i in range(len(directions)):
         x, y, z = directions[i]
-        t = np.arctan2(np.hypot(x, y), z)
+        across = np.hypot(x, y)
+        t = np.arctan2(across, z)
         p = np.arctan2(y, x) - turned[i]
         mine = lines[first[listed[i]] : first[listed[i] + 1]]
         for b in range(np.searchsorted(polar, t - ball - 1e-7), len(polar)):
             if polar[b] > t + ball + 1e-7:
                 break
-            # |d - b|^2 = (t - t_b chord)^2 + sin t sin t_b * 4 sin^2(half the azimuth between them)
-            free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
-            around = 4 * np.sin(t) * np.sin(polar[b])
+            # the law of cosines: cos(ball) = z z_b + across across_b cos(azimuth between them at the edge of the ball)
+            free = 2 * (z * upright[b] + across * flat[b] - cos_ball)
+            if ball < SMALL_RAD:  # the same without a difference of cosines, which would lose digits
+                free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
+            around = 4 * across * flat[b]
             if free < 0:
                 continue
             if free >= around:
