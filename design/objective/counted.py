@@ -117,7 +117,7 @@ def counted_J(
 
 
 def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) -> list[int]:
-    """How many directions to draw in each region: by its share of the weight, and a power of two, as Sobol points are."""
+    """How many directions to draw in each region: by its share of the weight, powers of two, as Sobol points are."""
     regions = len(drawn_in(layers))
     rng = np.random.default_rng([seed, SETS])
     _, value, area, _, _ = _weighted(layers, [qmc.Sobol(3, rng=rng).random(PILOT) for _ in range(regions)])
