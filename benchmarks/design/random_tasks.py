@@ -34,7 +34,7 @@ from design.task.task import LoadedTask, load_task
 LIDAR_FILE = Path(__file__).parents[2] / "design" / "catalogue" / "ld06.toml"
 LIDARS = [product.name for product in load_catalogue() if isinstance(product, Lidar)]
 SERVOS = [product.name for product in load_catalogue() if isinstance(product, Servo)]
-PERIODS_S = 1.0, 60.0
+PERIODS_S, SHORT_S = (1.0, 60.0), (1.0, 4.0)
 BALLS_DEG = 0.3, 15.0
 OBJECTIVES = {"log": 0.4, "required": 0.2, "kl": 0.15, "homogeneity": 0.15, "worst": 0.1}
 QUADRATURES = {"solid_angle": 0.85, "equal_angle": 0.15}
@@ -107,13 +107,16 @@ def drawn(rng: np.random.Generator, kinds: dict[str, float]) -> str:
     return str(rng.choice(list(kinds), p=list(kinds.values())))
 
 
-def random_task(rng: np.random.Generator, folder: Path, field: str | None = None, **density: Any) -> RandomTask:
+def random_task(
+    rng: np.random.Generator, folder: Path, field: str | None = None, *, small: bool = False, **density: Any
+) -> RandomTask:
     """A task with one to three regions or a whole painting, and up to three masks; its files are in the folder.
 
     Args:
         rng: what it is drawn from.
         folder: where its files are written.
         field: kind of its weights, of `FIELDS`; any if None.
+        small: whether its lidar has few beams and its turns are short: it has every kind of fault at a small price.
         density: what is not left to chance under `[density]`.
     """
     field = field or drawn(rng, FIELDS)
@@ -128,7 +131,7 @@ def random_task(rng: np.random.Generator, folder: Path, field: str | None = None
     for _ in range(rng.integers(0, 4) if rng.random() < 0.5 else 0):
         mask.append(_mask(rng, files))
     rng.shuffle(mask)
-    table |= {"weight": weight, "mask": mask, "density": _density(rng, weight) | density}
+    table |= {"weight": weight, "mask": mask, "density": _density(rng, weight, small) | density}
     units = {
         region["file"]: region.get("unit_m", 1.0)
         for region in [*weight, *mask, table.get("scene", {})]
@@ -139,7 +142,7 @@ def random_task(rng: np.random.Generator, folder: Path, field: str | None = None
             content.write(folder / name, units[name])
         else:
             np.save(folder / name, content)
-    loaded = _loaded(rng, table, folder)
+    loaded = _loaded(rng, table, folder, small)
     low, high = np.array([AngleRanges().limits(name) for name in NAMES]).T
     angles_deg = rng.uniform(low, high)
     if rng.random() < 0.4:  # where edges, poles and lines meet
@@ -152,15 +155,19 @@ def random_task(rng: np.random.Generator, folder: Path, field: str | None = None
     return RandomTask(field, loaded, files, tuple(angles_deg.tolist()), beams)
 
 
-def _loaded(rng: np.random.Generator, table: dict[str, Any], folder: Path) -> LoadedTask:
+def _loaded(rng: np.random.Generator, table: dict[str, Any], folder: Path, small: bool) -> LoadedTask:
     """The task with the first products drawn that can do the motion."""
     mode = drawn(rng, MOTIONS)
     error: Exception = TaskError("never tried")
     for _ in range(TRIES):
-        products = {"sensor": str(rng.choice(LIDARS)), "servo": str(rng.choice(SERVOS)), "motion": _motion(rng, mode)}
-        if rng.random() < 0.25:
+        products = {
+            "sensor": str(rng.choice(LIDARS)),
+            "servo": str(rng.choice(SERVOS)),
+            "motion": _motion(rng, mode, small),
+        }
+        if small or rng.random() < 0.25:
             products |= {"sensor": "odd fan", "catalogue": ["odd_fan.toml"]}
-            (folder / "odd_fan.toml").write_text(_odd_fan(rng), encoding="utf-8")
+            (folder / "odd_fan.toml").write_text(_odd_fan(rng, small), encoding="utf-8")
         try:
             return load_task(table | products, folder)
         except TaskError as refused:
@@ -172,9 +179,9 @@ def _loaded(rng: np.random.Generator, table: dict[str, Any], folder: Path) -> Lo
     raise error
 
 
-def _odd_fan(rng: np.random.Generator) -> str:
+def _odd_fan(rng: np.random.Generator, small: bool) -> str:
     """A lidar of two to a thousand beams that look anywhere, all around or not."""
-    turn = int(log_uniform(rng, 5, 1500))
+    turn = int(log_uniform(rng, 5, 100 if small else 1500))
     first = int(rng.integers(0, turn))
     count = turn if rng.random() < 0.3 else int(rng.integers(2, turn + 1))
     steps = {
@@ -183,12 +190,10 @@ def _odd_fan(rng: np.random.Generator) -> str:
         "last_step": first + count - 1,
         "front_step": int(rng.integers(0, 2 * turn)),
         "scan_rate_hz": float(rng.choice([5.0, 10.0, 12.5, 40.0])),
-        "name": "odd fan",
     }
     text = re.sub(r"^name = .*$", 'name = "odd fan"', LIDAR_FILE.read_text(encoding="utf-8"), flags=re.MULTILINE)
     for key, value in steps.items():
-        if key != "name":
-            text = re.sub(rf"^({key} = {{ value =) [\d.]+", rf"\1 {value}", text, flags=re.MULTILINE)
+        text = re.sub(rf"^({key} = {{ value =) [\d.]+", rf"\1 {value}", text, flags=re.MULTILINE)
     return text
 
 
@@ -235,7 +240,7 @@ def _mask(rng: np.random.Generator, files: dict[str, Array | Boxes]) -> dict[str
     return {"shape": "mesh"} | placed(rng, name)
 
 
-def _density(rng: np.random.Generator, weight: list[dict[str, Any]]) -> dict[str, Any]:
+def _density(rng: np.random.Generator, weight: list[dict[str, Any]], small: bool) -> dict[str, Any]:
     objective, quadrature = drawn(rng, OBJECTIVES), drawn(rng, QUADRATURES)
     density: dict[str, Any] = {"ball_radius_deg": log_uniform(rng, *BALLS_DEG), "objective": objective}
     if objective == "required":
@@ -246,7 +251,10 @@ def _density(rng: np.random.Generator, weight: list[dict[str, Any]]) -> dict[str
     if rng.random() < 0.2:
         density["background"] = random_value(rng)
     if quadrature == "equal_angle":
-        density |= {"quadrature": quadrature, "grid_step_deg": float(rng.choice([1.0, 2.0, 5.0, 10.0]))}
+        density |= {
+            "quadrature": quadrature,
+            "grid_step_deg": float(rng.choice([5.0, 10.0] if small else [1.0, 2.0, 5.0, 10.0])),
+        }
     return density
 
 
@@ -260,13 +268,17 @@ def _limits(rng: np.random.Generator) -> dict[str, Any]:
     return {name: value for name, value in every.items() if rng.random() < 0.1}
 
 
-def _motion(rng: np.random.Generator, mode: str) -> dict[str, Any]:
-    period_s = log_uniform(rng, *PERIODS_S)
+def _motion(rng: np.random.Generator, mode: str, small: bool) -> dict[str, Any]:
+    period_s = log_uniform(rng, *(SHORT_S if small else PERIODS_S))
     if mode == "sweep":
         ends = 15.0 * rng.choice(25, 2, replace=False) - 180 if rng.random() < 0.4 else rng.uniform(-180, 180, 2)
         lower, upper = np.sort(ends).tolist()
         return {"mode": mode, "limits_deg": [lower, upper], "period_s": 2.0 + period_s, "accel_deg_s2": 900.0}
     if mode == "stop_and_go":
-        return {"mode": mode, "stops": int(log_uniform(rng, 1, 700)), "dwell_s": log_uniform(rng, 0.03, 0.5)}
+        return {
+            "mode": mode,
+            "stops": int(log_uniform(rng, 1, 50 if small else 700)),
+            "dwell_s": log_uniform(rng, 0.03, 0.5),
+        }
     # a turn of whole lines, as most people take, in every other task
     return {"period_s": float(round(period_s)) if rng.random() < 0.5 else period_s}
