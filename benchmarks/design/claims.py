@@ -1,7 +1,7 @@
 """Whether the stated errors of J hold, and whether anything beats the reported optima: what would break is printed.
 
     uv run python -m benchmarks.design.claims [errors] [optima] [evolution] [--pairs 300] [--draws 100000]
-        [--tasks NAME...] [--random 100] [--first 0] [--seed 1] [--fields NAME...]
+        [--tasks NAME...] [--random 100] [--first 0] [--seed 1] [--work 2e6] [--fields NAME...]
 
 Errors: random tasks (`random_tasks`: every shape, mask, objective, quadrature, motion and lidar, written to files and
 loaded from them) at random settings, against `design.objective.counted`, which shares no code with the program. The
@@ -85,7 +85,12 @@ class Claim:
 
 
 def random_claim(
-    rng: np.random.Generator, folder: Path, field: str | None = None, most_work: float = MOST_WORK
+    rng: np.random.Generator,
+    folder: Path,
+    field: str | None = None,
+    *,
+    small: bool = False,
+    most_work: float = MOST_WORK,
 ) -> Claim:
     """A random task, one of its settings, what the program says of it, and what a count says.
 
@@ -93,9 +98,10 @@ def random_claim(
         rng: what it is drawn from.
         folder: where the files of the task are written.
         field: kind of its weights, of `random_tasks.FIELDS`; any if None.
+        small: whether its lidar has few beams and its turns are short.
         most_work: of the count: directions of one set times beams near to each.
     """
-    drawn = random_task(rng, folder, field)
+    drawn = random_task(rng, folder, field, small=small)
     start = perf_counter()
     found, refusal = None, ""
     bearings = drawn.loaded.lidar.bearings_rad()[drawn.beams]
@@ -142,13 +148,14 @@ def main() -> None:
     parser.add_argument("--random", type=int, default=100)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--work", type=float, default=MOST_WORK)
     parser.add_argument("--fields", nargs="*", default=list(FIELDS))
     asked = parser.parse_args()
     seed = asked.seed or secrets.randbelow(1 << 31)
     print(f"seed {seed}", flush=True)
     kept = True
     if "errors" in asked.what:
-        kept = print_errors(range(asked.first, asked.pairs), seed, asked.fields)
+        kept = print_errors(range(asked.first, asked.pairs), seed, asked.fields, asked.work)
     if "optima" in asked.what:
         for name in asked.tasks:
             print_contest(load_task(Path(name)), asked.draws, seed)
@@ -157,14 +164,14 @@ def main() -> None:
     raise SystemExit(0 if kept else 1)
 
 
-def print_errors(pairs: range, seed: int, fields: Iterable[str] = FIELDS) -> bool:
+def print_errors(pairs: range, seed: int, fields: Iterable[str], most_work: float) -> bool:
     """Each broken claim with all that repeats it, then the sum of all; returns whether all are kept."""
     claims = []
     for i in pairs:
         rng = np.random.default_rng([seed, i])
         with TemporaryDirectory() as folder:
             field = None if set(fields) == set(FIELDS) else str(rng.choice(list(fields)))
-            claims.append(random_claim(rng, Path(folder), field))
+            claims.append(random_claim(rng, Path(folder), field, most_work=most_work))
         claim = claims[-1]
         if not claim.kept:
             print(f"BROKEN pair {i}, off by {claim.off:.1e}: {claim.words()}", flush=True)

@@ -20,7 +20,7 @@ from design.errors import TaskError
 from design.sphere.directions import equal_angle_grid
 from design.sphere.painting import MAP, VALUE
 from design.sphere.regions import Field, field_of
-from design.sphere.total_weight import total_weight
+from design.sphere.total_weight import RELATIVE_ERROR, total_weight
 from design.task.shapes import Region
 from design.task.task import LoadedTask
 
@@ -44,12 +44,16 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """Moments and how they become J: `join` takes them along the first axis. `field` is the weight of the task."""
+    """Moments and how they become J: `join` takes them along the first axis, and is off by `join_error` at most.
+
+    `field` is the weight of the task.
+    """
 
     name: str
     field: Field
     moments: tuple[Moment, ...]
     join: Callable[[Array], Array]
+    join_error: float = 0.0
 
 
 def log_density(counts: Counts) -> Array:
@@ -95,7 +99,8 @@ def kl(field: Field, grid_step_deg: float | None = None) -> Objective:
     logs, whole, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
     shift = logs / whole + np.log(least) - np.log(whole / held)
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
-    return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift)
+    error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / whole) + 2)
+    return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)
 
 
 def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = None) -> Objective:
@@ -121,7 +126,8 @@ def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = Non
     if len(shared) == 1:
         shared = (replace(shared[0], field=field),)
     shares = np.array([moment.share for moment in shared])
-    return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1))
+    error = 0.0 if grid_step_deg or len(shared) == 1 else 2 * RELATIVE_ERROR  # no moment is above 1
+    return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1), error)
 
 
 def homogeneity(field: Field) -> Objective:
