@@ -35,7 +35,7 @@ LIDAR_FILE = Path(__file__).parents[2] / "design" / "catalogue" / "ld06.toml"
 LIDARS = [product.name for product in load_catalogue() if isinstance(product, Lidar)]
 SERVOS = [product.name for product in load_catalogue() if isinstance(product, Servo)]
 PERIODS_S, SHORT_S = (1.0, 60.0), (1.0, 4.0)
-BALLS_DEG = 0.3, 15.0
+BALLS_DEG, WIDE_BALLS_DEG = (0.3, 15.0), (4.0, 15.0)
 OBJECTIVES = {"log": 0.4, "required": 0.2, "kl": 0.15, "homogeneity": 0.15, "worst": 0.1}
 QUADRATURES = {"solid_angle": 0.85, "equal_angle": 0.15}
 FIELDS = {
@@ -116,7 +116,7 @@ def random_task(
         rng: what it is drawn from.
         folder: where its files are written.
         field: kind of its weights, of `FIELDS`; any if None.
-        small: whether its lidar has few beams and its turns are short: it has every kind of fault at a small price.
+        small: whether its lidar has few beams, its turns are short and its balls wide: every kind of task, but cheap.
         density: what is not left to chance under `[density]`.
     """
     field = field or drawn(rng, FIELDS)
@@ -181,7 +181,7 @@ def _loaded(rng: np.random.Generator, table: dict[str, Any], folder: Path, small
 
 def _odd_fan(rng: np.random.Generator, small: bool) -> str:
     """A lidar of two to a thousand beams that look anywhere, all around or not."""
-    turn = int(log_uniform(rng, 5, 100 if small else 1500))
+    turn = int(log_uniform(rng, 20, 120) if small else log_uniform(rng, 5, 1500))
     first = int(rng.integers(0, turn))
     count = turn if rng.random() < 0.3 else int(rng.integers(2, turn + 1))
     steps = {
@@ -242,7 +242,10 @@ def _mask(rng: np.random.Generator, files: dict[str, Array | Boxes]) -> dict[str
 
 def _density(rng: np.random.Generator, weight: list[dict[str, Any]], small: bool) -> dict[str, Any]:
     objective, quadrature = drawn(rng, OBJECTIVES), drawn(rng, QUADRATURES)
-    density: dict[str, Any] = {"ball_radius_deg": log_uniform(rng, *BALLS_DEG), "objective": objective}
+    density: dict[str, Any] = {
+        "ball_radius_deg": log_uniform(rng, *(WIDE_BALLS_DEG if small else BALLS_DEG)),
+        "objective": objective,
+    }
     if objective == "required":
         density["required"] = log_uniform(rng, 1.0, 300.0)
         for region in weight:

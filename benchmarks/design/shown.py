@@ -4,7 +4,8 @@
 
 Random tasks of `random_tasks` at random settings, two of five at whole 15, 45 or 90 deg, go through what stands behind
 `evaluate`, `compare`, the report and the studio. A message that refuses a task is right, anything else that is raised
-is a fault. One of fifty is compared in full, which searches mounts, and drawn in its room; it takes a second or more. A seed of 0 is a new one every time.
+is a fault. One of fifty is compared in full, which searches mounts, and drawn in its room: that takes a second or more.
+A seed of 0 is a new one every time.
 """
 
 from __future__ import annotations

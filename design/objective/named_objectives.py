@@ -117,8 +117,7 @@ def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = Non
         )
     moments = []
     for level in sorted({r for r in wanted if r is not None}):
-        part = field_of(loaded, _asking(level, asked))
-        part = replace(part, background=field.background * (asked == level))
+        part = field_of(loaded, _asking(level, asked), loaded.task.density.background * (asked == level))
         if len(part.patches):
             moments.append(Moment(part, _shortfall(level), share=_summed(part, grid_step_deg)))
     total = sum(moment.share for moment in moments)
