@@ -187,7 +187,7 @@ def main() -> None:
         for failure in failures:
             print(f"FAILED task {i}, {failure.command}, {drawn.kinds}, {_repeated(drawn.loaded)}", flush=True)
             print(f"  at {drawn.angles_deg}\n{failure.trace}", flush=True)
-        if (i + 1) % 100 == 0:
+        if (i + 1) % 50 == 0:
             print(f"{i + 1} tasks, {failed} failed, refused: {dict(refusals)}", flush=True)
     print(f"shown without a traceback: {len(tasks) - failed} of {len(tasks)} tasks; refused: {dict(refusals)}")
     raise SystemExit(1 if failed else 0)
