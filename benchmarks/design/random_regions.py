@@ -37,8 +37,9 @@ class Boxes:
         for box, middle, R in zip(boxes, self.middle_m, self.R_mesh_box, strict=True):
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = R, middle
-            box.apply_transform(T)
-        trimesh.util.concatenate(boxes).apply_scale(1 / unit_m).export(path)
+            box.apply_transform(np.diag([1 / unit_m] * 3 + [1.0]) @ T)
+        mesh: Any = trimesh.util.concatenate(boxes)
+        mesh.export(path)
 
     def surface(self, placed: Placed) -> Surface:
         """What rays from where the scanner is placed hit first, in closed form: where they enter and leave each box."""

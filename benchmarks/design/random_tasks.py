@@ -213,11 +213,11 @@ def _regions(
         weight, mask = brush_strokes(rng)
         return ([] if rng.random() < 0.5 and weight else [random_region(rng)]) + weight, mask
     if field == "mixed":
-        kinds = rng.choice(["painted", "tiny", "metres", "map", "everywhere"], rng.integers(2, 7))
+        kinds = rng.choice(["painted", "tiny", "metres", "map", "everywhere"], rng.integers(2, 7)).tolist()
     else:
         count = 1 if field == "everywhere" else int(rng.choice([1, 2, 3, 8, 12], p=[0.3, 0.25, 0.25, 0.1, 0.1]))
         kinds = [field] * (min(count, 3) if field == "map" else count)
-    weight = [makers[str(kind)]() | {"value": random_value(rng)} for kind in kinds]
+    weight = [makers[kind]() | {"value": random_value(rng)} for kind in kinds]
     return weight, []
 
 
