@@ -3,6 +3,7 @@
 It shares nothing with what it judges but the numbers of the task, the beam table, and what the rays into a mesh hit:
 rotations are scipy's, windows come from the law of cosines, weights are painted region by region, no sum is zonal.
 Directions and phases are scrambled Sobol points; the spread of independent scramblings is its error.
+With `quadrature = "equal_angle"` the directions are the nodes of the paper's grid, and only the phases are random.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import qmc
 
 from scanwright.design.arrays import Array, Ints, Setting
+from scanwright.design.errors import TaskError
 from scanwright.design.motion import Spin, StopAndGo, Sweep
-from scanwright.design.objective.drawn_regions import Layer, drawn_in, layers_of
+from scanwright.design.objective.drawn_regions import Layer, Nodes, drawn_in, layers_of, nodes_in, value_and_required
+from scanwright.design.sphere.directions import EMPTY
 from scanwright.design.task.task import LoadedTask
 
-SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws in every region
+SETS, POINTS = 8, 2**15  # scramblings, and directions that each draws
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
+SMALL_RAD = 1e-3  # of a ball
+PILOT, LEAST = 2**10, 2**7  # directions drawn in each region to see how much weight it has; and of the count, at least
 PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
 
 
@@ -28,48 +33,69 @@ PHASES = 2048  # of the lines of a sweep; where the start phase turns them all a
 class Counted:
     """J, three standard errors of it, the least count met, and the share of weight where none was.
 
-    Of `worst` the error is 0: the least count that was found.
+    Of `worst` the error is 0: the least count that was found. `weighted` is the share of the directions drawn that have
+    a weight.
     """
 
     J: float
     J_error: float
     least: int
     none: float
+    weighted: float
 
 
-def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = POINTS) -> Counted:
+def counted_J(
+    loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = POINTS, bearings_rad: Array | None = None
+) -> Counted:
     """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Args:
         loaded: the task.
         angles_rad: the setting.
         seed: of the scramblings.
-        points: directions that each scrambling draws in every region; a power of two.
+        points: about how many directions each scrambling draws, in each region by its share of the weight; of the
+            paper's grid all nodes are taken, with as many start phases as make up that number.
+        bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
+
+    Raises:
+        TaskError: no direction that is drawn has a weight.
     """
     layers = layers_of(loaded)
-    ball = np.radians(loaded.task.density.ball_radius_deg)
+    density = loaded.task.density
+    ball = np.radians(density.ball_radius_deg)
     to_rot = Rotation.from_euler("XY", angles_rad[:2]).inv()
-    bearings = loaded.lidar.bearings_rad()
+    bearings = loaded.lidar.bearings_rad() if bearings_rad is None else bearings_rad
     in_laser = np.stack([np.cos(bearings), np.sin(bearings), 0 * bearings], axis=1)
     beams = Rotation.from_euler("YX", angles_rad[[3, 2]]).apply(in_laser)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
     lines, first, repeats, span = _lines(loaded)
-    objective = loaded.task.density.objective
-    moments, least, none = [], np.iinfo(int).max, 0.0
+    objective = density.objective
+    moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
 
     def counted(cubes: list[Array]) -> tuple[Ints, Array, Array, Array]:
-        directions, value, area, required, phase = _weighted(layers, cubes)
+        found = _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)
+        directions, value, area, required, phase = found
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
         counts = repeats * _counts(to_rot.apply(directions), beams[order], turned, mine, lines, first, ball)
         return counts, value, area, required
 
+    nodes = nodes_in(layers, density.grid_step_deg) if density.quadrature == "equal_angle" else None
     drawing = drawn_in(layers)
+    if not drawing or (nodes is not None and not len(nodes.value)):
+        raise TaskError(EMPTY)
+    numbers = _numbers(layers, points, seed) if nodes is None else []
     for k in range(SETS):
         rng = np.random.default_rng([seed, k])
-        cubes = [qmc.Sobol(3, rng=rng).random(points) for _ in drawing]
+        if nodes is None:
+            cubes = [qmc.Sobol(3, rng=rng).random(n) for n in numbers]
+        else:
+            cubes = _phases_at(nodes, max(1, points // len(nodes.value)), rng)
         counts, value, area, required = counted(cubes)
         keep = value > 0
         moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
+        weighted += float(keep.mean()) / SETS
+        if not keep.any():
+            continue
         least = min(least, int(counts[keep].min()))
         weight = value * area
         none += float(weight[counts == 0].sum() / weight.sum()) / SETS
@@ -79,11 +105,25 @@ def counted_J(loaded: LoadedTask, angles_rad: Setting, seed: int, points: int = 
             keep = value > 0
             if keep.any():
                 least = min(least, int(counts[keep].min()))
+    if not weighted > 0:
+        raise TaskError(EMPTY)
     if objective == "worst":
-        return Counted(-float(np.log(1 + least)), 0.0, least, none)
-    each = np.array([_joined(objective, m) for m in moments])
+        return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
-    return Counted(float(J), float(3 * np.std(each, ddof=1) / SETS**0.5), least, none)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
+        each = np.array([_joined(objective, m) for m in moments])
+        J_error = float(3 * np.std(each, ddof=1) / SETS**0.5)
+    return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
+
+
+def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) -> list[int]:
+    """How many directions to draw in each region: by its share of the weight, powers of two, as Sobol points are."""
+    regions = len(drawn_in(layers))
+    rng = np.random.default_rng([seed, SETS])
+    _, value, area, _, _ = _weighted(layers, [qmc.Sobol(3, rng=rng).random(PILOT) for _ in range(regions)])
+    weight = (value * area).reshape(regions, PILOT).sum(axis=1)
+    share = weight / weight.sum() if weight.sum() > 0 else np.full(regions, 1 / regions)
+    return [int(2 ** np.ceil(np.log2(max(LEAST, points * one)))) for one in share]
 
 
 def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.random.Generator) -> list[Array]:
@@ -91,23 +131,34 @@ def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.r
     owner = np.repeat(np.arange(len(cubes)), [len(cube) for cube in cubes])
     lowest = np.argsort(counts, kind="stable")[:LOWEST]
     near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], LOOKS, axis=0) for i in range(len(cubes))]
-    return [np.clip(cube + reach * rng.uniform(-1, 1, cube.shape), 0, 1 - 1e-12) for cube in near]
+    moved = [cube + reach * rng.uniform(-1, 1, cube.shape) for cube in near]
+    if near[0].shape[1] == 2:  # nodes stay, at any phase
+        moved = [np.column_stack([cube[:, 0], rng.uniform(0, 1, len(cube))]) for cube in near]
+    return [np.clip(cube, 0, 1 - 1e-12) for cube in moved]
+
+
+def _phases_at(nodes: Nodes, each: int, rng: np.random.Generator) -> list[Array]:
+    """Start phases of every node, spread evenly from a start of its own: (node as a share of all, phase), one array."""
+    count = len(nodes.value)
+    phase = (np.arange(each)[:, None] + rng.uniform(size=count)) / each
+    return [np.column_stack([np.tile((np.arange(count) + 0.5) / count, each), phase.ravel()])]
+
+
+def _at_nodes(nodes: Nodes, cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
+    """What `_weighted` returns, for nodes of the paper's grid, each of which counts the same."""
+    at = (cubes[0][:, 0] * len(nodes.value)).astype(int)
+    value = nodes.value[at]
+    return nodes.directions[at], value, np.ones(len(at)), nodes.required[at], cubes[0][:, 1]
 
 
 def _weighted(layers: tuple[list[Layer], list[Layer]], cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
     """Directions drawn from every region; of each its weight, the area it stands for, what is required, and a phase."""
-    weights, masks = layers
     drawing = drawn_in(layers)
     drawn = [one.drawn(u) for one, u in zip(drawing, cubes, strict=True)]
     d = np.concatenate([directions for directions, _ in drawn])
     # as often as all regions together draw it: where they overlap each of their directions stands for less
     often = sum(len(u) * one.chance(d, area) for one, u, (_, area) in zip(drawing, cubes, drawn, strict=True))
-    value, required = np.zeros(len(d)), np.zeros(len(d))
-    for one in weights:
-        here = one.holds(d)
-        value, required = np.where(here, one.value_at(d), value), np.where(here, one.required, required)
-    for one in masks:
-        value = np.where(one.holds(d) & (one.value_at(d) > 0), 0.0, value)
+    value, required = value_and_required(layers, d)
     phase = np.concatenate(cubes)[:, 2]
     seen = often > 0  # rounding may put a direction outside the edge that it was drawn at
     return d, np.where(seen, value, 0.0), 1 / np.where(seen, often, np.inf), required, phase
@@ -146,25 +197,29 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
     return np.concatenate(listed), np.cumsum([0, *(len(one) for one in listed)]), repeats, span
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _counts(
     directions: Array, beams: Array, turned: Array, listed: Ints, lines: Array, first: Ints, ball: float
 ) -> Ints:
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
+    flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn = 2 * np.pi
     for i in range(len(directions)):
         x, y, z = directions[i]
-        t = np.arctan2(np.hypot(x, y), z)
+        across = np.hypot(x, y)
+        t = np.arctan2(across, z)
         p = np.arctan2(y, x) - turned[i]
         mine = lines[first[listed[i]] : first[listed[i] + 1]]
         for b in range(np.searchsorted(polar, t - ball - 1e-7), len(polar)):
             if polar[b] > t + ball + 1e-7:
                 break
-            # |d - b|^2 = (t - t_b chord)^2 + sin t sin t_b * 4 sin^2(half the azimuth between them)
-            free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
-            around = 4 * np.sin(t) * np.sin(polar[b])
+            # the law of cosines: cos(ball) = z z_b + across across_b cos(azimuth between them at the edge of the ball)
+            free = 2 * (z * upright[b] + across * flat[b] - cos_ball)
+            if ball < SMALL_RAD:  # the same without a difference of cosines, which would lose digits
+                free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
+            around = 4 * across * flat[b]
             if free < 0:
                 continue
             if free >= around:
@@ -193,7 +248,7 @@ def _moments(objective: str, counts: Ints, value: Array, area: Array, required: 
 
 def _joined(objective: str, m: Array) -> float:
     if objective == "homogeneity":
-        return float(np.log(m[0] * m[2] / m[1] ** 2))
+        return float(np.log(m[0] * m[2] / m[1] ** 2)) if m[1] > 0 else np.inf
     if objective == "kl":  # int p ln(p / q), p = w / int w, q = (1 + d) / int (1 + d)
         return float(m[0] / m[1] - np.log(m[1]) + np.log(m[2]))
     return float(m[0] / m[1])
