@@ -210,10 +210,13 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     sphere = spiral(BLIND_DIRECTIONS)
     unseen = counts(sphere[~problem.field.masked_at(sphere)]).max(axis=0) == 0
     middles = (np.array(uppers) + lowers) / 2
-    spread = 4 * float(np.std(middles, ddof=1)) / len(middles) ** 0.5 if len(middles) > 1 else 0.0
+    J, J_error = float(middles.mean()), 0.0
+    if np.isfinite([*uppers, *lowers]).all():  # else it sees nothing: an objective that divides by counts is infinite
+        J_error = float(np.mean(uppers) - np.mean(lowers)) / 2
+        J_error += 4 * float(np.std(middles, ddof=1)) / len(middles) ** 0.5 if len(middles) > 1 else 0.0
     return (
-        float(middles.mean()),
-        float(np.mean(uppers) - np.mean(lowers)) / 2 + spread,
+        J,
+        J_error,
         float(unseen.mean()) if len(unseen) else 0.0,
         float(np.mean(blind)),
     )

@@ -4,6 +4,7 @@ It shares nothing with what it judges but the numbers of the task, the beam tabl
 the beams that parts block: rotations are Rodrigues', windows come from the law of cosines, weights are painted region
 by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
 three dimensions); the spread of independent shifts is its error.
+With `quadrature = "equal_angle"` the directions are the nodes of the paper's grid, and only the phases are random.
 """
 
 from __future__ import annotations
@@ -14,16 +15,20 @@ import numpy as np
 from numba import njit
 
 from scanwright.design.arrays import Array, Ints, Mask, Setting
+from scanwright.design.errors import TaskError
 from scanwright.design.motion import Spin, StopAndGo, Sweep
-from scanwright.design.objective.drawn_regions import Layer, drawn_in, layers_of
+from scanwright.design.objective.drawn_regions import Layer, Nodes, drawn_in, layers_of, nodes_in, value_and_required
 from scanwright.design.shadow import Shadow
+from scanwright.design.sphere.directions import EMPTY
 from scanwright.design.task.task import LoadedTask
 
-SETS, POINTS = 8, 2**15  # shifts, and directions that each draws in every region
+SETS, POINTS = 8, 2**15  # shifts, and directions that each draws
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
+SMALL_RAD = 1e-3  # of a ball
+PILOT, LEAST = 2**10, 2**4  # directions drawn in each region to see how much weight it has; and of the count, at least
 PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
 MOST_LISTED = 4_000_000  # lines of all phases of a sweep
-PROBED, SPARSEST = 4096, 256.0  # directions that tell how many have a weight; times more are drawn if few have
+SPARSEST = 256.0  # times more directions are drawn, if few have a weight
 BITS = 32  # of a coordinate of the net
 X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
@@ -32,13 +37,15 @@ X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 class Counted:
     """J, three standard errors of it, the least count met, and the share of weight where none was.
 
-    Of `worst` the error is 0: the least count that was found. It is infinite if no drawn direction has a weight.
+    Of `worst` the error is 0: the least count that was found. It is infinite if less than two sets have a direction of
+    weight. `weighted` is the share of the directions drawn that have a weight.
     """
 
     J: float
     J_error: float
     least: int
     none: float
+    weighted: float
 
 
 def counted_J(
@@ -47,6 +54,7 @@ def counted_J(
     seed: int,
     points: int = POINTS,
     sets: int = SETS,
+    bearings_rad: Array | None = None,
     shadow: Shadow | None = None,
     lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Counted:
@@ -56,14 +64,21 @@ def counted_J(
         loaded: the task.
         angles_rad: the setting.
         seed: of the shifts.
-        points: directions that each shift draws in every region; a power of two.
+        points: about how many directions each shift draws, in each region by its share of the weight, and more if few
+            of them have a weight; of the paper's grid all nodes are taken, with as many start phases as make up that
+            number.
         sets: number of shifts.
+        bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
         shadow: the beams that the parts of the scanner block, if they are to be left out.
         lever: the optical centre off the axis, in the rotation frame, as a share of the range.
+
+    Raises:
+        TaskError: no direction that is drawn has a weight.
     """
     layers = layers_of(loaded)
-    ball = np.radians(loaded.task.density.ball_radius_deg)
-    bearings = loaded.lidar.bearings_rad()
+    density = loaded.task.density
+    ball = np.radians(density.ball_radius_deg)
+    bearings = loaded.lidar.bearings_rad() if bearings_rad is None else bearings_rad
     blocked = np.zeros((len(bearings), 1), dtype=bool)
     if shadow is not None:
         blocked = shadow.beams[:, None] | (blocked if shadow.stator is None else shadow.stator)
@@ -73,11 +88,12 @@ def counted_J(
     beams /= np.linalg.norm(beams, axis=1, keepdims=True)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
     lines, first, repeats, span = _lines(loaded)
-    objective = loaded.task.density.objective
-    moments, least, none = [], np.iinfo(int).max, 0.0
+    objective = density.objective
+    moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
 
     def counted(cubes: list[Array]) -> tuple[Ints, Array, Array, Array]:
-        directions, value, area, required, phase = _weighted(layers, cubes)
+        found = _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)
+        directions, value, area, required, phase = found
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
         in_rot = _turned(_turned(directions, X, -alpha_rot), Y, -beta_rot)
         counts, keep = np.zeros(len(value), dtype=np.int64), value > 0
@@ -86,17 +102,23 @@ def counted_J(
         )
         return counts, value, area, required
 
+    nodes = nodes_in(layers, density.grid_step_deg) if density.quadrature == "equal_angle" else None
     drawing = drawn_in(layers)
-    probe = _weighted(layers, [_net(PROBED, np.random.default_rng(seed)) for _ in drawing])[1]
-    points *= 1 << int(np.log2(min(SPARSEST, 1 / max((probe > 0).mean(), 1e-9))))
+    if not drawing or (nodes is not None and not len(nodes.value)):
+        raise TaskError(EMPTY)
+    numbers = _numbers(layers, points, seed) if nodes is None else []
     for k in range(sets):
         rng = np.random.default_rng([seed, k])
-        cubes = [_net(points, rng) for _ in drawing]
+        if nodes is None:
+            cubes = [_net(n, rng) for n in numbers]
+        else:
+            cubes = _phases_at(nodes, max(1, points // len(nodes.value)), rng)
         counts, value, area, required = counted(cubes)
         keep = value > 0
         if not keep.any():
             continue
         moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
+        weighted += float(keep.mean()) / sets
         least = min(least, int(counts[keep].min()))
         weight = value * area
         none += float(weight[counts == 0].sum() / weight.sum()) / sets
@@ -106,13 +128,26 @@ def counted_J(
             keep = value > 0
             if keep.any():
                 least = min(least, int(counts[keep].min()))
-    if len(moments) < 2:
-        return Counted(np.nan, np.inf, 0, np.nan)
+    if not weighted > 0:
+        raise TaskError(EMPTY)
     if objective == "worst":
-        return Counted(-float(np.log(1 + least)), 0.0, least, none)
-    each = np.array([_joined(objective, m) for m in moments])
+        return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
-    return Counted(float(J), float(3 * np.std(each, ddof=1) / len(moments) ** 0.5), least, none)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
+        each = np.array([_joined(objective, m) for m in moments])
+        J_error = float(3 * np.std(each, ddof=1) / sets**0.5) if len(each) > 1 else np.inf
+    return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
+
+
+def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) -> list[int]:
+    """How many directions to draw in each region: by its share of the weight, powers of two, as a net has points."""
+    regions = len(drawn_in(layers))
+    rng = np.random.default_rng([seed, SETS])
+    _, value, area, _, _ = _weighted(layers, [_net(PILOT, rng) for _ in range(regions)])
+    points *= 1 << int(np.log2(min(SPARSEST, 1 / max((value > 0).mean(), 1e-9))))
+    weight = (value * area).reshape(regions, PILOT).sum(axis=1)
+    share = weight / weight.sum() if weight.sum() > 0 else np.full(regions, 1 / regions)
+    return [int(2 ** np.ceil(np.log2(max(LEAST, points * one)))) for one in share]
 
 
 def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:
@@ -124,7 +159,7 @@ def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:
 def _net(count: int, rng: np.random.Generator) -> Array:
     """The first points of a Sobol net in three dimensions, shifted digit by digit, shape (count, 3), 0 to below 1."""
     bits = np.arange(BITS, dtype=np.uint64)
-    numbers = [np.ones(BITS, dtype=np.uint64), np.ones(BITS, dtype=np.uint64), np.ones(BITS, dtype=np.uint64)]
+    numbers = [np.ones(BITS, dtype=np.uint64) for _ in range(3)]
     for k in range(1, BITS):
         numbers[1][k] = 2 * numbers[1][k - 1] ^ numbers[1][k - 1]
         numbers[2][k] = 3 if k == 1 else 2 * numbers[2][k - 1] ^ 4 * numbers[2][k - 2] ^ numbers[2][k - 2]
@@ -141,23 +176,34 @@ def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.r
     owner = np.repeat(np.arange(len(cubes)), [len(cube) for cube in cubes])
     lowest = np.argsort(counts, kind="stable")[:LOWEST]
     near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], LOOKS, axis=0) for i in range(len(cubes))]
-    return [np.clip(cube + reach * rng.uniform(-1, 1, cube.shape), 0, 1 - 1e-12) for cube in near]
+    moved = [cube + reach * rng.uniform(-1, 1, cube.shape) for cube in near]
+    if near[0].shape[1] == 2:  # nodes stay, at any phase
+        moved = [np.column_stack([cube[:, 0], rng.uniform(0, 1, len(cube))]) for cube in near]
+    return [np.clip(cube, 0, 1 - 1e-12) for cube in moved]
+
+
+def _phases_at(nodes: Nodes, each: int, rng: np.random.Generator) -> list[Array]:
+    """Start phases of every node, spread evenly from a start of its own: (node as a share of all, phase), one array."""
+    count = len(nodes.value)
+    phase = (np.arange(each)[:, None] + rng.uniform(size=count)) / each
+    return [np.column_stack([np.tile((np.arange(count) + 0.5) / count, each), phase.ravel()])]
+
+
+def _at_nodes(nodes: Nodes, cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
+    """What `_weighted` returns, for nodes of the paper's grid, each of which counts the same."""
+    at = (cubes[0][:, 0] * len(nodes.value)).astype(int)
+    value = nodes.value[at]
+    return nodes.directions[at], value, np.ones(len(at)), nodes.required[at], cubes[0][:, 1]
 
 
 def _weighted(layers: tuple[list[Layer], list[Layer]], cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
     """Directions drawn from every region; of each its weight, the area it stands for, what is required, and a phase."""
-    weights, masks = layers
     drawing = drawn_in(layers)
     drawn = [one.drawn(u) for one, u in zip(drawing, cubes, strict=True)]
     d = np.concatenate([directions for directions, _ in drawn])
     # as often as all regions together draw it: where they overlap each of their directions stands for less
     often = sum(len(u) * one.chance(d, area) for one, u, (_, area) in zip(drawing, cubes, drawn, strict=True))
-    value, required = np.zeros(len(d)), np.zeros(len(d))
-    for one in weights:
-        here = one.holds(d)
-        value, required = np.where(here, one.value_at(d), value), np.where(here, one.required, required)
-    for one in masks:
-        value = np.where(one.holds(d) & (one.value_at(d) > 0), 0.0, value)
+    value, required = value_and_required(layers, d)
     phase = np.concatenate(cubes)[:, 2]
     seen = often > 0  # rounding may put a direction outside the edge that it was drawn at
     return d, np.where(seen, value, 0.0), 1 / np.where(seen, often, np.inf), required, phase
@@ -197,7 +243,7 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
     return np.concatenate(listed), np.cumsum([0, *(len(one) for one in listed)]), repeats, span
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> int:
     """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
     steps = len(blocked)
@@ -209,7 +255,7 @@ def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> 
     return free
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _counts(
     directions: Array,
     beams: Array,
@@ -224,18 +270,22 @@ def _counts(
     counts = np.zeros(len(directions), np.int64)
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
+    flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn = 2 * np.pi
     for i in range(len(directions)):
         x, y, z = directions[i]
-        t = np.arctan2(np.hypot(x, y), z)
+        across = np.hypot(x, y)
+        t = np.arctan2(across, z)
         p = np.arctan2(y, x) - turned[i]
         mine = lines[first[listed[i]] : first[listed[i] + 1]]
         for b in range(np.searchsorted(polar, t - ball - 1e-7), len(polar)):
             if polar[b] > t + ball + 1e-7:
                 break
-            # |d - b|^2 = (t - t_b chord)^2 + sin t sin t_b * 4 sin^2(half the azimuth between them)
-            free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
-            around = 4 * np.sin(t) * np.sin(polar[b])
+            # the law of cosines: cos(ball) = z z_b + across across_b cos(azimuth between them at the edge of the ball)
+            free = 2 * (z * upright[b] + across * flat[b] - cos_ball)
+            if ball < SMALL_RAD:  # the same without a difference of cosines, which would lose digits
+                free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
+            around = 4 * across * flat[b]
             if free < 0:
                 continue
             if free >= around:
@@ -266,7 +316,7 @@ def _moments(objective: str, counts: Ints, value: Array, area: Array, required: 
 
 def _joined(objective: str, m: Array) -> float:
     if objective == "homogeneity":
-        return float(np.log(m[0] * m[2] / m[1] ** 2))
+        return float(np.log(m[0] * m[2] / m[1] ** 2)) if m[1] > 0 else np.inf
     if objective == "kl":  # int p ln(p / q), p = w / int w, q = (1 + d) / int (1 + d)
         return float(m[0] / m[1] - np.log(m[1]) + np.log(m[2]))
     return float(m[0] / m[1])

@@ -10,39 +10,56 @@ from scanwright.design.arrays import Array, Mask
 from scanwright.design.task.shapes import AllRegion, BandRegion, BoxRegion, ConeRegion, PlaneRegion
 from scanwright.design.task.task import LoadedTask
 
+ROUNDING = 1e-12
+ON_EDGE = ON_EDGE_DEG = ON_EDGE_M = 1e-9  # edges are inclusive: nodes of the paper's grid lie on them, but for rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Nodes:
+    """Nodes of the paper's grid that have a weight: directions (n, 3), weights (n,), what is required there (n,)."""
+
+    directions: Array
+    value: Array
+    required: Array
+
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One region: which directions it holds, its value there, what it requires; directions drawn in it, their area."""
+    """One region: which directions it holds, its value there, what it requires; directions drawn in it, their area.
+
+    `required` is a number, or a table like `table`.
+    """
 
     region: object
     table: Array | None
     value: float
-    required: float
+    required: float | Array
 
     def holds(self, d: Array) -> Mask:
         """Whether directions (n, 3) lie in it, shape (n,)."""
         region = self.region
         if isinstance(region, ConeRegion):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
-            return np.linalg.norm(d - axis, axis=1) <= 2 * np.sin(np.radians(region.half_angle_deg) / 2)
+            half = np.radians(min(180.0, region.half_angle_deg + ON_EDGE_DEG))
+            return np.asarray(np.linalg.norm(d - axis, axis=1) <= 2 * np.sin(half / 2) + ROUNDING)
         if isinstance(region, BandRegion):
-            theta = np.degrees(np.arccos(np.clip(d[:, 2], -1, 1)))
-            ahead = (np.degrees(np.arctan2(d[:, 1], d[:, 0])) - region.phi_deg[0]) % 360
-            inside = (region.theta_deg[0] <= theta) & (theta <= region.theta_deg[1])
-            return inside & (ahead <= region.phi_deg[1] - region.phi_deg[0])
+            theta = np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), d[:, 2]))
+            ahead = (np.degrees(np.arctan2(d[:, 1], d[:, 0])) - region.phi_deg[0] + ON_EDGE_DEG) % 360
+            low, high = region.theta_deg
+            inside = (low - ON_EDGE_DEG <= theta) & (theta <= high + ON_EDGE_DEG)
+            pole = np.hypot(d[:, 0], d[:, 1]) < ROUNDING  # has no heading: it belongs to all
+            return inside & (pole | (ahead <= region.phi_deg[1] - region.phi_deg[0] + 2 * ON_EDGE_DEG))
         if isinstance(region, PlaneRegion):
             return _On(region).holds(d)
         return np.ones(len(d), dtype=bool)
 
     def value_at(self, d: Array) -> Array:
         """Its value at directions (n, 3), shape (n,)."""
-        if self.table is None:
-            return np.full(len(d), self.value)
-        rows, columns = self.table.shape
-        r = np.minimum((np.arccos(np.clip(d[:, 2], -1, 1)) / np.pi * rows).astype(int), rows - 1)
-        c = np.minimum((np.arctan2(d[:, 1], d[:, 0]) / (2 * np.pi) % 1 * columns).astype(int), columns - 1)
-        return self.value * self.table[r, c]
+        return np.full(len(d), self.value) if self.table is None else self.value * _of_cells(self.table, d)
+
+    def required_at(self, d: Array) -> Array:
+        """What it requires at directions (n, 3), shape (n,)."""
+        return _of_cells(self.required, d) if isinstance(self.required, np.ndarray) else np.full(len(d), self.required)
 
     def drawn(self, u: Array) -> tuple[Array, float]:
         """Directions (n, 3) for points of the unit cube (n, 3), and its area [sr], where they are drawn evenly."""
@@ -88,6 +105,16 @@ class Layer:
         return np.where(self.value_at(d) > 0, 1 / cells, 0.0)
 
 
+def _of_cells(table: Array, d: Array) -> Array:
+    """Entries of the cells of a table that hold directions (n, 3), shape (n,)."""
+    rows, columns = table.shape
+    across = np.hypot(d[:, 0], d[:, 1])
+    phi = np.where(across < ROUNDING, 0.0, np.arctan2(d[:, 1], d[:, 0]))  # a pole has no heading
+    r = np.minimum((np.arctan2(across, d[:, 2]) / np.pi * rows + ON_EDGE).astype(int), rows - 1)
+    c = (phi / (2 * np.pi) % 1 * columns + ON_EDGE).astype(int) % columns
+    return np.asarray(table[r, c])
+
+
 class _On:
     """A rectangle on a plane, by where rays meet that plane.
 
@@ -108,7 +135,8 @@ class _On:
         facing = d @ self.normal
         met = d * (self.away / np.where(facing > 0, facing, np.nan))[:, None]
         x, y = met @ self.e1, met @ self.e2
-        return (facing > 0) & (self.x[0] <= x) & (x <= self.x[1]) & (self.y[0] <= y) & (y <= self.y[1])
+        x_m, y_m = np.add(self.x, (-ON_EDGE_M, ON_EDGE_M)), np.add(self.y, (-ON_EDGE_M, ON_EDGE_M))
+        return (facing > 0) & (x_m[0] <= x) & (x <= x_m[1]) & (y_m[0] <= y) & (y <= y_m[1])
 
     def drawn(self, u: Array) -> Array:
         p = np.arctan2(self.x, self.away)
@@ -151,14 +179,16 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
     if surface is None:
         return weights, masks
     shape, d = surface.range_m.shape, surface.directions.reshape(-1, 3)
-    painted, area = np.zeros(len(d)), surface.area_per_sr().ravel()
+    painted, required, area = np.zeros(len(d)), np.zeros(len(d)), surface.area_per_sr().ravel()
     points = surface.points_m.reshape(-1, 3)
     for one in weights:
         if isinstance(one.region, BoxRegion):
             here = ((points >= one.region.min_m) & (points <= one.region.max_m)).all(axis=1)
             painted = np.where(here, one.value * area, painted)
         else:
-            painted = np.where(one.holds(d), one.value_at(d), painted)
+            here = one.holds(d)
+            painted = np.where(here, one.value_at(d), painted)
+        required = np.where(here, one.required, required)
     lidar = loaded.lidar
     reach = lidar.practical_range_m
     in_range = (surface.range_m >= lidar.range_min_mm / 1000) & (surface.range_m <= reach)
@@ -166,7 +196,28 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
     for one in masks:
         hidden |= one.holds(d) & (one.value_at(d) > 0)
     table = np.where(in_range.ravel() & ~hidden, painted, 0.0).reshape(shape)
-    return [Layer(None, table, 1.0, asked)], []
+    return [Layer(None, table, 1.0, required.reshape(shape))], []
+
+
+def value_and_required(layers: tuple[list[Layer], list[Layer]], d: Array) -> tuple[Array, Array]:
+    """Weight at directions (n, 3), 0 where a mask holds them, and what is required there, both of shape (n,)."""
+    value, required = np.zeros(len(d)), np.zeros(len(d))
+    for one in layers[0]:
+        here = one.holds(d)
+        value, required = np.where(here, one.value_at(d), value), np.where(here, one.required_at(d), required)
+    for one in layers[1]:
+        value = np.where(one.holds(d) & (one.value_at(d) > 0), 0.0, value)
+    return value, required
+
+
+def nodes_in(layers: tuple[list[Layer], list[Layer]], step_deg: float) -> Nodes:
+    """The nodes of the paper's grid of theta and phi that have a weight, those of the poles once for every phi."""
+    theta = np.pi * np.arange(round(180 / step_deg) + 1) / round(180 / step_deg)
+    phi = 2 * np.pi * np.arange(round(360 / step_deg)) / round(360 / step_deg)
+    t, p = np.repeat(theta, len(phi)), np.tile(phi, len(theta))
+    d = np.column_stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    value, required = value_and_required(layers, d)
+    return Nodes(d[value > 0], value[value > 0], required[value > 0])
 
 
 def drawn_in(layers: tuple[list[Layer], list[Layer]]) -> list[Layer]:

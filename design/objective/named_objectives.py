@@ -17,9 +17,10 @@ import numpy as np
 
 from scanwright.design.arrays import Array, Counts
 from scanwright.design.errors import TaskError
+from scanwright.design.sphere.directions import equal_angle_grid
 from scanwright.design.sphere.painting import MAP, VALUE
 from scanwright.design.sphere.regions import Field, field_of
-from scanwright.design.sphere.total_weight import total_weight
+from scanwright.design.sphere.total_weight import RELATIVE_ERROR, total_weight
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import LoadedTask
 
@@ -43,12 +44,16 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """Moments and how they become J: `join` takes them along the first axis. `field` is the weight of the task."""
+    """Moments and how they become J: `join` takes them along the first axis, and is off by `join_error` at most.
+
+    `field` is the weight of the task.
+    """
 
     name: str
     field: Field
     moments: tuple[Moment, ...]
     join: Callable[[Array], Array]
+    join_error: float = 0.0
 
 
 def log_density(counts: Counts) -> Array:
@@ -62,10 +67,13 @@ def objective_of(loaded: LoadedTask, field: Field) -> Objective:
     Raises:
         TaskError: `required` without a number, or one that nothing asks for.
     """
-    name = loaded.task.density.objective
-    if name == "required":
-        return required(loaded, field)
-    return {"log": log, "kl": kl, "homogeneity": homogeneity, "worst": worst}[name](field)
+    density = loaded.task.density
+    step_deg = density.grid_step_deg if density.quadrature == "equal_angle" else None
+    if density.objective == "required":
+        return required(loaded, field, step_deg)
+    if density.objective == "kl":
+        return kl(field, step_deg)
+    return {"log": log, "homogeneity": homogeneity, "worst": worst}[density.objective](field)
 
 
 def log(field: Field) -> Objective:
@@ -78,7 +86,7 @@ def beams_per_ball(objective: Objective, J: float) -> float | None:
     return float(np.expm1(-J)) + 0.0 if objective.name == "log" else None
 
 
-def kl(field: Field) -> Objective:
+def kl(field: Field, grid_step_deg: float | None = None) -> Objective:
     """Distance to the target distribution [nat], 0 where the density is spread just as the weights are.
 
     `J = int p ln(p / q) dO` over the directions that have a weight, p = w / int w, q = (1 + d) / int (1 + d): only how
@@ -88,13 +96,14 @@ def kl(field: Field) -> Objective:
     support = _mapped(field, lambda w: (w > 0).astype(float))
     least = _least(field)  # in units of it no weight has a negative logarithm
     logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
-    entropy = total_weight(logarithms) / total_weight(field) + np.log(least)
-    shift = entropy - np.log(total_weight(field) / total_weight(support))
+    logs, whole, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
+    shift = logs / whole + np.log(least) - np.log(whole / held)
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
-    return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift)
+    error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / whole) + 2)
+    return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)
 
 
-def required(loaded: LoadedTask, field: Field) -> Objective:
+def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = None) -> Objective:
     """Mean shortfall, 0 to 1: `J = mean_w <max(0, 1 - d / r)>` with the density r that each region requires."""
     asked = loaded.task.density.required
     wanted = [asked if region.required is None else region.required for region in loaded.task.weight]
@@ -108,16 +117,16 @@ def required(loaded: LoadedTask, field: Field) -> Objective:
         )
     moments = []
     for level in sorted({r for r in wanted if r is not None}):
-        part = field_of(loaded, _asking(level, asked))
-        part = replace(part, background=field.background * (asked == level))
+        part = field_of(loaded, _asking(level, asked), loaded.task.density.background * (asked == level))
         if len(part.patches):
-            moments.append(Moment(part, _shortfall(level), share=total_weight(part)))
+            moments.append(Moment(part, _shortfall(level), share=_summed(part, grid_step_deg)))
     total = sum(moment.share for moment in moments)
     shared = tuple(replace(moment, share=moment.share / total) for moment in moments if moment.share > 0)
     if len(shared) == 1:
         shared = (replace(shared[0], field=field),)
     shares = np.array([moment.share for moment in shared])
-    return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1))
+    error = 0.0 if grid_step_deg or len(shared) == 1 else 2 * RELATIVE_ERROR  # no moment is above 1
+    return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1), error)
 
 
 def homogeneity(field: Field) -> Objective:
@@ -133,6 +142,11 @@ def homogeneity(field: Field) -> Objective:
 def worst(field: Field) -> Objective:
     """`J = -ln(1 + least)`, least = the fewest beams per ball anywhere in the region, at any start phase."""
     return Objective("worst", field, (Moment(field, log_density, "highest"),), _first)
+
+
+def _summed(field: Field, grid_step_deg: float | None) -> float:
+    """All the weight of a field, as its moments are summed: over solid angle, or over the nodes of the paper's grid."""
+    return float(field.weight_at(equal_angle_grid(grid_step_deg)).sum()) if grid_step_deg else total_weight(field)
 
 
 def _first(moments: Array) -> Array:

@@ -91,7 +91,7 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool 
     if stated:
         each = np.arange(len(values))
         moved = np.array([join(np.where(each == k, m.value + m.error, values)) for k, m in enumerate(found)])
-        J_error = float(np.linalg.norm(moved - J)) + ROUNDING if np.isfinite(J) else 0.0
+        J_error = float(np.linalg.norm(moved - J)) + problem.objective.join_error + ROUNDING if np.isfinite(J) else 0.0
         J_lower = float(join(np.array([moment.lower for moment in found])))
     spoken = [(moment.share, m) for moment, m in zip(moments, found, strict=True) if moment.share > 0]
     return Score(

@@ -25,7 +25,6 @@ NEAR = 5e-3  # a wrong field is off by far more
 SETS = 16
 DRAWN = 256, 1024, 4096  # directions of each set, in all regions together, until the count is near enough
 AGAIN = 16384  # the same before a difference is an error: one count in a thousand is off by more than it states
-LEAST_DRAWN = 8  # in each region
 
 
 def require_counted(
@@ -74,17 +73,15 @@ def _counted(
     lever: tuple[float, float, float],
 ) -> tuple[float, float]:
     """J by counting, and four standard errors of it."""
-    regions = max(1, len(loaded.task.weight))
-    for total in drawn:
-        points = max(LEAST_DRAWN, 1 << (total // regions).bit_length() - 1)
-        count = counted_J(loaded, angles_rad, total, points, SETS, shadow, lever)
+    for points in drawn:
+        count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
         if SURE * count.J_error <= NEAR:
             break
     return count.J, SURE * count.J_error
 
 
 def _require_least(loaded: LoadedTask, angles_rad: Setting, found: Score) -> None:
-    count = counted_J(loaded, angles_rad, 0, LEAST_DRAWN * SETS, 2)
+    count = counted_J(loaded, angles_rad, 0, DRAWN[0], 2)
     if found.J + found.J_error < count.J:
         raise NumericalError(f"min_density = {found.least}, but a count over simulated beams finds {count.least}")
 

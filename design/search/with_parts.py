@@ -166,12 +166,13 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
     """
     seen = problem.behind(shadow)
     plain = score(seen, angles_rad)
-    if not shadow.partly().any():
+    if not shadow.partly().any() or not np.isfinite(plain.J):  # nothing is seen: parts change nothing
         return plain
     at_times = shadow.of(~shadow.beams)
     sampled = [_sampled(seen, angles_rad, at_times, index) for index in range(SETS)]
-    change = np.array([problem.objective.join(both[0]) - problem.objective.join(both[1]) for both, _, _ in sampled])
-    spread = float(4 * np.std(change, ddof=1) / SETS**0.5)
+    behind, free = np.array([[float(problem.objective.join(one)) for one in both] for both, _, _ in sampled]).T
+    change = np.where(np.isfinite(free), behind, 0.0) - np.where(np.isfinite(free), free, 0.0)
+    spread = float(4 * np.std(change, ddof=1) / SETS**0.5) if np.isfinite(change).all() else 0.0
     return replace(
         plain,
         J=plain.J + float(change.mean()),

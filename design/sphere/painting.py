@@ -14,6 +14,7 @@ VALUE = 13  # of a row: its kind, what it needs of twelve parameters, what it is
 COLUMNS = VALUE + 1
 
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
+CELL_EDGE = 1e-9  # share of a cell of a map: what lies this little before the next one is on the border, so in the next
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -46,11 +47,12 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
     """What a map holds at the direction; 1 of any other region."""
     if row[0] != MAP:
         return 1.0
-    theta = np.arctan2(np.sqrt(x * x + y * y), z)
-    phi = np.arctan2(y, x)
+    across = np.sqrt(x * x + y * y)
+    theta = np.arctan2(across, z)
+    phi = np.arctan2(y, x) if across > EDGE else 0.0
     height, width = int(row[2]), int(row[3])
-    r = min(int(theta / np.pi * height), height - 1)
-    c = min(int((phi % (2 * np.pi)) / (2 * np.pi) * width), width - 1)
+    r = min(int(theta / np.pi * height + CELL_EDGE), height - 1)
+    c = int((phi % (2 * np.pi)) / (2 * np.pi) * width + CELL_EDGE) % width
     return tables[int(row[1]), r, c]
 
 

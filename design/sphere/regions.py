@@ -146,25 +146,34 @@ def value_of(region: Region | MaskRegion) -> float:
     return region.value
 
 
-def field_of(loaded: LoadedTask, weight_of: Callable[[Region], float] = value_of) -> Field:
-    """The weights and masks of a task; `weight_of` tells what each region is painted with.
+def field_of(
+    loaded: LoadedTask, weight_of: Callable[[Region], float] = value_of, background: float | None = None
+) -> Field:
+    """The weights and masks of a task; `weight_of` is what each region is painted with, `background` all else.
 
     With a scene both become tables on its grid of rays: directions without a surface in range are masked, and what
     lies in a box weighs by its area.
     """
     maps = list(loaded.maps)
+    background = loaded.task.density.background if background is None else background
     if loaded.surface is not None:
-        return _on_surface(loaded, loaded.surface, maps, weight_of)
+        return _on_surface(loaded, loaded.surface, maps, weight_of, background)
     weight = _layers(loaded.task.weight, maps, weight_of)
     mask = _layers(loaded.task.mask, maps, value_of)
-    return Field(weight, mask, loaded.task.density.background)
+    return Field(weight, mask, background)
 
 
-def _on_surface(loaded: LoadedTask, surface: Surface, maps: list[Array], weight_of: Callable[[Region], float]) -> Field:
+def _on_surface(
+    loaded: LoadedTask,
+    surface: Surface,
+    maps: list[Array],
+    weight_of: Callable[[Region], float],
+    background: float,
+) -> Field:
     shape = surface.range_m.shape
     flat = surface.directions.reshape(-1, 3)
     area = surface.area_per_sr()
-    painted = np.full(shape, loaded.task.density.background)
+    painted = np.full(shape, background)
     for region in loaded.task.weight:
         if isinstance(region, BoxRegion):
             inside = ((surface.points_m >= region.min_m) & (surface.points_m <= region.max_m)).all(axis=2)

@@ -9,9 +9,11 @@ import pytest
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.ball_search import ball_score
+from scanwright.design.objective.counted import counted_J
 from scanwright.design.objective.named_objectives import Moment, homogeneity, kl, worst
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import quick_J, score
+from scanwright.design.scene.surface import Surface, cell_directions
 from scanwright.design.search import families
 from scanwright.design.search.search import search
 from scanwright.design.task.task import LoadedTask, Task
@@ -91,6 +93,29 @@ def test_kl_and_homogeneity_of_an_even_scan_are_those_of_its_statistics():
     even = score(p.with_objective(homogeneity(p.field)), setting).J
     assert even == pytest.approx(np.log(square / mean**2), abs=1e-4)
     assert even >= 0
+
+
+@pytest.mark.parametrize("objective", ["kl", "required"])
+def test_the_papers_sum_weighs_all_that_it_joins_alike(objective):
+    """Shares of the weight are sums over the nodes of the grid too: the level of a pole weighs as its nodes do."""
+    up = {"shape": "band", "theta_deg": [0, 60], "value": 0.3, "required": 5.0}
+    grid = {"quadrature": "equal_angle", "grid_step_deg": 5.0, "ball_radius_deg": 5.0, "required": 2000.0}
+    task = loaded(objective, (up, GROUND), **grid)
+    setting = np.radians(SETTINGS[1])
+    found, counted = score(problem_of(task), setting), counted_J(task, setting, seed=1, points=2**12)
+    assert found.J == pytest.approx(counted.J, abs=1e-3 + counted.J_error)
+
+
+def test_each_level_of_a_scene_has_its_own_background():
+    """What no region of a scene names belongs to one level of density only."""
+    cells = cell_directions(10.0)
+    shape = cells.shape[:2]
+    wall = Surface(cells, np.full(shape, 2.0), np.zeros(shape), 2 * cells)
+    cone = {"shape": "cone", "axis": [0, 0, 1], "half_angle_deg": 60, "value": 0.5, "required": 5.0}
+    task = replace(loaded("required", (cone,), required=2000.0, background=0.5), surface=wall)
+    setting = np.radians(SETTINGS[1])
+    found, counted = score(problem_of(task), setting), counted_J(task, setting, seed=1, points=2**13)
+    assert abs(found.J - counted.J) <= found.J_error + counted.J_error
 
 
 def test_kl_is_lowest_where_the_density_follows_the_weights():

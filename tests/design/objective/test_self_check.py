@@ -17,6 +17,7 @@ from scanwright.design.search.search import search
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.shadow import AXIS_STEPS, Shadow
 from scanwright.design.sphere import polar_rule
+from scanwright.design.sphere.corners import Corners
 from scanwright.design.task.task import LoadedTask, Task, load_task
 
 GROUND = {"shape": "ground", "height_m": 0.5, "from_m": 0.5, "to_m": 2.0, "width_m": 2.0}
@@ -106,12 +107,12 @@ def test_a_score_with_parts_is_counted_with_them():
 
 
 def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monkeypatch):
-    """The fault of commit 099f72a put back: segments kept by their middle circle, no sum compared."""
+    """The fault of version 0.1 put back: no corner is a break, segments stay by their middle circle, no sum compared."""
     rng = np.random.default_rng(5)
     cells = np.zeros((24, 48))
     cells[8:20, 4:40] = rng.random((12, 36)) < 0.25
     loaded = a_task([{"shape": "map", "file": "w.npy"}], maps=[cells])
-    monkeypatch.setattr(polar_rule, "has_all_breaks", lambda _: True)
+    monkeypatch.setattr(polar_rule, "edge_corners", lambda _: Corners(np.empty((0, 3)), np.empty((0, 0))))
     monkeypatch.setattr(polar_rule, "WEIGHT_OFF", np.inf)
     problem = problem_of(loaded)
     best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 30.0})).best[0]

@@ -1,0 +1,204 @@
+"""Whether every figure of a valid task can be shown: what ends in a traceback is printed with all that repeats it.
+
+    uv run python -m benchmarks.design.shown [--tasks 2000] [--first 0] [--seed 1]
+
+Random tasks of `random_tasks` at random settings, two of five at whole 15, 45 or 90 deg, go through what stands behind
+`evaluate`, `compare`, the report and the studio. A message that refuses a task is right, anything else that is raised
+is a fault. One of fifty is compared in full, which searches mounts, and drawn in its room: that takes a second or more.
+A seed of 0 is a new one every time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import secrets
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.design.random_tasks import RandomTask, random_task
+from scanwright.design.angles import standard_settings
+from scanwright.design.catalogue.products import Multibeam
+from scanwright.design.errors import ScanwrightError
+from scanwright.design.evaluation.comparison import compare, ready_made
+from scanwright.design.evaluation.comparison_table import notes, table
+from scanwright.design.evaluation.evaluation import evaluate
+from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.motion import Shortest
+from scanwright.design.objective.problem import problem_of
+from scanwright.design.objective.score import score
+from scanwright.design.search.families import Family
+from scanwright.design.search.mounts.reference import reference_mounts
+from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.task.task import LoadedTask
+from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.density_sphere import density_sphere
+from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
+from scanwright.report.room_picture import room_picture
+from scanwright.report.sentences import sentences
+from scanwright.studio.panel.facts import Judge
+from scanwright.studio.panel.panel_html import facts_html, kept_html, scale_html
+from scanwright.studio.state import Setting
+from scanwright.studio.view.coloured_sphere import density_colours, edges, hexagons, highest_density
+
+TOLERANCE = 0.1  # of J: what is shown of it is looked at, not how exact it is
+FULL_COMPARISONS = 50  # one of so many tasks
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What a command raised that is no message: which one, and the traceback."""
+
+    command: str
+    trace: str
+
+
+def shown(drawn: RandomTask, folder: Path, *, full: bool = False) -> tuple[list[Failure], list[str]]:
+    """Show all figures of a task as the commands do; returns what failed, and what was refused with a message.
+
+    Args:
+        drawn: the task and its setting; beams that are missing stand for those that parts block.
+        folder: where the files of the task are.
+        full: whether other mounts and scanners are searched as `compare` does it, and the report's room is drawn.
+    """
+    commands: dict[str, Callable[[RandomTask, Path], None]] = {
+        "evaluate": _evaluate,
+        "compare": _compare_fully if full else _compare,
+        "report": partial(_report, picture=full),
+        "studio": _studio,
+    }
+    failures, refused = [], []
+    for name, command in commands.items():
+        try:
+            command(drawn, folder)
+        except ScanwrightError as error:
+            refused.append(f"{name}: {error}")
+        except Exception:  # any: these are what is looked for
+            failures.append(Failure(name, traceback.format_exc()))
+    return failures, refused
+
+
+def shown_task(rng: np.random.Generator, folder: Path) -> RandomTask:
+    """A random task with cheap figures; some spin as fast as their limits allow."""
+    drawn = random_task(rng, folder, small=True, tolerance=TOLERANCE)
+    task = drawn.loaded.task
+    if task.motion.mode == "spin" and rng.random() < 0.1:
+        limits = task.limits.model_copy(update={"min_density": 1})
+        task = task.model_copy(update={"motion": Shortest(longest_s=20.0), "limits": limits})
+    return replace(drawn, loaded=replace(drawn.loaded, task=task))
+
+
+def _shadow(drawn: RandomTask) -> Shadow | None:
+    """Beams that are missing as parts that turn with the laser, and a part that stands still before some others."""
+    if drawn.beams.all():
+        return None
+    stator = np.zeros((len(drawn.beams), AXIS_STEPS), dtype=bool)
+    stator[: len(drawn.beams) // 4, : AXIS_STEPS // 8] = True
+    return Shadow(~drawn.beams, stator)
+
+
+def _evaluate(drawn: RandomTask, _: Path) -> None:
+    found = evaluate(
+        drawn.loaded, drawn.angles_rad, "20,1000,5", "5,-3,1.0" if drawn.beams.all() else None, _quiet, _shadow(drawn)
+    )
+    "\n".join(found.lines())
+    json.dumps({"angles_deg": drawn.angles_deg, **found.facts()})
+    found.beam_directions()
+
+
+def _compare(drawn: RandomTask, _: Path) -> None:
+    loaded = drawn.loaded
+    problem = problem_of(loaded)
+    products = [product for product in loaded.products if isinstance(product, Multibeam)]
+    product = products[len(drawn.beams) % len(products)]
+    rows = [ready_made(problem, product, turns) for turns in (1, 3)]
+    "\n".join([*table(rows), *notes(loaded, rows)])
+
+
+def _compare_fully(drawn: RandomTask, _: Path) -> None:
+    problem, shadow = problem_of(drawn.loaded), _shadow(drawn)
+    best = Family(drawn.angles_deg, score(problem, drawn.angles_rad), 1, "given")  # type: ignore[arg-type]
+    mounts = reference_mounts(problem, drawn.loaded.task)
+    rows = compare(drawn.loaded, problem, best, mounts, built=None if shadow is None else (drawn.angles_rad, shadow))
+    "\n".join([*table(rows), *notes(drawn.loaded, rows)])
+
+
+def _report(drawn: RandomTask, folder: Path, picture: bool) -> None:
+    loaded, shadow = drawn.loaded, _shadow(drawn)
+    angles = loaded.angle_set(drawn.angles_deg)
+    problem, setting = problem_as_built(loaded, angles), mounting_rad(angles)
+    found = answer(loaded, angles, shadow)
+    mounts = np.degrees([setting, *standard_settings().values()])
+    J = np.array([score(problem, np.radians(mount)).J for mount in mounts])
+    planes, axes = np.column_stack([mounts[:, 2:], J, mounts[:, :2]]), np.column_stack([mounts[:, :2], J])
+    tuned = [mount.gain.mount for mount in found.as_built.mounts]
+    sphere = density_sphere(problem, angles, tuned, axes, loaded.task.angles.step_deg, shadow)
+    json.dumps(sphere.data())
+    if picture:
+        room_picture(loaded.task, folder, problem, setting, sphere, [], shadow)
+    sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting, shadow))
+    other_mounts(problem, loaded.task, setting, planes)
+    landscape(planes[:, :3], PLANE, angles, "J")
+    landscape(axes, AXIS, angles, "J")
+    found.as_built.lines()
+    if shadow is not None:
+        hidden_by(shadow)
+
+
+def _studio(drawn: RandomTask, _: Path) -> None:
+    judge = Judge.for_task(drawn.loaded)
+    setting = Setting.within_bounds(drawn.angles_deg)
+    quick, exact = judge.quick(setting), judge.exact(setting)
+    settled = judge.settled(exact)
+    log = judge.problem.objective.name == "log"
+    for facts in (quick, exact, settled):
+        facts_html(facts, log)
+    kept_html({"A": settled, "B": quick})
+    highest = highest_density(judge.problem, setting.angles_rad)
+    scale_html(highest)
+    density_colours(judge.problem, setting.angles_rad, hexagons().directions, highest)
+    edges(judge.problem.field)
+
+
+def _quiet(_: str) -> None:
+    """Progress that nobody reads."""
+
+
+def main() -> None:
+    """Print every failure, and the sum."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--tasks", type=int, default=2000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    seed = asked.seed or secrets.randbelow(1 << 31)
+    print(f"seed {seed}", flush=True)
+    failed, refusals, tasks = 0, Counter[str](), range(asked.first, asked.tasks)
+    for i in tasks:
+        with TemporaryDirectory() as folder:
+            drawn = shown_task(np.random.default_rng([seed, i]), Path(folder))
+            failures, refused = shown(drawn, Path(folder), full=i % FULL_COMPARISONS == 0)
+        failed += bool(failures)
+        refusals.update(message.split(":")[0] for message in refused)
+        for failure in failures:
+            print(f"FAILED task {i}, {failure.command}, {drawn.kinds}, {_repeated(drawn.loaded)}", flush=True)
+            print(f"  at {drawn.angles_deg}\n{failure.trace}", flush=True)
+        if (i + 1) % 50 == 0:
+            print(f"{i + 1} tasks, {failed} failed, refused: {dict(refusals)}", flush=True)
+    print(f"shown without a traceback: {len(tasks) - failed} of {len(tasks)} tasks; refused: {dict(refusals)}")
+    raise SystemExit(1 if failed else 0)
+
+
+def _repeated(loaded: LoadedTask) -> dict[str, object]:
+    return loaded.task.model_dump(mode="json", exclude_defaults=True)
+
+
+if __name__ == "__main__":
+    main()
