@@ -44,7 +44,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
         return BOUGHT
     process = assembly.parts[body].process
     if process == "printed":
-        return PRINTED if assembly.layout.scanner.printer.plastic else ALUMINIUM
+        return PRINTED
     return STEEL if process == "sawn" else ALUMINIUM
 
 

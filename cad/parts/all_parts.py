@@ -11,13 +11,11 @@ from cad.parts.bearing_tower import tower_spec
 from cad.parts.capsule_holder import holder_spec
 from cad.parts.counterweight import counterweight_spec
 from cad.parts.drive_plate import plate_spec
-from cad.parts.homing_bracket import bracket_spec
 from cad.parts.horn_cup import cup_spec
 from cad.parts.journal_sleeve import sleeve_spec
 from cad.parts.main_shaft import main_shaft_spec
 from cad.parts.part_spec import PartSpec
 from cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
-from cad.parts.ring_cover import ring_cover_spec
 from cad.parts.servo_shaft import servo_shaft_spec
 from cad.parts.shaft_ring import shaft_ring_spec
 from cad.parts.slip_ring_adapter import adapter_spec
@@ -41,8 +39,6 @@ OF_ALL = (
     mount_spec,
     counterweight_spec,
     sleeve_spec,
-    ring_cover_spec,
-    bracket_spec,
     tripod_foot_spec,
 )
 

@@ -31,7 +31,6 @@ from design.catalogue.products import (
     Provenance,
     Servo,
     SlipRing,
-    SlotSwitch,
 )
 from design.errors import TaskError, suggest
 from design.record import Fault, faults_of, read_toml, tell
@@ -47,7 +46,6 @@ KINDS: dict[str, type[Product]] = {
     "slip_ring": SlipRing,
     "bearing": Bearing,
     "belt": Belt,
-    "slot_switch": SlotSwitch,
     "printer": Printer,
     "multibeam": Multibeam,
 }

@@ -86,7 +86,7 @@ def find_servo(
 
 def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
     level = table.status_return
-    if level is None or not table.can_be_mute:
+    if not table.can_be_mute:
         return False
     return unmute == "for good" or (unmute == "until power-off" and not table.is_kept(level))
 

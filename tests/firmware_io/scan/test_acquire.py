@@ -271,7 +271,7 @@ def residuals_m(cloud, angles, scene):
 
 SWEEP = {"mode": "sweep", "limits_deg": [-45, 45], "period_s": 6.0}  # at 30.6 deg/s, 1.05 steps of 0.293 deg in 10 ms
 SICK = {"sensor": "LMS111"}
-INTERLACED = {"sensor": "LMS 200", "servo": "PD42-3-1140"}  # scans of 181 and of 180 beams in turn; a stepper
+INTERLACED = {"sensor": "LMS 200"}  # scans of 181 and of 180 beams in turn
 SWEEPING = {"sensor": "URG-04LX", "servo": "AX-12A", "motion": SWEEP}
 
 
@@ -523,7 +523,7 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, twins):
             acquire.acquire(plan, lambda _: None)
 
 
-SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
+SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")]
 
 
 @pytest.mark.parametrize(("servo", "protocol"), SERVOS)
