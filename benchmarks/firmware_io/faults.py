@@ -32,7 +32,8 @@ from firmware_io.recording.recording import open_recording
 from firmware_io.recording.repair.repair import repair
 from firmware_io.scan import acquire
 from firmware_io.scan.plan import plan_scan
-from firmware_io.twins.scanner import EmulatedScanner, emulated_scanner, room
+from firmware_io.twins.scanner import EmulatedScanner, emulated_scanner
+from firmware_io.twins.world import room
 
 ANGLES = AngleSet.model_validate(
     {

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from design.errors import DeviceError, ScanwrightError, notes_of, require
+from firmware_io.posix import require_posix
 from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from firmware_io.scan.scan_end import ScanEnd
     from firmware_io.scan.scan_summary import ScanSummary
 
-app = Commands("Devices")
+app = Commands("Devices", first=require_posix)
 
 
 class StampAt(Enum):
@@ -85,7 +86,8 @@ def emulate(
     from design.angles import load_angles
     from firmware_io.device_ports import announced
     from firmware_io.twins.head import read_load
-    from firmware_io.twins.scanner import emulated_scanner, room
+    from firmware_io.twins.scanner import emulated_scanner
+    from firmware_io.twins.world import room
 
     angles = load_angles(out / "angles.json")
     place = room(scene, unit_m, at)

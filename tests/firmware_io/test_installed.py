@@ -16,8 +16,9 @@ from firmware_io.lidar import families as lidar_families
 from firmware_io.lidar.families import family_of, open_lidar
 from firmware_io.servo import families as servo_families
 from firmware_io.servo.servo import open_servo
-from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.scanner import emulated_scanner
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.world import room
 
 # Ten turns a second of four beams, one line of text each: "range range range range" in millimetres.
 LIDAR = """

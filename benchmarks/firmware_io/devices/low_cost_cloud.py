@@ -28,7 +28,8 @@ from design.scene.ray_caster import Scene, cast
 from firmware_io.clouds.ply import read_ply
 from firmware_io.scan.acquire import acquire
 from firmware_io.scan.plan import plan_scan
-from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.scanner import emulated_scanner
+from firmware_io.twins.world import room
 from scanwright import api
 
 _ASIDE_RAD = math.radians(0.5)

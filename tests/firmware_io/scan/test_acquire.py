@@ -39,8 +39,9 @@ from firmware_io.scan.plan import plan_scan
 from firmware_io.scan.setpoints import course
 from firmware_io.servo.progress import ServoState
 from firmware_io.servo.servo import open_servo
-from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.scanner import emulated_scanner
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.world import room
 
 ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}

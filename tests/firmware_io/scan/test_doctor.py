@@ -15,9 +15,10 @@ from design.angles import AngleSet
 from firmware_io import device_ports, serial_port
 from firmware_io.scan import doctor
 from firmware_io.servo.families import all_tables
-from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.scanner import emulated_scanner
 from firmware_io.twins.servo.dynamixel_packets import take
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.world import room
 
 PING, READ, WRITE = 1, 2, 3
 

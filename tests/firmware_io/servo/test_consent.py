@@ -16,9 +16,10 @@ from firmware_io.servo.bus.bus import ServoBus
 from firmware_io.servo.fitness import ServoSetupError
 from firmware_io.servo.servo import open_servo
 from firmware_io.servo.settings import set_up
-from firmware_io.twins.scanner import emulated_scanner, room
+from firmware_io.twins.scanner import emulated_scanner
 from firmware_io.twins.servo.machine import Request
 from firmware_io.twins.servo.twin import ServoTwin
+from firmware_io.twins.world import room
 from scanwright.cli import servo_setup
 from scanwright.cli.servo_setup import asking_first
 
