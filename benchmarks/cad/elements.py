@@ -28,7 +28,6 @@ from cad.assembly.masses import link_bodies, rotor_of
 from cad.checks.deflection import LEAST_ERROR
 from cad.checks.mount import carried
 from cad.geometry.inertia import of_solid
-from cad.layout.loads import STANDARD_GRAVITY
 from cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from cad.parts.base_mount import FOOT_RADIUS
 from cad.screws import passing_hole
@@ -36,7 +35,7 @@ from cad.statics.mount_sag import mount_sag
 from cad.statics.sag import POISSON, linkage_sag
 from design.angles import load_angles
 from design.arrays import Array, Mask
-from design.frames import Rz
+from design.frames import STANDARD_GRAVITY_M_S2, Rz
 from design.scanner import Scanner
 from design.task.task import load_task
 
@@ -120,13 +119,13 @@ def turned(
     text += [f"{modulus}, {POISSON}", "*DENSITY", f"{density * 1e-9}"]
     text += ["*SOLID SECTION, ELSET=BODY, MATERIAL=PRINTED"]
     for down, mass_kg, centre_m in cases:
-        force = mass_kg * STANDARD_GRAVITY * down
+        force = mass_kg * STANDARD_GRAVITY_M_S2 * down
         moment = np.cross(1000 * centre_m - middle, force)
         forces = share[:, None] * (force / share.sum() + np.cross(np.linalg.solve(inertia, moment), arms))
         text += ["*STEP", "*STATIC", "*CLOAD, OP=NEW"]
         text += [f"{n + 1}, {axis + 1}, {f[axis]:.9g}" for n, f in zip(nodes, forces, strict=True) for axis in range(3)]
         along = ", ".join(f"{share:.9f}" for share in down)
-        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY:.6f}, {along}"]
+        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY_M_S2:.6f}, {along}"]
         text += ["*NODE PRINT, NSET=SEAT", "U", "*END STEP"]
     (folder / "part.inp").write_text("\n".join(text) + "\n", encoding="ascii")
     _run(["ccx", "-i", "part"], folder)

@@ -20,11 +20,10 @@ from cad.geometry import inertia
 from cad.geometry.inertia import Inertial
 from cad.layout.all_joints import joints_of
 from cad.layout.joints import Joint
-from cad.layout.loads import STANDARD_GRAVITY
 from cad.layout.names import DECK, LIDAR, TRIPOD
 from cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
 from design.arrays import Array
-from design.frames import cross_matrix
+from design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
 from design.scanner import Scanner
 
 SHOCK_G = 5.0
@@ -84,7 +83,7 @@ def _place(joint: Joint) -> str:
 
 def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Check:
     body = together_of(scanner, assembly, hanging)
-    force = SHOCK_G * STANDARD_GRAVITY * body.mass_kg
+    force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
     pull, push = worst_shares(joint, body.centre_m)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
     first = min(margins, key=margins.__getitem__)
