@@ -361,6 +361,7 @@ def test_mutated_answers_are_right_or_typed_errors(bus, protocol):
     [
         ({"port": "/dev/nothing"}, "/dev/nothing: no such port; serial ports here: "),
         ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': not one this program can drive; known: AX-12A"),
+        ({"port": "pty", "model": "PD42-3-1140"}, "not one this program can drive; removed in 0.2: "),
     ],
 )
 def test_what_cannot_be_opened_says_why(arguments, words):

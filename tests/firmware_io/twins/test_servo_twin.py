@@ -643,3 +643,8 @@ def test_unplugged_is_said_and_plugged_in_it_is_found_again(model, protocol):
             until(lambda: not turns(twin))
             servo.spin(RATE)
             read_for(servo, 0.05)
+
+
+def test_a_servo_that_was_removed_is_refused_with_what_to_use_instead():
+    with pytest.raises(DeviceError, match=r"no twin of a servo PD42-3-1140; removed in 0\.2: "):
+        machine_of("PD42-3-1140", None, Load(), 0, 0.0)
