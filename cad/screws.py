@@ -78,7 +78,7 @@ def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | 
         printer: the profile.
         carries: whether the lidar hangs on it: threads in bare plastic creep, so these get nuts whatever it asks for.
     """
-    bare = printer.plastic and (printer.thread == "cut" or screw.insert is None)
+    bare = printer.thread == "cut" or screw.insert is None
     if printer.thread != "nut" and not (carries and bare):
         return None
     fit = printer.fit_clearance_mm

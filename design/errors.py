@@ -24,6 +24,20 @@ import difflib
 from collections.abc import Iterable
 from importlib.util import find_spec
 
+_NO_SWITCH = "the servo knows its angle, and `scanwright scan` never read the switch"
+_NO_STEPPER = "no layout took the stepper; use a Dynamixel or Feetech servo, such as MX-64R"
+
+REMOVED: dict[str, str] = {  # names in files and commands of version 0.1, and what to use instead
+    # keys of [modules]
+    "homing_flag": f"leave the key out: {_NO_SWITCH}",
+    "ring_cover": "leave the key out: nothing replaces it",
+    # products and kinds of products
+    "cnc": "printers print; use 'fdm-0.4', and have parts milled or turned from their STEP files",
+    "EE-SX672": _NO_SWITCH,
+    "slot_switch": _NO_SWITCH,
+    "PD42-3-1140": _NO_STEPPER,
+}
+
 
 class ScanwrightError(Exception):
     """Base of every error that a person can mend."""
@@ -87,8 +101,15 @@ def notes_of(error: BaseException) -> list[str]:
     return list(getattr(error, "__notes__", ()))
 
 
+def removal(name: str) -> str | None:
+    """Return "removed in 0.2: ..." with what to use instead; None for a name that version 0.1 did not have."""
+    return None if name not in REMOVED else f"removed in 0.2: {REMOVED[name]}"
+
+
 def suggest(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'X'?", or the list of what is known where nothing comes close."""
+    """Return "; did you mean 'X'?", or the list of known words if none is close; or what replaces a removed word."""
+    if (removed := removal(word)) is not None:
+        return f"; {removed}"
     names = sorted(known)
     folded = {name.lower(): name for name in names}
     close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.6)

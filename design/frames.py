@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike
 
 from scanwright.design.arrays import Array, Pose, Rotation
 
+STANDARD_GRAVITY_M_S2 = 9.80665  # along -z of `world`; exact by definition: 3rd CGPM (1901), Resolution 2
+
 
 def Rx(angle_rad: ArrayLike) -> Float[ndarray, "*k 3 3"]:
     """Rotation about x, shape (..., 3, 3)."""

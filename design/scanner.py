@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing, SlotSwitch
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
 from scanwright.design.deck_holes import Circle, Rectangle
+from scanwright.design.errors import removal
 from scanwright.design.record import Record
 
 
 class Modules(Record):
     """Parts that a scanner works without, and that a task may ask for."""
 
-    ring_cover: bool = Field(default=False, strict=True, description="a tube around a slip ring with a bore")
     tripod_foot: bool = Field(
         default=False, strict=True, description="a plate under the mount with a nut 1/4-20 for a tripod"
     )
-    homing_flag: bool = Field(
-        default=False, strict=True, description="a flag on the rotor, and a bracket with an optical switch for it"
-    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_removed(cls, table: Any) -> Any:
+        """The resolved tasks of version 0.1 say `false` for modules that are no longer there."""
+        if not isinstance(table, dict):
+            return table
+        return {key: value for key, value in table.items() if value is not False or removal(key) is None}
 
 
 NO_MODULES = Modules()
-HOMING_SWITCH = "EE-SX672"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +43,6 @@ class Scanner:
         belts: those that a capsule ring's scanner may choose from, the narrowest first.
         deck: holes that the base mount is screwed to; None where the mount may choose them.
         modules: what else was asked for.
-        switch: that a homing flag passes; None where none was asked for.
     """
 
     angles: AngleSet
@@ -50,7 +54,6 @@ class Scanner:
     belts: tuple[Belt, ...] = ()
     deck: Rectangle | Circle | None = None
     modules: Modules = NO_MODULES
-    switch: SlotSwitch | None = None
 
 
 def scanner_of(
@@ -75,5 +78,4 @@ def scanner_of(
         belts=catalogue.belts(),
         deck=deck,
         modules=modules,
-        switch=catalogue.get(HOMING_SWITCH, SlotSwitch) if modules.homing_flag else None,
     )

@@ -28,7 +28,6 @@ from scanwright.cad.assembly.masses import link_bodies, rotor_of
 from scanwright.cad.checks.deflection import LEAST_ERROR
 from scanwright.cad.checks.mount import carried
 from scanwright.cad.geometry.inertia import of_solid
-from scanwright.cad.layout.loads import STANDARD_GRAVITY
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from scanwright.cad.parts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
@@ -36,7 +35,7 @@ from scanwright.cad.statics.mount_sag import mount_sag
 from scanwright.cad.statics.sag import POISSON, linkage_sag
 from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array, Mask
-from scanwright.design.frames import Rz
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2, Rz
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.task import load_task
 
@@ -120,13 +119,13 @@ def turned(
     text += [f"{modulus}, {POISSON}", "*DENSITY", f"{density * 1e-9}"]
     text += ["*SOLID SECTION, ELSET=BODY, MATERIAL=PRINTED"]
     for down, mass_kg, centre_m in cases:
-        force = mass_kg * STANDARD_GRAVITY * down
+        force = mass_kg * STANDARD_GRAVITY_M_S2 * down
         moment = np.cross(1000 * centre_m - middle, force)
         forces = share[:, None] * (force / share.sum() + np.cross(np.linalg.solve(inertia, moment), arms))
         text += ["*STEP", "*STATIC", "*CLOAD, OP=NEW"]
         text += [f"{n + 1}, {axis + 1}, {f[axis]:.9g}" for n, f in zip(nodes, forces, strict=True) for axis in range(3)]
         along = ", ".join(f"{share:.9f}" for share in down)
-        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY:.6f}, {along}"]
+        text += ["*DLOAD, OP=NEW", f"BODY, GRAV, {1000 * STANDARD_GRAVITY_M_S2:.6f}, {along}"]
         text += ["*NODE PRINT, NSET=SEAT", "U", "*END STEP"]
     (folder / "part.inp").write_text("\n".join(text) + "\n", encoding="ascii")
     _run(["ccx", "-i", "part"], folder)

@@ -32,7 +32,8 @@ from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.recording.repair.repair import repair
 from scanwright.firmware_io.scan import acquire
 from scanwright.firmware_io.scan.plan import plan_scan
-from scanwright.firmware_io.twins.scanner import EmulatedScanner, emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import EmulatedScanner, emulated_scanner
+from scanwright.firmware_io.twins.world import room
 
 ANGLES = AngleSet.model_validate(
     {
@@ -94,7 +95,6 @@ SERVOS = {  # model and protocol
     "protocol 2.0": ("MX-64R", "2.0"),
     "XL430-W250": ("XL430-W250", "2.0"),
     "STS3215": ("STS3215", "STS"),
-    "PD42-3-1140": ("PD42-3-1140", "TMCL"),
 }
 LIDARS = ("STL27L", "RPLIDAR A2", "TiM561", "LMS 200")  # one of each family
 ALL = [
@@ -102,7 +102,7 @@ ALL = [
     *[name for name in (*INSIDE, *SIGNALS, FULL_DISK) if name != "servo unplugged"],
     *[
         f"{name}, {servo}"
-        for servo in ("XL430-W250", "STS3215", "PD42-3-1140")
+        for servo in ("XL430-W250", "STS3215")
         for name in ("servo unplugged", "stall", "garbage", "servo brown-out", "kill -9")
     ],
     *[

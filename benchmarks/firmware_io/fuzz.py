@@ -1,7 +1,7 @@
 """Damaged replies through every codec: `python -m benchmarks.firmware_io.fuzz [STREAMS] [SEED] [PROTOCOL...]`.
 
 STREAMS (default 1,000,000) dialogues of a lidar of each family, and as many answers of a servo in each protocol (or
-of those that are named: SCIP, CoLa, LMS2xx, LDROBOT, Slamtec, "servo 1.0", "servo 2.0", "servo STS", "servo TMCL"),
+of those that are named: SCIP, CoLa, LMS2xx, LDROBOT, Slamtec, "servo 1.0", "servo 2.0", "servo STS"),
 each with a few flipped bits, lost, doubled, swapped and foreign bytes. Whatever is raised must be one of our typed
 errors, whatever is accepted must have right sums, told by loops of these files, and nothing may hang. Anything else
 ends the run.
@@ -23,13 +23,9 @@ from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from scanwright.firmware_io.servo.feetech.packets import STS
-from scanwright.firmware_io.servo.tmcl.packets import TMCL
 from scanwright.firmware_io.twins.servo import dynamixel_packets, feetech_packets
-from scanwright.firmware_io.twins.servo.tmcl import datagrams
 
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
-_SERVO_SCRAPS += [b"\x02\x01\x64\x06", b"\x01\x64\x06", b"\x02\x01"]
-_BLOCKS = {"TMCL": Register(215, 4)}  # a parameter; the others are asked for a stretch of addresses
 _BLOCK = Register(36, 8)
 
 Statuses = Callable[[int, bytes], tuple[bytes, ...]]  # as a servo sends it, and others of the same meaning
@@ -96,17 +92,6 @@ def in_stream(statuses: Statuses, stream: bytes, data: bytes) -> bool:
     return any(packet in stream for error in range(256) for packet in statuses(error, data))
 
 
-def tmcl(error: int, data: bytes) -> tuple[bytes, ...]:
-    """A reply to a reading of the axis."""
-    return (datagrams.reply(2, 1, error or 100, 6, data[::-1]),)
-
-
-def in_windows(_: Statuses, stream: bytes, data: bytes) -> bool:
-    """The same of replies without a header: nine bytes to that reading, with that data and a right sum."""
-    windows = (stream[start : start + 9] for start in range(len(stream) - 8))
-    return any((one[1], one[3], one[4:8], one[8]) == (1, 6, data[::-1], sum(one[:8]) % 256) for one in windows)
-
-
 def lidar(streams: int, seed: int, name: str) -> None:
     """Damage dialogues, and print what became of them."""
     language = LANGUAGES[name]
@@ -138,16 +123,14 @@ def servo(answers: int, seed: int, packets: PacketFormat, statuses: Statuses) ->
         patch.object(bus, "_TRIES", 1),
     ):
         servo_bus, accepted, slowest_s, began_s = ServoBus("wire", packets), 0, 0.0, time.perf_counter()
-        block = _BLOCKS.get(packets.protocol, _BLOCK)
-        whole = in_windows if packets is TMCL else in_stream
         for k in range(answers):
-            data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(block.size))
+            data = bytes(rng.choice((0, 1, 0x55, 0xFD, 0xFF)) for _ in range(_BLOCK.size))
             wire.answer = damaged(rng, statuses(0, data)[0], _SERVO_SCRAPS, 2, 4)
             asked_s = time.perf_counter()
             try:
-                answer = servo_bus.read(1, block)
+                answer = servo_bus.read(1, _BLOCK)
                 accepted += 1
-                assert whole(statuses, wire.answer, answer.data), "accepted with a wrong sum"
+                assert in_stream(statuses, wire.answer, answer.data), "accepted with a wrong sum"
             except DeviceError:
                 pass
             except BaseException:
@@ -168,7 +151,6 @@ SERVOS: dict[str, tuple[PacketFormat, Statuses]] = {
         lambda error, data: (dynamixel_packets.status("2.0", 1, error, data), plain(error, data)),
     ),
     "servo STS": (STS, lambda error, data: (feetech_packets.status(1, error, data),)),
-    "servo TMCL": (TMCL, tmcl),
 }
 
 

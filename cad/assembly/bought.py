@@ -23,7 +23,6 @@ from scanwright.cad.layout.cables.leads import RotorLead
 from scanwright.cad.layout.cables.standing import StandingLead
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
 from scanwright.cad.parts.part_spec import STEEL, Colour
 from scanwright.design.catalogue.products import Bearing
 
@@ -86,10 +85,6 @@ def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
         yield _ring(names.RING_ROTOR, "rot", partial(draw.ring_rotor, stack))
     if stack.bearing is not None:
         yield from _bearing(stack.bearing, stack.bearing_top, "")
-    bracket = bracket_of(layout.scanner, stack)
-    if isinstance(bracket, HomingBracket):
-        make = partial(draw.slot_switch, bracket)
-        yield BodySpec(name=names.SWITCH_BODY, product=names.SWITCH, frame="servo", colour=CASE, make=make)
 
 
 def _of_belt(stack: BeltStack) -> Iterator[BodySpec]:

@@ -14,7 +14,6 @@ from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
-from scanwright.cad.layout.modules.homing_flag import HomingBracket
 from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
@@ -104,19 +103,6 @@ def bearing_outer(bearing: Bearing, high: float) -> cq.Solid:
     """Outer ring, its upper face at a height."""
     outer = bearing.outer_mm / 2
     return _tube(outer - _race(bearing), outer, high - bearing.width_mm, high)
-
-
-def slot_switch(p: HomingBracket) -> cq.Solid:
-    """Flange with its holes, and fork with its slot down to the flange, where it stands on its bracket."""
-    switch = p.switch
-    (x, y, high), (wide, deep, thick) = switch.body_mm, switch.flange_mm
-    fork = solids.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, high))
-    flange = solids.box((-wide / 2, -deep / 2, 0.0), (wide / 2, deep / 2, thick))
-    half, radius = switch.slot_mm / 2, SCREWS[switch.screw].nominal / 2
-    cuts = [solids.box((-half, -y, thick), (half, y, high + 1.0))]
-    cuts += [solids.upright(radius, -1.0, thick + 1.0, side * switch.hole_pitch_mm / 2, 0.0) for side in (1.0, -1.0)]
-    whole = fork.fuse(flange).cut(*cuts).moved(cq.Location(cq.Vector(p.radius, 0.0, p.seat)))
-    return whole.moved(solids.about_axis(p.azimuth)).Solids()[0]
 
 
 def _race(bearing: Bearing) -> float:

@@ -15,8 +15,6 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import DriveLayout, Mounted
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
-from scanwright.cad.layout.modules.homing_flag import bracket_of
-from scanwright.cad.layout.modules.ring_cover import cover_of
 from scanwright.cad.layout.modules.unasked import unasked
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
 from scanwright.cad.screws import passing_hole
@@ -65,12 +63,6 @@ def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
     out = [*layout.drive.left_out]
     if isinstance(layout.counterweight, LeftOut):
         out.append(layout.counterweight)
-    cover = cover_of(layout.scanner, layout.stack)
-    if isinstance(cover, LeftOut):
-        out.append(cover)
-    bracket = bracket_of(layout.scanner, layout.stack)
-    if isinstance(bracket, LeftOut):
-        out.append(bracket)
     ties = hub_tie_of(layout.scanner, layout.linkage), plate_ties_of(layout.scanner.lidar, layout.linkage)
     out += [tie for tie in ties if isinstance(tie, LeftOut)]
     if layout.deck.tripod is None:

@@ -20,11 +20,10 @@ from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.loads import STANDARD_GRAVITY
 from scanwright.cad.layout.names import DECK, LIDAR, TRIPOD
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
 from scanwright.design.arrays import Array
-from scanwright.design.frames import cross_matrix
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
 from scanwright.design.scanner import Scanner
 
 SHOCK_G = 5.0
@@ -44,7 +43,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
         return BOUGHT
     process = assembly.parts[body].process
     if process == "printed":
-        return PRINTED if assembly.layout.scanner.printer.plastic else ALUMINIUM
+        return PRINTED
     return STEEL if process == "sawn" else ALUMINIUM
 
 
@@ -84,7 +83,7 @@ def _place(joint: Joint) -> str:
 
 def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Check:
     body = together_of(scanner, assembly, hanging)
-    force = SHOCK_G * STANDARD_GRAVITY * body.mass_kg
+    force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
     pull, push = worst_shares(joint, body.centre_m)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
     first = min(margins, key=margins.__getitem__)

@@ -21,7 +21,7 @@ from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.remarks import left_out_of, products_of, unverified
 from scanwright.cad.checks.retention import retention_checks
 from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
-from scanwright.design.catalogue.products import Product, SlotSwitch
+from scanwright.design.catalogue.products import Product
 from scanwright.design.electrics.rules import broken_rules
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.left_out import LeftOut
@@ -75,7 +75,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(scanner, layout.stack, bodies),
         *retention_checks(scanner, assembly),
-        *electric_checks(scanner, layout.drive.switch),
+        *electric_checks(scanner),
         *lead_checks(assembly),
         *standing_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
@@ -125,9 +125,9 @@ def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Check]:
     ]
 
 
-def electric_checks(scanner: Scanner, switch: SlotSwitch | None = None) -> list[Check]:
+def electric_checks(scanner: Scanner) -> list[Check]:
     """Every broken rule of the wiring, or one word that it keeps them; and what the catalogue does not know of it."""
-    network = network_of(scanner, switch)
+    network = network_of(scanner)
     faults = [
         Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
         for fault in broken_rules(network)

@@ -22,7 +22,7 @@ from scanwright.cad.layout.cables.words import tied_at
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 
@@ -110,9 +110,9 @@ def items_of(
     items.append(_filament(scanner, items))
     items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
-    items += _wiring(scanner, assembly.layout.drive.switch)
+    items += _wiring(scanner)
     items += _ties(assembly)
-    items += _electrics(scanner, assembly.layout.drive.switch)
+    items += _electrics(scanner)
     items += _with_it(assembly.layout.drive, joints)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
@@ -131,7 +131,7 @@ def bom_text(items: list[BomItem]) -> str:
 
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
-        if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt | SlotSwitch):
+        if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
             number = _order_number(product, drive)
             yield _bought(product, max(1, drive.products.count(product)), number)
 
@@ -144,7 +144,7 @@ def _order_number(product: Product, drive: DriveLayout) -> str:
     return product.name
 
 
-def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt | SlotSwitch, quantity: int, number: str) -> BomItem:
+def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
     origin = product.provenance().get("price_usd")
     price = product.price_usd
     return BomItem(
@@ -187,14 +187,10 @@ def _screws(joints: list[Joint]) -> Iterator[BomItem]:
         yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note)
 
 
-def _wiring(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomItem]:
-    supply = f"power supply, {PAPER_V:g} V, {network_of(scanner, switch).supply_a:g} A"
+def _wiring(scanner: Scanner) -> Iterator[BomItem]:
+    supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
     yield BomItem("wiring", supply, quantity=1, source=PAPER, note="price unknown")
     yield from _servo_wiring(scanner.servo)
-    if switch is not None and switch.connector is not None:
-        origin = switch.provenance()["connector"]
-        note = f"for {switch.name}; price unknown"
-        yield BomItem("wiring", switch.connector, quantity=1, source=origin.source, note=note)
     needs = WIRING.get(scanner.lidar.name)
     if needs is None:
         yield _unknown_wiring(scanner.lidar)
@@ -255,9 +251,9 @@ def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
     )
 
 
-def _electrics(scanner: Scanner, switch: SlotSwitch | None = None) -> Iterator[BomItem]:
+def _electrics(scanner: Scanner) -> Iterator[BomItem]:
     """What the wiring needs beside the devices themselves."""
-    network, source = network_of(scanner, switch), "wiring.md"
+    network, source = network_of(scanner), "wiring.md"
     blades: dict[float, int] = {}
     for branch in network.branches:
         blades[branch.fuse_a] = blades.get(branch.fuse_a, 0) + 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from scanwright.cad.files.schematic import schematic_svg
-from scanwright.design.catalogue.products import SlotSwitch
 from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
 from scanwright.design.electrics.network import Network
 from scanwright.design.electrics.rules import broken_rules
@@ -24,15 +23,14 @@ STALLED = (
 )
 
 
-def wiring_files(scanner: Scanner, digest: str, switch: SlotSwitch | None = None) -> dict[str, bytes]:
+def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
     """Both files by name.
 
     Args:
         scanner: angles and products.
         digest: of what shapes the parts.
-        switch: that a homing flag passes, where there is one.
     """
-    network = network_of(scanner, switch)
+    network = network_of(scanner)
     title = f"{scanner.angles.task}: wiring ({digest})"
     return {
         "wiring.svg": schematic_svg(network, title).encode("utf-8"),

@@ -70,7 +70,7 @@ def export_scanner(
     items = items_of(scanner, assembly, joints, masses, digest)
     files["bom.csv"] = bom_text(items).encode("utf-8")
     files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
-    files |= wiring_files(scanner, digest, assembly.layout.drive.switch)
+    files |= wiring_files(scanner, digest)
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)
     left_out = tuple(

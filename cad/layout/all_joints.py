@@ -26,8 +26,6 @@ from scanwright.cad.layout.joints import (
 )
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.linkage import CROSS_SCREW, cross_floor_mm, cross_seat_mm, cross_thread_mm
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of, homing_joints
-from scanwright.cad.layout.modules.ring_cover import RingCover, cover_joint, cover_of
 from scanwright.cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, STANDS_OUT, TripodFoot
 from scanwright.cad.screws import TRIPOD_SCREW
 
@@ -41,12 +39,6 @@ def joints_of(layout: Layout) -> list[Joint]:
     scanner, stack = layout.scanner, layout.stack
     drive = belt_joints(scanner, stack) if isinstance(stack, BeltStack) else direct_joints(scanner, stack)
     joints = [*drive, _crossed(layout), *_of_lidar(layout), *_on_deck(layout)]
-    cover = cover_of(scanner, stack)
-    if isinstance(cover, RingCover):
-        joints.append(cover_joint(cover))
-    bracket = bracket_of(scanner, stack)
-    if isinstance(bracket, HomingBracket):
-        joints += homing_joints(bracket)
     if isinstance(layout.counterweight, Counterweight):
         joints.append(_bar(layout.counterweight))
     return sorted(joints, key=lambda joint: joint.slot_mm is not None)

@@ -11,7 +11,7 @@ from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.screws import Screw
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Belt, SlotSwitch
+from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.left_out import LeftOut
 
 Stack = DirectStack | BeltStack
@@ -95,7 +95,7 @@ class DriveLayout:
 
     stack: Stack
     shaft: str
-    products: tuple[Bearing | Belt | SlotSwitch, ...]
+    products: tuple[Bearing | Belt, ...]
     mounted: Mounted
     masses: tuple[Mass, ...]
     shapes: tuple[Cuboid | Rod, ...]
@@ -104,8 +104,3 @@ class DriveLayout:
     left_out: tuple[LeftOut, ...]
     needs: tuple[tuple[str, str], ...]
     borne: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def switch(self) -> SlotSwitch | None:
-        """That a homing flag passes; None where it has none, whatever was asked for."""
-        return next((product for product in self.products if isinstance(product, SlotSwitch)), None)

@@ -15,7 +15,6 @@ from scanwright.cad.layout.direct.drive import direct_drive
 from scanwright.cad.layout.drive import DriveLayout, Stack
 from scanwright.cad.layout.envelope import screw_travel_mm
 from scanwright.cad.layout.linkage import AlignmentLinkage, linkage_of
-from scanwright.cad.layout.modules.homing_flag import bracket_of, flag_of
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
 from scanwright.design.scanner import NO_MODULES, Scanner
@@ -52,15 +51,7 @@ def layout_of(scanner: Scanner) -> Layout:
         linkage = replace(linkage, ear=bar.ear)
     tie = hub_tie_of(scanner, linkage)
     linkage = replace(linkage, hub_tie=None if isinstance(tie, LeftOut) else tie)
-    linkage = replace(linkage, flag=flag_of(bracket_of(scanner, drive.stack), drive.stack, _taken(linkage)))
     return Layout(scanner, drive, deck, linkage, bar)
-
-
-def _taken(linkage: AlignmentLinkage) -> tuple[float, ...]:
-    """Azimuths at which the hub has screws, the way of the wires, the ear of a bar and a tongue for a tie."""
-    taken = (*linkage.cross_azimuths, sum(linkage.cross_azimuths) / 2)
-    taken = taken if linkage.ear is None else (*taken, linkage.ear.azimuth)
-    return taken if linkage.hub_tie is None else (*taken, linkage.hub_tie.azimuth)
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:

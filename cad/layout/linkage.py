@@ -23,7 +23,6 @@ from scanwright.cad.layout.envelope import (
     slot_ends,
 )
 from scanwright.cad.layout.joints import round_wall_mm
-from scanwright.cad.layout.modules.homing_flag import Flag
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
@@ -80,7 +79,6 @@ class AlignmentLinkage:
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
     cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
     ear: Ear | None = None
-    flag: Flag | None = None
     hub_tie: TieSeat | None = None  # rotation frame
     plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 

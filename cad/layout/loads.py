@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
-STANDARD_GRAVITY = 9.80665
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
 FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
 ALUMINIUM_G_CM3 = 2.7
@@ -46,7 +46,7 @@ def tilt_sine(scanner: Scanner) -> float:
 def weight_of(scanner: Scanner, mass_kg: float, lever_m: float, off_axis_m: float) -> Weight:
     """Weight of a rotor whose centre of mass is known."""
     sine = tilt_sine(scanner)
-    weight = mass_kg * STANDARD_GRAVITY
+    weight = mass_kg * STANDARD_GRAVITY_M_S2
     return Weight(weight * sine, weight * math.sqrt(1.0 - min(1.0, sine**2)), lever_m, off_axis_m)
 
 

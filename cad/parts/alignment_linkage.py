@@ -168,7 +168,7 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
         linkage = checked(body.cut(*shapes.holes).clean())
     bottom = linkage.BoundingBox().zmin
-    if abs(bottom - (stack.shoulder if p.flag is None else p.flag.low)) > 1e-3:
+    if abs(bottom - stack.shoulder) > 1e-3:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: hub: h = {stack.h} mm: the part reaches down to {bottom:.3f}, below the hub"
         )

@@ -11,13 +11,11 @@ from scanwright.cad.parts.bearing_tower import tower_spec
 from scanwright.cad.parts.capsule_holder import holder_spec
 from scanwright.cad.parts.counterweight import counterweight_spec
 from scanwright.cad.parts.drive_plate import plate_spec
-from scanwright.cad.parts.homing_bracket import bracket_spec
 from scanwright.cad.parts.horn_cup import cup_spec
 from scanwright.cad.parts.journal_sleeve import sleeve_spec
 from scanwright.cad.parts.main_shaft import main_shaft_spec
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
-from scanwright.cad.parts.ring_cover import ring_cover_spec
 from scanwright.cad.parts.servo_shaft import servo_shaft_spec
 from scanwright.cad.parts.shaft_ring import shaft_ring_spec
 from scanwright.cad.parts.slip_ring_adapter import adapter_spec
@@ -41,8 +39,6 @@ OF_ALL = (
     mount_spec,
     counterweight_spec,
     sleeve_spec,
-    ring_cover_spec,
-    bracket_spec,
     tripod_foot_spec,
 )
 

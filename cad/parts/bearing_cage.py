@@ -35,15 +35,10 @@ from scanwright.cad.layout.direct.cage import (
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from scanwright.cad.layout.fits import OnSheet, printed_seat
 from scanwright.cad.layout.joints import ALL_SCREWS, screws
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE
-from scanwright.cad.parts.homing_bracket import bracket_threads
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
-from scanwright.cad.parts.ring_cover import cover_threads
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
-from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
@@ -63,7 +58,7 @@ def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     return PartSpec(
         name=BEARING_CAGE,
         turns=False,
-        make=partial(bearing_cage, p, cover_of(scanner, stack), bracket_of(scanner, stack)),
+        make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
         sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
     )
@@ -87,7 +82,7 @@ def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     )
 
 
-def bearing_cage(p: BearingCage, cover: RingCover | LeftOut, bracket: HomingBracket | LeftOut) -> cq.Solid:
+def bearing_cage(p: BearingCage) -> cq.Solid:
     """Make the bell.
 
     Raises:
@@ -119,7 +114,6 @@ def bearing_cage(p: BearingCage, cover: RingCover | LeftOut, bracket: HomingBrac
             middle, heads = (p.foot + p.high) / 2, stack.cage_inner + UNDER_CAGE_HEAD
             cuts.append(solids.radial(p.cage_hole / 2, azimuth, middle))
             cuts.append(solids.radial(CAGE_SCREW.head_room, azimuth, middle, heads))
-        cuts += cover_threads(cover, BEARING_CAGE) + bracket_threads(bracket, BEARING_CAGE)
         return checked(body.cut(*cuts).clean())
 
 

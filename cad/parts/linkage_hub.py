@@ -14,7 +14,6 @@ from scanwright.cad import outlines, solids
 from scanwright.cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 from scanwright.cad.layout.direct.loads import JOURNAL_WALL
 from scanwright.cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
-from scanwright.cad.parts.homing_bracket import flag_on_hub
 
 WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
@@ -30,8 +29,6 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
         hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
     if p.hub_tie is not None:
         hub = hub.fuse(tongue(p.hub_tie))
-    if p.flag is not None:
-        hub = hub.fuse(*flag_on_hub(p))
     return hub
 
 

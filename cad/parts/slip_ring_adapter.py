@@ -20,15 +20,10 @@ from scanwright.cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLA
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
 from scanwright.cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
 from scanwright.cad.parts.bearing_cage import cage_base
-from scanwright.cad.parts.homing_bracket import bracket_threads
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
-from scanwright.cad.parts.ring_cover import cover_threads
 from scanwright.cad.solids import building
-from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
@@ -44,12 +39,7 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(
-            slip_ring_adapter,
-            cage_of(scanner, stack) or adapter_of(scanner, stack),
-            cover_of(scanner, stack),
-            bracket_of(scanner, stack),
-        ),
+        make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
         step=Step(
             "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
         ),
@@ -57,9 +47,7 @@ def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
     )
 
 
-def slip_ring_adapter(
-    p: SlipRingAdapter | BearingCage, cover: RingCover | LeftOut, bracket: HomingBracket | LeftOut
-) -> cq.Solid:
+def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
     """Make the adapter: the fork, or the base of a cage, and the arms.
 
     Raises:
@@ -86,7 +74,6 @@ def slip_ring_adapter(
             solids.box((low, -99.0, tie - 3.0), (high, 99.0, tie + 3.0))
             for low, high in ((outer - 1.5, outer + 5.0), (-outer - 5.0, 1.5 - outer))
         ]
-        cuts += cover_threads(cover, SLIP_RING_ADAPTER) + bracket_threads(bracket, SLIP_RING_ADAPTER)
         return checked(body.cut(*cuts).clean())
 
 

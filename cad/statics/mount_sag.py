@@ -13,12 +13,12 @@ import numpy as np
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.drive import Mounted
-from scanwright.cad.layout.loads import STANDARD_GRAVITY
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
 from scanwright.cad.statics.sag import POISSON
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 
 EDGES = (12.0, 8.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell
@@ -78,7 +78,7 @@ def _on_grid(
     seats = (seats - centre) @ R
     at = elastic.places(model, seats)
     seats = seats[at.known]  # a foot narrower than the ring bears on what it has
-    down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY
+    down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY_M_S2
     lever = R.T @ (carried.centre_m * 1000 - centre)
     loads = elastic.weight(model, density * 1e-6 * down)
     loads += elastic.pull(model, at, shared(seats, carried.mass_kg * down, lever))

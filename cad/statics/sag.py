@@ -16,12 +16,12 @@ import numpy as np
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.loads import STANDARD_GRAVITY
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
 from scanwright.cad.statics.shaft import ShaftBend
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 
 EDGES = (8.0, 6.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell
@@ -70,7 +70,7 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
     end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
     turned, shifted = [], []
     for along in np.eye(3):
-        force = rotor.mass_kg * STANDARD_GRAVITY * along
+        force = rotor.mass_kg * STANDARD_GRAVITY_M_S2 * along
         moment = np.cross(rotor.centre_m - end, force)
         rotation = shaft.rotation_of(force, moment)
         turned.append(rotation)
@@ -102,7 +102,7 @@ def _on_grid(
     held = elastic.places(model, spigot @ R)
     points, on_seat = _seat(grid, body, seat)
     at = elastic.places(model, points[on_seat])
-    down = STANDARD_GRAVITY * R.T  # columns: gravity along each axis of the rotation frame, laser frame
+    down = STANDARD_GRAVITY_M_S2 * R.T  # columns: gravity along each axis of the rotation frame, laser frame
     loads = elastic.weight(model, density * 1e-6 * down)
     lever = lidar.centre_m * 1000
     loads += elastic.pull(model, at, shared(points[on_seat], lidar.mass_kg * down, lever))

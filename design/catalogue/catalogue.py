@@ -31,7 +31,6 @@ from scanwright.design.catalogue.products import (
     Provenance,
     Servo,
     SlipRing,
-    SlotSwitch,
 )
 from scanwright.design.errors import TaskError, suggest
 from scanwright.design.record import Fault, faults_of, read_toml, tell
@@ -47,7 +46,6 @@ KINDS: dict[str, type[Product]] = {
     "slip_ring": SlipRing,
     "bearing": Bearing,
     "belt": Belt,
-    "slot_switch": SlotSwitch,
     "printer": Printer,
     "multibeam": Multibeam,
 }

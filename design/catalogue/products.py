@@ -1,4 +1,4 @@
-"""What the catalogue holds: records of lidars, servos, slip rings, bearings, belts, switches, printers, 3D lidars.
+"""What the catalogue holds: records of lidars, servos, slip rings, bearings, belts, printers, 3D lidars.
 
 Lengths are millimetres, masses grams.
 """
@@ -364,34 +364,8 @@ class Multibeam(Product):
         return self
 
 
-class SlotSwitch(Product):
-    """A slotted optical switch with a flange across its slot. Its base at z = 0, slot up, flange along x; mm."""
-
-    kind: Literal["slot_switch"]
-    slot_mm: float = Field(gt=0, description="width of the slot, along x")
-    beam_height_mm: float = Field(gt=0, description="of the light over the base")
-    body_mm: Triple = Field(description="of the fork: along x, along y, and its height over the base")
-    flange_mm: Triple = Field(description="along x, along y, and its thickness")
-    hole_pitch_mm: float = Field(gt=0, description="of the two holes in the flange, along x")
-    screw: Literal["M2", "M2.5", "M3", "M4"]
-    supply_v: Pair
-    current_a: float = Field(gt=0)
-    output: str
-    connector: str | None = None
-    mass_g: float = Field(gt=0)
-    price_usd: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _fork_stands_on_the_flange(self) -> SlotSwitch:
-        if not self.slot_mm < self.body_mm[0] < self.hole_pitch_mm < self.flange_mm[0]:
-            raise ValueError("slot_mm, body_mm[0], hole_pitch_mm and flange_mm[0] do not rise")
-        if not self.flange_mm[2] < self.beam_height_mm < self.body_mm[2]:
-            raise ValueError("beam_height_mm is not between flange and top")
-        return self
-
-
 class Printer(Product):
-    """How a part is made, and what that costs in millimetres."""
+    """How a part is printed in plastic, and what that costs in millimetres."""
 
     kind: Literal["printer"]
     screw_clearance_mm: float = Field(ge=0, le=1)
@@ -406,7 +380,11 @@ class Printer(Product):
         default="cut", description="what screws that end in a part hold on to"
     )
 
-    @property
-    def plastic(self) -> bool:
-        """Whether its material creeps: no metal is as soft as 20 GPa, no unfilled plastic as stiff."""
-        return self.modulus_gpa < 20.0
+    @model_validator(mode="after")
+    def _prints_plastic(self) -> Printer:
+        if self.modulus_gpa >= 20.0:  # no metal is as soft, no unfilled plastic as stiff
+            raise ValueError(
+                f"modulus_gpa {self.modulus_gpa:g} is that of a metal: a printer prints plastic (below 20); have parts "
+                "milled or turned from their STEP files"
+            )
+        return self

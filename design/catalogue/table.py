@@ -7,17 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scanwright.design.catalogue.catalogue import KINDS
-from scanwright.design.catalogue.products import (
-    Bearing,
-    Belt,
-    Lidar,
-    Multibeam,
-    Printer,
-    Product,
-    Servo,
-    SlipRing,
-    SlotSwitch,
-)
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Multibeam, Printer, Product, Servo, SlipRing
 
 DOUBT = "?"
 FOOTNOTE = f"{DOUBT} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."
@@ -90,13 +80,6 @@ FIGURES: dict[type[Product], tuple[Figure, ...]] = {
         _of("pitch mm", "pitch_mm"),
         _of("width mm", "width_mm"),
         _of("tension N", "working_tension_n"),
-        MASS,
-        PRICE,
-    ),
-    SlotSwitch: (
-        _of("slot mm", "slot_mm"),
-        _of("beam mm", "beam_height_mm"),
-        _of("current mA", "current_a", 1000.0),
         MASS,
         PRICE,
     ),

@@ -58,7 +58,8 @@ def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Be
     Functions, arguments and results are pickled: functions of modules only. A process that has loaded `modules`, which
     it begins to do at once, is their mould; it stays for the next block unless this one fails, and loads nothing more.
     """
-    if cores() < 2 or multiprocessing.current_process().daemon:
+    can_mould = "forkserver" in multiprocessing.get_all_start_methods()  # Windows cannot
+    if cores() < 2 or not can_mould or multiprocessing.current_process().daemon:
         yield in_turn
         return
     context = multiprocessing.get_context("forkserver")
@@ -120,13 +121,15 @@ def ctrl_c_held_back() -> Iterator[None]:
     came: list[tuple[int, FrameType | None]] = []
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, lambda *told: came.append(told)) if main else None
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    masks = hasattr(signal, "pthread_sigmask")  # Windows has none
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
     try:
         yield
     finally:
         if main:
             signal.signal(signal.SIGINT, before)
-        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
         if came and callable(before):
             before(*came[0])
 

@@ -12,9 +12,9 @@ from numba import njit
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Ints
+from scanwright.design.sphere.shell_sort import sort_indices
 
 TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
-CROWD = 32  # places in one bucket, above which sorting within it would cost more than sorting all
 NO_LEVEL = 1 << 62
 
 
@@ -82,18 +82,7 @@ def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
         b = min(int(at[k] * n), n - 1)
         order[starts[b]] = k
         starts[b] += 1
-    gap = 1
-    while most > CROWD and gap < n // 3:  # Shell, Knuth's gaps: np.argsort would take longer to compile than the rest
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(gap, n):
-            k = order[i]
-            j = i - gap
-            while j >= 0 and at[order[j]] > at[k]:
-                order[j + gap] = order[j]
-                j -= gap
-            order[j + gap] = k
-        gap //= 3
+    sort_indices(at, order, n, most)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from scanwright.design.catalogue.products import Lidar, SlipRing, SlotSwitch, Ways
+from scanwright.design.catalogue.products import Lidar, SlipRing, Ways
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
 from scanwright.design.electrics.loads import (
     CHANGER,
@@ -30,13 +30,6 @@ DATA = {
 }
 PLUG = {"usb": "USB", "usb-powered": "USB", "ethernet": "Ethernet", "serial": "serial port"}
 SIGNALS = {"rs485": ("D+", "D-"), "ttl": ("DATA",)}
-HOMING = ("+", "-", "OUT")
-FLAG_SWITCH = "switch of the flag"
-COMPUTER_SIDE = {  # net at pins of the computer; the input pulls up to its own voltage
-    "5 V out": "5 V",
-    "0 V out": "0 V",
-    "input with pull-up": "home",
-}
 OWN = {"+": "red", "-": "black"}  # of the wires that a person cuts between the boxes of the supply
 OWN_SOURCE = "your own wires: red is +, black is -"
 USB = {"VBUS": "red", "D-": "white", "D+": "green", "GND": "black"}
@@ -50,8 +43,8 @@ CUT, WHOLE = "a cut cable", "its cable"
 CROSSED = {"TX": "RX", "RX": "TX"}  # what one side sends the other receives
 
 
-def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
-    """The wiring of one scanner, and of the switch that its homing flag passes, where it has one.
+def network_of(scanner: Scanner) -> Network:
+    """The wiring of one scanner.
 
     Raises:
         ValueError: a device draws more than any fuse of the table carries.
@@ -60,9 +53,9 @@ def network_of(scanner: Scanner, switch: SlotSwitch | None = None) -> Network:
     loads = loads_of(scanner)
     branches = [branch_of(number, load) for number, load in enumerate(loads, start=1)]
     circuits = () if ring is None else _circuits(ring, lidar)
-    wires = _wires(scanner, switch, loads, branches, circuits)
+    wires = _wires(scanner, loads, branches, circuits)
     return Network(
-        boxes=tuple(_boxes(scanner, switch, loads, branches, circuits)),
+        boxes=tuple(_boxes(scanner, loads, branches, circuits)),
         wires=tuple(wires),
         circuits=circuits,
         branches=tuple(branches),
@@ -120,7 +113,6 @@ def _feed(load: ElectricLoad) -> str:
 
 def _boxes(
     scanner: Scanner,
-    switch: SlotSwitch | None,
     loads: list[ElectricLoad],
     branches: list[Branch],
     circuits: tuple[Circuit, ...],
@@ -144,9 +136,8 @@ def _boxes(
             boxes.append(Box(f"{load.name} converter", title, size, ("in +", "in -"), ("out +", "out -"), 3))
     signals = SIGNALS[servo.bus or "ttl"]
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
-    homing = () if switch is None else tuple(COMPUTER_SIDE)
     boxes += [
-        Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug, *homing), 4),
+        Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug), 4),
         Box("adapter", "servo adapter", ("such as U2D2: data only",), ("USB",), (*signals, "GND"), 5),
         Box(
             "servo",
@@ -157,8 +148,6 @@ def _boxes(
             6,
         ),
     ]
-    if switch is not None:
-        boxes.append(Box(FLAG_SWITCH, switch.name, (switch.output,), (*HOMING, "L"), (), 6, ("L",)))
     data = _data(lidar)
     power = () if lidar.link == "usb-powered" else ("+", "-")
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
@@ -184,7 +173,6 @@ def _boxes(
 
 def _wires(
     scanner: Scanner,
-    switch: SlotSwitch | None,
     loads: list[ElectricLoad],
     branches: list[Branch],
     circuits: tuple[Circuit, ...],
@@ -223,10 +211,6 @@ def _wires(
     signals = SIGNALS[servo.bus or "ttl"]
     joined = {**{pin: pin for pin in signals}, "GND": "GND data"}
     wires += [Wire(("adapter", pin), ("servo", end), pin, 0.0, 0.0, note="servo cable") for pin, end in joined.items()]
-    if switch is not None:
-        for (pin, net), end in zip(COMPUTER_SIDE.items(), HOMING, strict=True):
-            amps = 0.0 if end == "OUT" else switch.current_a
-            wires.append(Wire(("computer", pin), (FLAG_SWITCH, end), net, amps, 0.0))
     peaks = dict(_nets(lidar))
     for net in (*_data(lidar), *_shield(lidar)):
         start = ("plug", _plug_pin(net))

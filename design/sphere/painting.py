@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from scanwright.design.arrays import Array, Mask
+from scanwright.design.sphere.shell_sort import sort_indices
 
 ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""
@@ -96,26 +97,6 @@ def values_at(directions: Array, rows: Array, tables: Array, background: float) 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sort(values: Array, n: int) -> None:
-    """Sort the first n values in place (Shell, Knuth's gaps): on nearly every circle they are few.
-
-    `np.sort` would take longer to compile than all the rest of this file.
-    """
-    gap = 1
-    while n > 32 and gap < n // 3:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(gap, n):
-            value = values[i]
-            j = i - gap
-            while j >= 0 and values[j] > value:
-                values[j + gap] = values[j]
-                j -= gap
-            values[j + gap] = value
-        gap //= 3
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -139,6 +120,7 @@ def circle_means(
     weights = np.zeros((len(frames), len(polar)))
     shares = np.zeros((len(frames), len(polar)))
     cuts = np.empty(2 * len(planes) + 1)
+    order = np.empty(len(cuts), np.int64)
     azimuth, across, along = np.empty(len(planes)), np.empty(len(planes)), np.empty(len(planes))
     for f in range(len(frames)):
         frame = frames[f]
@@ -161,14 +143,17 @@ def circle_means(
             if n == 0:
                 cuts[0] = 0.0
                 n = 1
-            _sort(cuts, n)
+            for j in range(n):
+                order[j] = j
+            sort_indices(cuts, order, n, n)
             weight, share = 0.0, 0.0
             for j in range(n):
-                after = cuts[j + 1] if j + 1 < n else cuts[0] + 2 * np.pi
-                arc = after - cuts[j]
+                before = cuts[order[j]]
+                after = cuts[order[j + 1]] if j + 1 < n else cuts[order[0]] + 2 * np.pi
+                arc = after - before
                 if arc <= 0.0:
                     continue
-                p = 0.5 * (cuts[j] + after)
+                p = 0.5 * (before + after)
                 u, v = st * np.cos(p), st * np.sin(p)
                 x = u * frame[0, 0] + v * frame[1, 0] + ct * frame[2, 0]
                 y = u * frame[0, 1] + v * frame[1, 1] + ct * frame[2, 1]

@@ -15,7 +15,6 @@ from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 from scanwright.firmware_io.servo.dynamixel.tables import TABLES as DYNAMIXEL_TABLES
 from scanwright.firmware_io.servo.feetech.tables import TABLES as FEETECH_TABLES
-from scanwright.firmware_io.servo.tmcl.tables import TABLES as TMCL_TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +51,6 @@ FAMILIES = (
         FEETECH_TABLES,
         (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400),
         "scanwright.firmware_io.twins.servo.feetech_machine:FeetechMachine",
-    ),
-    ServoFamily(
-        "Trinamic",
-        TMCL_TABLES,
-        (1_000_000, 9600, 115_200, 57_600, 38_400, 19_200, 500_000, 250_000, 230_400, 76_800, 28_800, 14_400),
-        "scanwright.firmware_io.twins.servo.tmcl.machine:TmclMachine",
     ),
 )
 

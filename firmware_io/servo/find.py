@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Literal
 
-from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError, removal
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 from scanwright.firmware_io.servo.bus.registers import ControlTable
@@ -47,8 +47,8 @@ def find_servo(
         DeviceError: none answers, several do, or it is another model.
     """
     if model is not None and model not in {table.model for table in all_tables()}:
-        known = ", ".join(sorted({table.model for table in all_tables()}))
-        raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; known: {known}")
+        known = f"known: {', '.join(sorted({table.model for table in all_tables()}))}"
+        raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; {removal(model) or known}")
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
     met: set[str] = set()
@@ -86,7 +86,7 @@ def find_servo(
 
 def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
     level = table.status_return
-    if level is None or not table.can_be_mute:
+    if not table.can_be_mute:
         return False
     return unmute == "for good" or (unmute == "until power-off" and not table.is_kept(level))
 

@@ -62,10 +62,9 @@ def needed_settings(table: ControlTable, *, spins: bool | None) -> list[tuple[Se
         table: of the servo.
         spins: whether it must turn continuously (True) or go to angles (False); None if that is not known yet.
     """
-    level = () if table.status_return is None else ((table.status_return, table.answers_all),)
     mode = () if spins is None else table.mode(spins=spins)
     return [
-        *((setting, _ANSWERS_LESS) for setting in level),
+        ((table.status_return, table.answers_all), _ANSWERS_LESS),
         *((setting, _NEUTRAL) for setting in table.neutral),
         *((setting, _MODE[bool(spins)]) for setting in mode),
     ]
@@ -89,7 +88,7 @@ def needed_changes(unit: ServoUnit, *, spins: bool | None) -> list[SettingChange
     A servo that was mute and was made to answer has that change first: it was made, and must be kept and undone.
     """
     level = unit.table.status_return
-    muted = [SettingChange(level, 0, unit.table.answers_all, _MUTE)] if unit.was_mute and level else []
+    muted = [SettingChange(level, 0, unit.table.answers_all, _MUTE)] if unit.was_mute else []
     return muted + _differing(unit, needed_settings(unit.table, spins=spins))
 
 
@@ -107,14 +106,13 @@ def unfit_settings(unit: ServoUnit, *, spins: bool | None = None) -> list[Settin
 
 def mute_servo(port: str, table: ControlTable, servo_id: int) -> ServoSetupError:
     """The error of a servo that answers nothing but pings, and keeps that without power."""
-    assert table.status_return is not None
     return ServoSetupError(port, None, servo_id, [SettingChange(table.status_return, 0, table.answers_all, _MUTE)])
 
 
 def settable(table: ControlTable) -> dict[str, Register]:
     """The registers that a set-up may write, and the number of the servo, by their names."""
     registers = [
-        *([table.status_return] if table.status_return else []),
+        table.status_return,
         table.return_delay_ns,
         table.baud,
         table.id,
@@ -145,7 +143,7 @@ def _differing(unit: ServoUnit, needed: list[tuple[Setting, str]]) -> list[Setti
 
 def _reading_s(table: ControlTable, baud: int) -> float:
     """How long the bytes of one reading take."""
-    return sum(table.packets.overhead + register.size for register in table.present) * 10 / baud
+    return (table.packets.overhead + table.present.size) * 10 / baud
 
 
 def _slow(unit: ServoUnit) -> Iterator[SettingChange]:

@@ -33,7 +33,7 @@ def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) ->
         DeviceError: the servo does not answer, or does not keep a setting.
     """
     table, bus = unit.table, unit.bus
-    if table.status_return and not table.is_kept(table.status_return):
+    if not table.is_kept(table.status_return):
         unit.answer_everything()
     _torque_off(unit)
     changes = needed_changes(unit, spins=spins)
@@ -79,7 +79,7 @@ def _torque_off(unit: ServoUnit) -> None:
         DeviceError: it stays on.
     """
     level, torque = unit.table.status_return, unit.table.torque
-    if level is None or unit.count(level) == unit.table.answers_all:
+    if unit.count(level) == unit.table.answers_all:
         unit.write(torque, 0)
         return
     unit.bus.write_unanswered(unit.id, torque, torque.encode(0))
@@ -91,8 +91,6 @@ def _torque_off(unit: ServoUnit) -> None:
 def _recover(unit: ServoUnit) -> None:
     """Clear a shutdown: by the torque limit, which it lowers, or by a restart if there is no such register."""
     table = unit.table
-    if table.alarms:  # reading them has cleared them
-        return
     if table.torque_limit and table.max_torque:
         unit.bus.write(unit.id, table.torque_limit, unit.read(table.max_torque).data)
         return

@@ -20,8 +20,8 @@ class ServoState:
         time_bound_ns: it was sampled within this of `time_ns`.
         position_rad: turns are counted; counter-clockwise as one looks at the horn, 0 at the encoder's centre.
             NaN in the AX-12A's dead sector.
-        velocity_rad_s: NaN in the AX-12A's wheel mode, where it measures none; of a stepper that of its steps.
-        load: fraction of the rated torque, positive counter-clockwise; NaN of a stepper, which measures none.
+        velocity_rad_s: NaN in the AX-12A's wheel mode, where it measures none.
+        load: fraction of the rated torque, positive counter-clockwise.
         voltage_V: of the supply.
         temperature_degC: inside.
     """

@@ -8,7 +8,7 @@ if the caller names a folder for the file that undoes them. While the servo turn
 turns are counted from what is read, and a servo that nobody listens to is stopped (by the guard process, and by the bus
 watchdog where the servo has one).
 
-What nobody can help: a servo without a watchdog (protocol 1.0, STS, TMCL) that spins goes on when its bus is cut.
+What nobody can help: a servo without a watchdog (protocol 1.0, STS) that spins goes on when its bus is cut.
 """
 
 from __future__ import annotations
@@ -197,8 +197,7 @@ class ServoDriver:
         if isinstance(progress, Stall):
             if not self._unit.has_torque():
                 self._fault(f"it has restarted by itself, {state.voltage_V:.1f} V now: {_ADVICE['voltage']}")
-            load = "" if math.isnan(state.load) else f", load {state.load:.0%}"
-            self._fault(f"{progress}{load}: {_ADVICE['overload']}")
+            self._fault(f"{progress}, load {state.load:.0%}: {_ADVICE['overload']}")
         if progress is None:
             self._rest()
         return progress
@@ -239,19 +238,13 @@ class ServoDriver:
             return
         self._stop()
         set_agreed(self._unit, mode_changes(self._unit, spins=spins), self._undo_folder)
-        if table.counters:
-            self._unit.write(table.wheel_speed, 0.0)  # steps that went on without torque, too
-        for counter in table.counters:
-            self._unit.write(counter, self._here())
         if spins:
             self._unit.write(table.wheel_speed, 0.0)
         else:
             self._unit.write(table.joint_speed, _GENTLE_RAD_S)
             self._unit.write(table.goal, self._here())
             self._known = None
-        self._unit.write(table.torque, table.torque_on)
-        if table.driven:
-            self._unit.write(table.driven, 1)
+        self._unit.write(table.torque, 1)
         self._spins = spins
 
     def _watch(self) -> None:

@@ -89,8 +89,8 @@ def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder
     try:
         file = keep_settings(undo_folder, unit, [(one.register, one.now, one.needed) for one in changes])
     except DeviceError:
-        if unit.was_mute and (level := unit.table.status_return):  # it had to answer before its model was known
-            unit.set_answers(level, 0)
+        if unit.was_mute:  # it had to answer before its model was known
+            unit.set_answers(unit.table.status_return, 0)
         raise
     yield file
     for change in changes:

@@ -74,7 +74,7 @@ class HornMotion:
             t = max((time_ns - self._origin_ns) / 1e9, self._drives[-1][0])
             state = self._states(np.array([t]))[:, 0]
             last_s, last, start, _ = self._drives[-1]
-            walking = last.mode == drive.mode and drive.mode in ("position", "steps")
+            walking = last.mode == drive.mode == "position"
             setpoint = walked_rad(t - last_s, start, last.goal, last.rate_rad_s) if walking else float(state[2])
             if drive.mode != "velocity" or last.mode != "velocity":
                 state[4] = drive.goal / self._plant.no_load_rad_s if drive.mode == "velocity" else 0.0
@@ -111,7 +111,8 @@ class HornMotion:
             start_s, drive, start, _ = self._drives[
                 bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1
             ]
-        duty, torque = effort(self._plant, drive, walked_rad(t - start_s, start, drive.goal, drive.rate_rad_s), *state)
+        setpoint = walked_rad(t - start_s, start, drive.goal, drive.rate_rad_s)
+        duty, torque = effort(self._plant, drive, setpoint, *state[[1, 2, 4, 5]])
         return Motion(float(state[2]), float(state[3]), duty, torque)
 
     def _index(self, t: float) -> int:

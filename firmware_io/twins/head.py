@@ -14,7 +14,7 @@ from scanwright.design.arrays import Rotation, Vector
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.twins.servo_plant import Load
 
-_GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
+_GRAVITY_M_S2 = np.array([0.0, 0.0, -frames.STANDARD_GRAVITY_M_S2])
 
 
 def read_load(out: Path, angles: AngleSet) -> Load:

@@ -6,24 +6,22 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from pkgutil import resolve_name
 
 import numpy as np
 
-from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import SceneError
 from scanwright.design.motion import Spin
-from scanwright.design.scene.ray_caster import Scene, build_scene, cast, load_scene
+from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.device_ports import Ports
 from scanwright.firmware_io.lidar.families import family_of
 from scanwright.firmware_io.twins.lidar_line import LidarLine
 from scanwright.firmware_io.twins.servo.twin import ServoTwin
 from scanwright.firmware_io.twins.servo_plant import Load
-from scanwright.firmware_io.twins.world import furnished_room, looking, range_model, rays
+from scanwright.firmware_io.twins.world import looking, range_model, rays
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +31,6 @@ class EmulatedScanner:
     ports: Ports
     lidar: LidarLine
     servo: ServoTwin
-
-
-def room(mesh: Path | None, unit_m: float = 1.0, at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
-    """The scene of a mesh, or of the furnished room; the scanner's world frame stands at `at_m` in it.
-
-    Raises:
-        SceneError: the mesh cannot be used.
-    """
-    if mesh is None:
-        return build_scene(furnished_room() - np.array(at_m))
-    return load_scene(mesh, unit_m, frames.rigid(np.eye(3), -np.array(at_m)))
 
 
 @contextmanager

@@ -26,10 +26,8 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
 from scanwright.firmware_io.servo.bus.registers import RPM
 
-Mode = Literal["off", "share", "velocity", "position", "steps"]
+Mode = Literal["off", "share", "velocity", "position"]
 _PLASTIC_TEETH = ("AX-12A", "XL330-M288", "XL430-W250")
-_STEPPERS = ("PD42-3-1140",)
-_POLES = 50  # of a rotor with 200 steps a turn: torque comes from where it stands beside the field, four steps around
 _SLOW_RAD_S = 1e-4  # below it Coulomb friction fades, so that it has a slope a solver can follow
 
 
@@ -68,8 +66,6 @@ class Plant:
         position_p: duty per rad of position error.
         margin_rad: position error that the loop ignores.
         punch: least duty beyond the margin.
-        coasting_rad_s: rate at which what a rotor loses without current would take its stall torque; infinite where
-            friction is all.
     """
 
     stall_torque_nm: float
@@ -85,15 +81,12 @@ class Plant:
     position_p: float
     margin_rad: float
     punch: float
-    coasting_rad_s: float = math.inf
 
 
 def plant_of(model: str) -> Plant:
     """The plant of a model: torque, speed and play from its maker, loop gains from its control table's defaults."""
     ax = model == "AX-12A"
     servo = load_catalogue().get(model, Servo)
-    if model in _STEPPERS:
-        return _stepper(servo.stall_torque_nm)
     no_load_rad_s, play_deg = servo.no_load_rpm * RPM, servo.backlash_deg
     if play_deg is None:
         play_deg = 0.5 if ax else 0.333  # assumed
@@ -117,38 +110,13 @@ def plant_of(model: str) -> Plant:
     )
 
 
-def _stepper(holding_nm: float) -> Plant:
-    """A stepper that turns its horn itself; no loop knows of its angle.
-
-    Assumed: rotor and hub of 500 g cm2, more than they have, so that a solver need not follow what nobody sees; eddies
-    that would take all the torque at 200 rpm, with current or without, and no friction beside them; a shaft of
-    100 Nm/rad.
-    """
-    return Plant(
-        stall_torque_nm=holding_nm,
-        no_load_rad_s=200 * RPM,
-        coasting_rad_s=200 * RPM,
-        inertia_kg_m2=5e-5,
-        friction_nm=0.0,
-        backlash_rad=0.0,
-        stiffness_nm_rad=100.0,
-        impact_s_rad=0.0,
-        sensor_lag_s=0.004,
-        velocity_p=0.0,
-        velocity_i=0.0,
-        position_p=0.0,
-        margin_rad=0.0,
-        punch=0.0,
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Actuation:
     """What acts on the plant from one moment on.
 
     Attributes:
-        mode: motor open, share of the supply, velocity or position loop, or the steps of a stepper.
-        goal: nothing, a duty in -1..1, rad/s or rad; infinite for steps without end.
+        mode: motor open, share of the supply, velocity or position loop.
+        goal: nothing, a duty in -1..1, rad/s or rad.
         rate_rad_s: at which the goal position is walked to.
         supply: voltage as a fraction of the rated one.
         torque_limit: largest duty.
@@ -180,10 +148,8 @@ def effort(
     plant: Plant,
     drive: Actuation,
     setpoint: float,
-    m: float,
     m_rate: float,
     h: float,
-    h_rate: float,
     i: float,
     seen: float,
 ) -> tuple[float, float]:
@@ -193,20 +159,14 @@ def effort(
         plant: the servo.
         drive: what acts.
         setpoint: goal of a position loop, where it has walked to [rad].
-        m: motor angle, and what follows, as the states of `equations`.
-        m_rate: its rate.
+        m_rate: rate of the motor, and what follows, as the states of `equations`.
         h: horn angle.
-        h_rate: its rate.
         i: integral of the velocity loop.
         seen: angle that the loop knows.
     """
-    del h_rate
     if drive.mode == "off":
-        return 0.0, -m_rate / plant.coasting_rad_s
-    asked = math.sin(_POLES * (setpoint - m)) if drive.mode == "steps" else _asked(plant, drive, setpoint, h, i, seen)
-    if drive.mode == "steps":  # the current makes the field weaker, it does not cut its top off
-        asked *= drive.torque_limit
-    duty = max(-drive.torque_limit, min(drive.torque_limit, asked))
+        return 0.0, 0.0
+    duty = max(-drive.torque_limit, min(drive.torque_limit, _asked(plant, drive, setpoint, h, i, seen)))
     return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
 
 
@@ -230,7 +190,7 @@ def equations(
     def rhs(t: float, y: Floats) -> list[float]:
         m, m_rate, h, h_rate, i, seen = y.tolist()
         duty, torque = effort(
-            plant, drive, walked_rad(t - start_s, setpoint, drive.goal, drive.rate_rad_s), m, m_rate, h, h_rate, i, seen
+            plant, drive, walked_rad(t - start_s, setpoint, drive.goal, drive.rate_rad_s), m_rate, h, i, seen
         )
         twist = m - h
         bite = twist - half if twist > half else twist + half if twist < -half else 0.0

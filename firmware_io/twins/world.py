@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import trimesh
 from jaxtyping import Float64
 from numpy import ndarray
 
+from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import TaskError
-from scanwright.design.scene.ray_caster import Hits, Scene, cast
+from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, load_scene
 
 _MOST_NOISE_MM = 1e5
 _WANDER = 0.01
@@ -148,3 +150,14 @@ def furnished_room() -> Float64[ndarray, "triangles 3 3"]:
         [[0.4, -0.4, 1.6], [1.6, 0.4, 1.9]],  # lamp
     ]
     return np.concatenate([trimesh.creation.box(bounds=bounds).triangles for bounds in [room, *furniture]])
+
+
+def room(mesh: Path | None, unit_m: float = 1.0, at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
+    """The scene of a mesh, or of the furnished room; the scanner's world frame stands at `at_m` in it.
+
+    Raises:
+        SceneError: the mesh cannot be used.
+    """
+    if mesh is None:
+        return build_scene(furnished_room() - np.array(at_m))
+    return load_scene(mesh, unit_m, frames.rigid(np.eye(3), -np.array(at_m)))

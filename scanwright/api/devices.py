@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
 from scanwright.api.recordings import assemble
+from scanwright.firmware_io.posix import require_posix
 
 if TYPE_CHECKING:
     from scanwright.firmware_io.assembly.assemble import AssembleSummary
@@ -40,6 +41,7 @@ def open_servo(
         ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
     """
+    require_posix()
     from scanwright.firmware_io.servo.servo import open_servo
 
     folder = None if undo_folder is None else Path(undo_folder)
@@ -71,6 +73,7 @@ def set_up_servo(
     Raises:
         DeviceError: no such servo, its torque is on, a setting does not stay, or the file cannot be written.
     """
+    require_posix()
     from scanwright.firmware_io.servo.settings import set_up
 
     undo: Path | None = None
@@ -92,6 +95,7 @@ def open_lidar(address: str, model: str | None = None) -> LidarDriver:
     Raises:
         DeviceError: no such port, it is in use, or what answers is no sensor that is known.
     """
+    require_posix()
     from scanwright.firmware_io.lidar.families import open_lidar
 
     return open_lidar(address, model)
@@ -140,6 +144,7 @@ def scan(
         ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
             stopped then, and what was recorded is whole.
     """
+    require_posix()
     from scanwright.firmware_io.scan.acquire import acquire
     from scanwright.firmware_io.scan.plan import plan_scan
 
@@ -183,8 +188,8 @@ def simulate(
         TaskError: the sensor is not in the catalogue.
         DeviceError: the angle set does not say how the servo moves.
     """
-    from scanwright.firmware_io.twins.scanner import room
     from scanwright.firmware_io.twins.simulated import simulated_recording
+    from scanwright.firmware_io.twins.world import room
 
     place = room(None if scene is None else Path(scene))
     return simulated_recording(as_angle_set(angles), place, turns=turns, sigma_mm=noise_mm, seed=seed)

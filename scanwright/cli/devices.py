@@ -15,6 +15,7 @@ from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain,
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
 from scanwright.design.errors import DeviceError, ScanwrightError, notes_of, require
+from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.scan.plan import ScanPlan
     from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
-app = Commands("Devices")
+app = Commands("Devices", first=require_posix)
 
 
 class StampAt(Enum):
@@ -85,7 +86,8 @@ def emulate(
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
     from scanwright.firmware_io.twins.head import read_load
-    from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+    from scanwright.firmware_io.twins.scanner import emulated_scanner
+    from scanwright.firmware_io.twins.world import room
 
     angles = load_angles(out / "angles.json")
     place = room(scene, unit_m, at)

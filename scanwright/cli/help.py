@@ -20,18 +20,18 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Every step on it
 
 
 class Commands(typer.Typer):
-    """A group of commands with a title; each of them gets `-q` and `-v`."""
+    """A group of commands with a title; each of them gets `-q` and `-v`, and calls `first` before anything else."""
 
-    def __init__(self, title: str = "") -> None:
+    def __init__(self, title: str = "", first: Callable[[], None] = lambda: None) -> None:
         super().__init__(rich_markup_mode=None, pretty_exceptions_enable=False)
-        self.title = title
+        self.title, self.first = title, first
 
     def command(self, name: str | None = None, **options: Any) -> Callable[[F], F]:
         """As typer's own."""
         register = super().command(name, rich_help_panel=self.title, **options)
 
         def registered(function: F) -> F:
-            register(_with_voice(function))
+            register(_with_voice(function, self.first))
             return function
 
         return registered
@@ -59,13 +59,14 @@ def first_sentence(command: Any) -> str:
     return re.split(r"\.(?: (?=[A-Z])|$)", paragraph, maxsplit=1)[0]
 
 
-def _with_voice(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function with `quiet` and `verbose`, which it does not see."""
+def _with_voice(function: Callable[..., Any], first: Callable[[], None]) -> Callable[..., Any]:
+    """The function with `quiet` and `verbose`, which it does not see; it runs after `first`."""
 
     @wraps(function)
     def spoken(*args: Any, quiet: bool = False, verbose: bool = False, **kwargs: Any) -> Any:
         if quiet or verbose:
             set_voice(Voice.QUIET if quiet else Voice.VERBOSE)
+        first()
         return function(*args, **kwargs)
 
     signature = inspect.signature(function, eval_str=True)

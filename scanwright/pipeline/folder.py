@@ -8,18 +8,23 @@ the folder may hold links: `_refuse_what_is_in_the_way` checks each name before 
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 from scanwright.design.atomic_file import place_in
 from scanwright.design.concurrency.processes import ctrl_c_held_back
 from scanwright.design.errors import BuildError
 from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 
 @contextmanager
@@ -95,19 +100,36 @@ def _alone(target: Path) -> Iterator[None]:
         BuildError: another process holds it.
     """
     path = target.with_name(f".{target.name}.lock")
-    with _told_of(target):
-        lock = path.open("a+", encoding="utf-8")
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise BuildError(f"{target}: another build of this folder is at work: wait for it") from None
+    with _locked(path, target) as lock:
         if not path.exists() or path.stat().st_ino != os.fstat(lock.fileno()).st_ino:  # its holder has just ended
             raise BuildError(f"{target}: another build of this folder has just ended: build again")
         try:
             yield
         finally:
+            if fcntl is None:
+                lock.close()  # Windows removes no open file
             path.unlink(missing_ok=True)
+
+
+def _locked(path: Path, target: Path) -> TextIO:
+    """Open the lock file and lock it; if the system has no `flock`, the file alone is the lock.
+
+    Raises:
+        BuildError: another process holds it.
+    """
+    busy = f"{target}: another build of this folder is at work: wait for it"
+    with _told_of(target):
+        try:
+            lock = path.open("x" if fcntl is None else "a+", encoding="utf-8")
+        except FileExistsError:
+            raise BuildError(f"{busy}; if that build was killed, remove {path}") from None
+    try:
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.close()
+        raise BuildError(busy) from None
+    return lock
 
 
 def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterable[str]) -> None:

@@ -15,12 +15,12 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
 from scanwright.design.errors import BuildError, TaskError
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
 from scanwright.design.task.shapes import LEAST_M, MOST_M
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
 
-GRAVITY_M_S2 = 9.81
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
 
 ANGLES = r"""
@@ -115,7 +115,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
     """Refuse a lidar whose weight alone, its middle off a level axis, asks more of the servo than it gives all day."""
     off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
-    needed = lidar.mass_g / 1000 * GRAVITY_M_S2 * off_m
+    needed = lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * off_m
     if needed > servo.lasting_torque_nm:
         raise TaskError(
             f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "

@@ -13,13 +13,12 @@ from math import exp
 import numpy as np
 
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing, SlotSwitch
+from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem
-from scanwright.design.scanner import HOMING_SWITCH
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
@@ -29,7 +28,7 @@ ANYBODY = "candidate"  # the name of a task changes nothing
 BOUNDED = ("log", "required", "worst")  # objectives that fewer beams can only make worse
 PARTS_DECIDE = {"load_margin": np.inf, "hidden_fraction": 0.0, "deflection_deg": 0.0}
 
-Bought = Lidar | Servo | SlipRing | Bearing | Belt | SlotSwitch
+Bought = Lidar | Servo | SlipRing | Bearing | Belt
 
 
 def search_record(loaded: LoadedTask) -> LoadedTask:
@@ -45,8 +44,6 @@ def record_digest(loaded: LoadedTask) -> str:
     """Of all that decides the result of a record, bearings and belts included, and the name not."""
     nameless = replace(loaded, task=loaded.task.model_copy(update={"name": ANYBODY}))
     choice: tuple[Product, ...] = (*loaded.products.bearings(), *loaded.products.belts())
-    if loaded.task.modules.homing_flag and HOMING_SWITCH in loaded.products.products:  # a search needs none
-        choice = (*choice, loaded.products.products[HOMING_SWITCH])
     chosen_from = "\n".join(product.model_dump_json() for product in choice)
     return hashlib.sha256(f"{nameless.sha256()}\n{chosen_from}".encode()).hexdigest()
 

@@ -7,7 +7,6 @@ whose worker dies is asked for again, `TRIES` times in all; what fails then is t
 from __future__ import annotations
 
 import multiprocessing
-import resource
 import signal
 import threading
 import time
@@ -19,6 +18,11 @@ from typing import Any
 
 from scanwright.design.errors import BuildError, ScanwrightError
 from scanwright.study.results import Result, Results, program
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
 
 TRIES = 3
 TICK_S = 5.0  # between two words on a long silence
@@ -41,7 +45,7 @@ class Done:
     Attributes:
         result: of the unit.
         seconds: it took, None where the result was there.
-        memory_mb: the most that the worker has ever had.
+        memory_mb: the most that the worker has ever had; 0 if the system does not tell.
         kept: whether the result is in the results folder.
     """
 
@@ -191,11 +195,12 @@ def _limited(limit_s: float) -> Iterator[None]:
 
 def _set_alarm() -> None:
     left_s = max(1e-3, min(_deadlines.values()) - time.monotonic()) if _deadlines else 0.0  # 0: no alarm
-    signal.setitimer(signal.ITIMER_REAL, left_s)
+    if hasattr(signal, "setitimer"):  # Windows has no alarms, and so no limit
+        signal.setitimer(signal.ITIMER_REAL, left_s)
 
 
 def _memory_mb() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return 0.0 if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _reason(error: Exception, limit_s: float) -> str:

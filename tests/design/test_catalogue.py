@@ -61,11 +61,10 @@ def test_all_products_of_the_issue_are_there(shipped):
             "XH430-W350",
             "XM540-W270",
             "STS3215",
-            "PD42-3-1140",
         ),
     }
     assert by_kind[SlipRing] == {"UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"}
-    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla", "cnc"}
+    assert by_kind[Printer] == {"fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

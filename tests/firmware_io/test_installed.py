@@ -16,8 +16,9 @@ from scanwright.firmware_io.lidar import families as lidar_families
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.servo import families as servo_families
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import emulated_scanner
 from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.world import room
 
 # Ten turns a second of four beams, one line of text each: "range range range range" in millimetres.
 LIDAR = """

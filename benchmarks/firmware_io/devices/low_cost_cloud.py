@@ -29,7 +29,8 @@ from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.scan.acquire import acquire
 from scanwright.firmware_io.scan.plan import plan_scan
-from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import emulated_scanner
+from scanwright.firmware_io.twins.world import room
 
 _ASIDE_RAD = math.radians(0.5)
 _LEAST_M = 1e-6

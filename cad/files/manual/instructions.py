@@ -83,7 +83,7 @@ def instructions_text(
         lines += [_words(assembly, scene), ""]
         if scene.step.check:
             lines += [f"Before you go on: {scene.step.check}.", ""]
-    network = network_of(scanner, assembly.layout.drive.switch)
+    network = network_of(scanner)
     lines += [
         f"## {len(scenes) + 1}. {LOOK}",
         "",

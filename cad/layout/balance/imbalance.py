@@ -9,8 +9,9 @@ import numpy as np
 from scanwright.cad.layout.balance.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
-from scanwright.cad.layout.loads import FAR_MM, STANDARD_GRAVITY, tilt_sine
+from scanwright.cad.layout.loads import FAR_MM, tilt_sine
 from scanwright.design.arrays import Array
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.motion import Sweep
 from scanwright.design.scanner import Scanner
 
@@ -51,7 +52,7 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:
 
 def torque_nm(scanner: Scanner, moment: float) -> float:
     """Largest torque of gravity about the axis, over a whole turn, for an imbalance [g mm]."""
-    return moment * 1e-6 * STANDARD_GRAVITY * tilt_sine(scanner)
+    return moment * 1e-6 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner)
 
 
 def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:

@@ -17,7 +17,6 @@ from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.envelope import Box, box_corners, envelope_of
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.linkage import neck_corners
-from scanwright.cad.layout.modules.homing_flag import ARM_HIGH, VANE, VANE_HALF, Flag
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.products import Lidar
@@ -107,8 +106,6 @@ def room_of(layout: Layout) -> RotorRoom:
     corners += [tie.corners(tie.inner) @ R.T for tie in p.plate_ties]
     if p.hub_tie is not None:
         corners.append(p.hub_tie.corners(stack.hub_radius))
-    if p.flag is not None:
-        corners.append(_arm(p.flag))
     if isinstance(layout.counterweight, Counterweight):
         corners.extend(_bar(layout.counterweight))
     bearings = layout.scanner.lidar.bearings_rad()
@@ -138,12 +135,6 @@ def _stubs(lidar: Lidar) -> list[Box]:
     return [
         ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
     ]
-
-
-def _arm(flag: Flag) -> Array:
-    """Corners of the room of a homing flag over all that stands still."""
-    box: Box = ((0.0, -VANE_HALF, flag.base), (flag.radius + VANE, VANE_HALF, flag.base + ARM_HIGH))
-    return _turned(box_corners(box), flag.azimuth)
 
 
 def _turned(corners: Array, azimuth: float) -> Array:

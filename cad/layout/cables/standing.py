@@ -22,7 +22,6 @@ from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.direct.stack import STATOR_EXIT
 from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.design.arrays import Array
 
@@ -115,9 +114,7 @@ def _leaving(layout: Layout) -> Iterator[Leaving]:
     else:
         # by a window of the cage, or between the arms of the adapter
         z, start = stack.ring_bottom + STATOR_EXIT, stack.ring_radius + 0.2
-        cover = cover_of(layout.scanner, stack)
         out_of = max(stack.ring_radius, 0.0 if stack.bearing is None else stack.cage_outer)
-        out_of = max(out_of, cover.outer) if isinstance(cover, RingCover) else out_of
         places = tuple((np.array([0.0, side * start, z]), np.array([0.0, side, 0.0])) for side in (-1.0, 1.0))
         yield Leaving(STATOR_LEADS, ring.name, wide, radius, places, out_of - start, stiff=True)
 

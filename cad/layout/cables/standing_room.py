@@ -28,8 +28,6 @@ from scanwright.cad.layout.direct.cage import SEAT_GAP, plate_half_x
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
-from scanwright.cad.layout.modules.ring_cover import RingCover, cover_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array, Mask
 
@@ -95,14 +93,6 @@ def _direct(layout: Layout, stack: DirectStack) -> Iterator[Array]:
         yield around_axis(stack.ring_radius, stack.ring_bottom, stack.ring_top)
         yield box_corners(((-outer, -adapter.ARM_HALF_WIDTH, front), (outer, adapter.ARM_HALF_WIDTH, stack.ring_top)))
         yield box_corners(((-outer, y0, front), (outer, adapter.ARM_HALF_WIDTH, front + adapter.PLATE)))
-    cover = cover_of(layout.scanner, stack)
-    if isinstance(cover, RingCover):
-        yield around_axis(cover.outer, cover.low, cover.high)
-    bracket = bracket_of(layout.scanner, stack)
-    if isinstance(bracket, HomingBracket):
-        box = box_corners(((bracket.face, -10.0, bracket.low), (bracket.outer, 10.0, bracket.top)))
-        c, s = np.cos(bracket.azimuth), np.sin(bracket.azimuth)
-        yield box @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _belt(stack: BeltStack) -> Iterator[Array]:

@@ -10,7 +10,6 @@ from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
-from scanwright.cad.layout.modules.homing_flag import HomingBracket, bracket_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.products import Servo
 from scanwright.design.errors import BuildError
@@ -29,8 +28,6 @@ BUILT = (
     names.RING,
     names.JOURNAL_SLEEVE,
     names.BEARING_CAGE,
-    names.RING_COVER,
-    names.HOMING_BRACKET,
     names.STANDING_LEADS,
     names.LIDAR,
     names.SUB_PLATE,
@@ -49,9 +46,6 @@ STACKED = (
     names.BEARING_CAGE,
     names.BEARING,
     names.JOURNAL_SLEEVE,
-    names.RING_COVER,
-    names.HOMING_BRACKET,
-    names.SWITCH,
     names.ALIGNMENT_LINKAGE,
 )
 ADAPTER_ARMS = 8.0  # beyond the ring
@@ -76,15 +70,11 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
         top = stack.bearing_top
         bearing = Rod(stack.bearing.outer_mm / 2, top - stack.bearing.width_mm, top)
         masses.append(Mass(names.BEARING, stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
-    bracket = bracket_of(scanner, stack)
-    switches = () if isinstance(bracket, LeftOut) else (bracket.switch,)
-    if isinstance(bracket, HomingBracket):
-        masses.append(Mass(names.SWITCH, bracket.switch.mass_g, bracket.switch_room()))
     return DriveLayout(
         stack=stack,
         shaft=stack.shaft,
-        products=(*(() if stack.bearing is None else (stack.bearing,)), *switches),
-        mounted=_mounted(scanner.servo, stack, bracket),
+        products=() if stack.bearing is None else (stack.bearing,),
+        mounted=_mounted(scanner.servo, stack),
         masses=tuple(masses),
         shapes=(case, *rods),
         built=BUILT,
@@ -104,7 +94,7 @@ def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
         yield "two-component epoxy, slow", "bearing in its printed seat"
 
 
-def _mounted(servo: Servo, stack: DirectStack, bracket: HomingBracket | LeftOut) -> Mounted:
+def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
     """The servo's case.
 
     Raises:
@@ -121,9 +111,6 @@ def _mounted(servo: Servo, stack: DirectStack, bracket: HomingBracket | LeftOut)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
-    discs = [(around, stack.horn), (around, top)]
-    if isinstance(bracket, HomingBracket):
-        discs += [(bracket.outer, bracket.low), (bracket.outer, bracket.top)]
     return Mounted(
         onto=names.SERVO_CASE,
         rear=stack.horn + servo.case_min_mm[2],
@@ -131,7 +118,7 @@ def _mounted(servo: Servo, stack: DirectStack, bracket: HomingBracket | LeftOut)
         screw=SCREWS[servo.case_screw],
         holes=_corner_holes(holes),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
-        discs=tuple(discs),
+        discs=((around, stack.horn), (around, top)),
         stands_alone=True,
     )
 

@@ -14,13 +14,13 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
-    STANDARD_GRAVITY,
     Weight,
     rated_moment_nm,
     tilt_sine,
     weight_of,
 )
 from scanwright.design.catalogue.products import Bearing
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
@@ -86,7 +86,7 @@ def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
 def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
     """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
     weight = heaviest(scanner, stack)
-    bar = bar_g / 1000 * STANDARD_GRAVITY * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
+    bar = bar_g / 1000 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
     return _is_rated(scanner, weight.across_n * weight.lever_m + bar)
 
 

@@ -84,8 +84,6 @@ class ControlTable:
         packets: how they are packed.
         number: of the model, that stands in `model_number`.
         ram: first address that is not kept without power; below it torque must be off to write.
-        kept: addresses that outlast the power, of a servo whose addresses are not in that order; None for those below
-            `ram`.
         centre: count of the encoder's centre, angle 0.
         last: highest count of one turn, or of the range that the sensor covers.
         measures_turn: False where the position sensor has a dead sector.
@@ -100,13 +98,6 @@ class ControlTable:
         max_torque: what `torque_limit` is when the servo starts; after a shutdown it is less.
         lock: 1 in it keeps settings as they are, or writes to them from outlasting the power.
         watchdog: stops a servo to which nobody talks for so long.
-        torque_on: count of `torque` with which it holds.
-        scattered: True where each value has a request of its own, instead of all in one stretch of addresses.
-        alarms: among the present values, what it reports of itself, eight bits of `faults` each; reading clears them.
-            None where each answer tells.
-        driven: memory that a restart clears, which the driver sets beside the torque, of a servo that has its torque as
-            soon as it has its power.
-        counters: what counts the steps that are sent to the motor, and must say the encoder's angle before it holds.
     """
 
     model: str
@@ -127,12 +118,12 @@ class ControlTable:
     id: Register
     baud: Register
     return_delay_ns: Register
-    status_return: Register | None
+    status_return: Register
     torque: Register
     wheel_speed: Register
     joint_speed: Register
     goal: Register
-    load: Register | None
+    load: Register
     velocity: Register
     position: Register
     voltage: Register
@@ -142,16 +133,10 @@ class ControlTable:
     hardware_error: Register | None = None
     lock: Register | None = None
     watchdog: Register | None = None
-    torque_on: int = 1
-    scattered: bool = False
-    alarms: tuple[Register, ...] = ()
-    driven: Register | None = None
-    counters: tuple[Register, ...] = ()
-    kept: range | None = None
 
     def is_kept(self, register: Register) -> bool:
         """Whether a register outlasts the power (EEPROM): such a register is written only if a person agrees."""
-        return register.address in (range(self.ram) if self.kept is None else self.kept)
+        return register.address < self.ram
 
     def mode(self, *, spins: bool) -> tuple[Setting, ...]:
         """Settings of continuous rotation, or of going to an angle."""
@@ -192,26 +177,18 @@ class ControlTable:
         return min(ends), max(ends)
 
     @property
-    def present(self) -> tuple[Register, ...]:
-        """What is asked for to know all present values, each in a transaction; the one with the position is first."""
-        asked = (self.position, *self.alarms, self.load, self.velocity, self.voltage, self.temperature)
-        values = tuple(register for register in asked if register)
-        if self.scattered:
-            return values
+    def present(self) -> Register:
+        """The block of addresses that holds all present values: one transaction reads it."""
+        values = (self.position, self.load, self.velocity, self.voltage, self.temperature)
         first = min(register.address for register in values)
-        return (Register(first, max(register.address + register.size for register in values) - first),)
+        return Register(first, max(register.address + register.size for register in values) - first)
 
     def names(self, code: int) -> str:
         """The faults that a fault byte tells of."""
         named = " and ".join(name for bit, name in self.faults.items() if code >> bit & 1)
         return named or f"fault code {code}"
 
-    def pick(self, register: Register | None, data: bytes) -> float:
-        """One value out of those of `present`; NaN where the servo tells none."""
-        if register is None:
-            return math.nan
-        if self.scattered:
-            start = sum(one.size for one in self.present[: self.present.index(register)])
-        else:
-            start = register.address - self.present[0].address
+    def pick(self, register: Register, data: bytes) -> float:
+        """Return one value out of the bytes of `present`, in SI units."""
+        start = register.address - self.present.address
         return register.decode(data[start : start + register.size])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.servo.bus.bus import ServoAnswer, ServoBus
@@ -38,16 +38,11 @@ class ServoUnit:
 
     def present(self) -> ServoAnswer:
         """The present values, for `ControlTable.pick`, and the time of the position; raises as `ServoBus.read`."""
-        answers = [self.read(register) for register in self.table.present]
-        data, table = b"".join(answer.data for answer in answers), self.table
-        codes = [round(table.pick(alarm, data)) & 0xFF for alarm in table.alarms]
-        alarm = int.from_bytes(codes, "little") & sum(1 << bit for bit in table.faults)
-        return replace(answers[0], data=data, conditions=alarm if table.alarms else answers[0].conditions)
+        return self.read(self.table.present)
 
     def has_torque(self) -> bool:
-        """Whether it holds or turns because somebody has told it to."""
-        table = self.table
-        return bool(self.count(table.torque)) and (table.driven is None or bool(self.count(table.driven)))
+        """Whether its torque is on: it holds or turns."""
+        return bool(self.count(self.table.torque))
 
     def value(self, register: Register) -> float:
         """What a register holds, in SI units."""
@@ -140,8 +135,6 @@ class ServoUnit:
     def answer_everything(self) -> None:
         """Set it to answer everything; this outlasts the power if `ControlTable.is_kept` says so."""
         level = self.table.status_return
-        if level is None:
-            return
         with_answer = level.encode(self.table.answers_all)
         try:
             answers = self.read(level).data == with_answer

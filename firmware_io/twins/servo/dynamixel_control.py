@@ -50,7 +50,6 @@ def show(table: ControlTable, memory: Memory, turns: int, motion: Motion, now_ns
         motion: of the horn.
         now_ns: when it moves so.
     """
-    assert table.load, "every one of them tells its load"
     rate = round(motion.rate_rad_s / table.velocity.unit)
     milliseconds = now_ns // 1_000_000 % 32768
     memory[table.position.address] = count_of(table, memory, turns, motion.angle_rad)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pkgutil import resolve_name
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import DeviceError, removal
 from scanwright.firmware_io.servo.families import all_families, all_tables
 from scanwright.firmware_io.twins.servo.machine import ServoMachine
 from scanwright.firmware_io.twins.servo_plant import Load
@@ -28,6 +28,6 @@ def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle
             if table.model == model and protocol in (None, table.protocol):
                 made: ServoMachine = resolve_name(family.twin)(table, load, time_ns, angle_rad)
                 return made
-    known = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
+    there = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
     asked = model if protocol is None else f"{model} with {protocol}"
-    raise DeviceError(f"there is no twin of a servo {asked}; there are: {known}")
+    raise DeviceError(f"there is no twin of a servo {asked}; {removal(model) or f'there are: {there}'}")

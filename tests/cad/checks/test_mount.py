@@ -9,11 +9,11 @@ import pytest
 from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.checks.mount import carried, mount_checks
 from scanwright.cad.geometry.mesh import mesh_of
-from scanwright.cad.layout.loads import STANDARD_GRAVITY
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 
 HALF, HIGH, MODULUS, DENSITY = 12.0, 120.0, 2000.0, 1.2  # mm, MPa, g/cm3
 
@@ -34,8 +34,8 @@ def test_a_post_bends_as_a_beam_does(arm_m, seat_mm):
     load = Carried(mass_kg, centre, np.array([1.0, 0.0, 0.0]), seat_mm, HALF)
     rotation = sum(mount_sag(mesh, deck, mounted, load, MODULUS, DENSITY))
     inertia = (2 * HALF) ** 4 / 12
-    force = mass_kg * STANDARD_GRAVITY
-    own = DENSITY * 1e-6 * STANDARD_GRAVITY * (2 * HALF) ** 2
+    force = mass_kg * STANDARD_GRAVITY_M_S2
+    own = DENSITY * 1e-6 * STANDARD_GRAVITY_M_S2 * (2 * HALF) ** 2
     slope = (force * HIGH**2 / 2 + force * 1000 * arm_m * HIGH + own * HIGH**3 / 6) / MODULUS / inertia
     np.testing.assert_allclose(rotation, [0.0, slope, 0.0], rtol=0.06, atol=0.02 * slope)
 

@@ -157,7 +157,7 @@ def is_reachable(hole, head, piercing):
     return not piercing.between(start - 0.05 * direction, start + DRIVER * direction)
 
 
-FOOT, COVER, FLAG = Modules(tripod_foot=True), Modules(ring_cover=True), Modules(homing_flag=True)
+FOOT = Modules(tripod_foot=True)
 SETTINGS = {
     "tilted, with a bearing": scanner_at(GROUND_AHEAD),
     "tilted, nuts": scanner_at(TILTED, printer="fdm-0.4-nut"),
@@ -170,10 +170,7 @@ SETTINGS = {
     "printed throughout, inserts": scanner_at(
         (0, 0, 0, 50), slip_ring=None, sensor="STL27L", servo="XL430-W250", printer="fdm-0.4-insert"
     ),
-    "a cover on a cage, a tripod": scanner_at(GROUND_AHEAD, modules=Modules(ring_cover=True, tripod_foot=True)),
-    "a cover on a fork": scanner_at(UPRIGHT, modules=COVER),
-    "a switch on a cage": scanner_at(GROUND_AHEAD, modules=FLAG),
-    "a switch on a fork": scanner_at(UPRIGHT, modules=FLAG),
+    "a tripod": scanner_at(GROUND_AHEAD, modules=FOOT),
     "a belt on a tripod, nuts M5": replace(
         scanner_at(ROLLING, slip_ring=CAPSULE, printer="fdm-0.4-nut", modules=FOOT),
         deck=Rectangle(shape="rectangle", size_mm=(90, 90), screw="M5"),

@@ -8,7 +8,7 @@ import scanwright.cad
 from scanwright.cad.layout import names
 
 FOLDER = Path(scanwright.cad.__file__).parent
-WORDS = {"BEARING", "BELT", "DECK", "LIDAR", "RING", "SERVO", "SWITCH", "TRIPOD"}  # of everyday speech, and of frames
+WORDS = {"BEARING", "BELT", "DECK", "LIDAR", "RING", "SERVO", "TRIPOD"}  # of everyday speech, and of frames
 NAMES = [value for key, value in vars(names).items() if key.isupper() and key not in WORDS]
 
 

@@ -38,7 +38,7 @@ def rated(scanner, newton):
     return replace(scanner, servo=Servo.model_validate(scanner.servo.model_dump() | {"radial_load_n": newton}))
 
 
-ASKED_FOR = {"counterweight", "homing_flag", "ring_cover", "tripod_foot"}  # by balance, or by a task
+ASKED_FOR = {"counterweight", "tripod_foot"}  # by balance, or by a task
 
 
 SCANNERS = {

@@ -24,7 +24,7 @@ SETTINGS = {
     "ceiling": (180, 0, 45, -30, "UTM-30LX", "MX-64R"),
     "small": (160, -50, 33, 12, "URG-04LX", "AX-12A"),  # hangs, and so does the ceiling's
 }
-MODULES = ["ring_cover", "homing_flag", "tripod_foot"]  # nobody asked for them
+MODULES = ["tripod_foot"]  # nobody asked for them
 BEARING = {"ground_ahead", "small"}
 BALANCED = {"ground_ahead"}  # elsewhere gravity does not turn it, the horn bears no more, or no room
 SEAT = {"UTM-30LX": (55.0, 26.5), "URG-04LX": (53.15, 20.0)}  # optical height, hole offset

@@ -107,7 +107,7 @@ def test_a_score_with_parts_is_counted_with_them():
 
 
 def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monkeypatch):
-    """The fault of version 0.1 put back: no corner is a break, segments stay by their middle circle, no sum compared."""
+    """The fault of version 0.1 put back: no corner is a break, middle circles decide, and no sum is compared."""
     rng = np.random.default_rng(5)
     cells = np.zeros((24, 48))
     cells[8:20, 4:40] = rng.random((12, 36)) < 0.25

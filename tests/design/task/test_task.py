@@ -150,7 +150,7 @@ WRONG = {
     "section for a list": (BASE + '[weight]\nshape = "all"\n', ["task.toml", "weight"]),
     "unknown shape": (weight('shape = "cube"'), ["weight.0", "cube", "'band'"]),
     "shape missing": (weight("value = 1.0"), ["weight.0", "shape"]),
-    "module in quotes": (BASE + '[modules]\nring_cover = "no"\n', ["modules.ring_cover = 'no'", "true or false"]),
+    "module in quotes": (BASE + '[modules]\ntripod_foot = "no"\n', ["modules.tripod_foot = 'no'", "true or false"]),
     "module by number": (BASE + "[modules]\ntripod_foot = 1\n", ["modules.tripod_foot = 1", "true or false"]),
     "unknown module": (BASE + "[modules]\ntripod = true\n", ["modules.tripod", "did you mean 'tripod_foot'"]),
     "cone without axis": (weight('shape = "cone"\nhalf_angle_deg = 3'), ["weight.0.axis", "required"]),

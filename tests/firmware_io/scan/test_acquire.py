@@ -39,8 +39,9 @@ from scanwright.firmware_io.scan.plan import plan_scan
 from scanwright.firmware_io.scan.setpoints import course
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import emulated_scanner
 from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.world import room
 
 ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}
@@ -271,7 +272,7 @@ def residuals_m(cloud, angles, scene):
 
 SWEEP = {"mode": "sweep", "limits_deg": [-45, 45], "period_s": 6.0}  # at 30.6 deg/s, 1.05 steps of 0.293 deg in 10 ms
 SICK = {"sensor": "LMS111"}
-INTERLACED = {"sensor": "LMS 200", "servo": "PD42-3-1140"}  # scans of 181 and of 180 beams in turn; a stepper
+INTERLACED = {"sensor": "LMS 200"}  # scans of 181 and of 180 beams in turn
 SWEEPING = {"sensor": "URG-04LX", "servo": "AX-12A", "motion": SWEEP}
 
 
@@ -523,7 +524,7 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, twins):
             acquire.acquire(plan, lambda _: None)
 
 
-SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
+SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")]
 
 
 @pytest.mark.parametrize(("servo", "protocol"), SERVOS)

@@ -18,9 +18,10 @@ from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.fitness import ServoSetupError
 from scanwright.firmware_io.servo.servo import open_servo
 from scanwright.firmware_io.servo.settings import set_up
-from scanwright.firmware_io.twins.scanner import emulated_scanner, room
+from scanwright.firmware_io.twins.scanner import emulated_scanner
 from scanwright.firmware_io.twins.servo.machine import Request
 from scanwright.firmware_io.twins.servo.twin import ServoTwin
+from scanwright.firmware_io.twins.world import room
 
 MODELS = [
     ("AX-12A", "1.0"),
@@ -30,17 +31,14 @@ MODELS = [
     ("XM430-W350", "2.0"),
     ("XL330-M288", "2.0"),
     ("STS3215", "STS"),
-    ("PD42-3-1140", "TMCL"),
 ]
-FAMILIES = [MODELS[1], MODELS[4], MODELS[6], MODELS[7]]
+FAMILIES = [MODELS[1], MODELS[4], MODELS[6]]
 # Counts that no driver wants, by address: turned and shifted angles, a narrow range, another mode, few answers.
 SPOILT = {
     "1.0": {6: 10, 8: 900, 16: 1, 5: 200},
     "2.0": {10: 1, 20: -500, 11: 16, 9: 200, 68: 1},
     "STS": {31: 500, 30: 2, 33: 2, 9: 100, 8: 0, 7: 200},
-    "TMCL": {1090: 1, 210: 12_800, 140: 4, 154: 7},
 }
-SET_GLOBAL, STORING = 9, (7, 11, 137)  # of TMCL: global parameters are stored as they are set
 
 
 @pytest.fixture(autouse=True)
@@ -80,10 +78,7 @@ def person(monkeypatch):
 
 def kept(twin):
     """What the power does not take, by address."""
-    table, memory = twin.servo.table, twin.memory
-    if table.protocol == "TMCL":
-        return {address: memory[address] for address in range(1000, 2000) if address in memory}
-    return dict(enumerate(memory.data[: table.ram]))
+    return dict(enumerate(twin.memory.data[: twin.servo.table.ram]))
 
 
 def kept_writes(twin):
@@ -97,9 +92,6 @@ def kept_writes(twin):
 
 def _addresses(request: Request, table):
     what, values = request.instruction, request.parameters
-    if table.protocol == "TMCL":
-        assert what not in STORING
-        return [1000 + values[0]] if what == SET_GLOBAL and values[1] == 0 else []
     assert what in (1, 2, 3, 8)  # ping, read, write, reboot; nothing that writes in another way
     if what != 3:
         return []
@@ -144,12 +136,9 @@ def test_a_driver_that_may_not_write_does_not_change_the_mode(model, protocol, v
     twin = virtual_bus(model, protocol)
     with open_servo(twin.port) as servo:
         servo.sweep_to(0.3, 0.5)
-        if protocol == "TMCL":
-            servo.spin(0.5)  # which is no setting there
-        else:
-            with pytest.raises(ServoSetupError, match="so that it does not turn continuously"):
-                servo.spin(0.5)
-            assert twin.memory[twin.servo.table.torque.address] == 0
+        with pytest.raises(ServoSetupError, match="so that it does not turn continuously"):
+            servo.spin(0.5)
+        assert twin.memory[twin.servo.table.torque.address] == 0
     assert kept_writes(twin) == set()
 
 
@@ -168,11 +157,7 @@ def test_who_agrees_gets_what_was_listed_and_can_undo_it(model, protocol, spoilt
 
     asking_first(work, tmp_path, None).close()
     assert len(person.questions) == 1 and f"{len(listed)} register" in person.questions[0].replace("this", "1")
-    listed_bytes = {
-        change.register.address + k
-        for change in listed
-        for k in range(1 if protocol == "TMCL" else change.register.size)
-    }
+    listed_bytes = {change.register.address + k for change in listed for k in range(change.register.size)}
     assert kept_writes(twin) == listed_bytes
     after = kept(twin)
     assert {address for address in before if before[address] != after[address]} <= listed_bytes

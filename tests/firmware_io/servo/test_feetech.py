@@ -76,7 +76,7 @@ def test_the_memory_table_is_the_maker_s():
         register = getattr(STS3215, name)
         assert (register.address, register.size, register.sign) == (address, size, sign), name
         assert abs(register.unit) == pytest.approx(unit), name
-    assert (STS3215.present[0].address, STS3215.present[0].size) == (56, 8)
+    assert (STS3215.present.address, STS3215.present.size) == (56, 8)
     assert [STS3215.bauds[count] for count in range(8)] == [
         *(1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400),
     ]

@@ -103,7 +103,7 @@ def test_the_bits_of_a_fault_byte(table):
 def test_the_block_holds_all_present_values_and_nothing_more():
     for table in TABLES:
         first, size = (36, 8) if table.protocol == "1.0" else (126, 21)
-        assert (table.present[0].address, table.present[0].size) == (first, size)
+        assert (table.present.address, table.present.size) == (first, size)
         block = bytes(range(1, size + 1))
         for name in ("load", "velocity", "position", "voltage", "temperature"):
             register = getattr(table, name)

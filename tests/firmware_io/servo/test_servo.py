@@ -95,8 +95,8 @@ def test_counts_as_the_manual_writes_them():
     assert mx_1.wheel_speed.encode(-300 * 0.114 * RPM) == (1024 + 300).to_bytes(2, "little")  # bit 10 is clockwise
     assert mx_2.wheel_speed.encode(-300 * 0.229 * RPM) == (-300).to_bytes(4, "little", signed=True)
     assert ax.load.decode((1024 + 512).to_bytes(2, "little")) == pytest.approx(-0.512)
-    assert (mx_1.present[0].address, mx_1.present[0].size) == (36, 8)
-    assert (mx_2.present[0].address, mx_2.present[0].size) == (126, 21)
+    assert (mx_1.present.address, mx_1.present.size) == (36, 8)
+    assert (mx_2.present.address, mx_2.present.size) == (126, 21)
     assert ax.wheel_speed.unit * 1023 == pytest.approx(load_catalogue().get("AX-12A", Servo).no_load_rpm * RPM)
 
 
@@ -361,6 +361,7 @@ def test_mutated_answers_are_right_or_typed_errors(bus, protocol):
     [
         ({"port": "/dev/nothing"}, "/dev/nothing: no such port; serial ports here: "),
         ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': not one this program can drive; known: AX-12A"),
+        ({"port": "pty", "model": "PD42-3-1140"}, "not one this program can drive; removed in 0.2: "),
     ],
 )
 def test_what_cannot_be_opened_says_why(arguments, words):

@@ -168,12 +168,3 @@ def test_a_stalled_loop_at_its_limit_is_no_work_for_the_solver(begin_ns, stall_n
         axis.angle_rad(np.array([int(1e9 * axis._integrator.t) + 1000]))
         assert len(axis._steps) < 5000  # it crawled along its limit in steps of 10 ns, for ever
     assert axis.motion(end_ns).duty == pytest.approx(1.0)
-
-
-def test_a_stepper_that_loses_its_current_comes_to_rest():
-    axis = driven(Actuation("steps", math.inf, math.pi), plant_of("PD42-3-1140"))
-    axis.motion(2 * SECOND)
-    axis.drive(2 * SECOND, Actuation())
-    before = len(axis._steps)
-    axis.motion(7 * SECOND)
-    assert len(axis._steps) - before < 5000  # its rotor swung in its shaft for ever, a hundred thousand steps

@@ -31,10 +31,10 @@ from scanwright.firmware_io.twins.servo.twin import ServoTwin
 from scanwright.firmware_io.twins.servo_plant import Load
 
 MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
-MODELS += [("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
-FAMILIES = [("MX-64R", "1.0"), ("MX-64R", "2.0"), ("STS3215", "STS"), ("PD42-3-1140", "TMCL")]
-BAUDS = {"STS": 1_000_000, "TMCL": 9600}  # from the factory
-VOLTS = {"XL330-M288": 5.0, "PD42-3-1140": 24.0}
+MODELS += [("STS3215", "STS")]
+FAMILIES = [("MX-64R", "1.0"), ("MX-64R", "2.0"), ("STS3215", "STS")]
+BAUDS = {"STS": 1_000_000}  # from the factory
+VOLTS = {"XL330-M288": 5.0}
 MODELS_2 = [table.model for table in TABLES if table.protocol == "2.0"]
 RATE = math.radians(180)
 # Bytes that make up headers and stuffing; random ones hardly ever do.
@@ -510,8 +510,7 @@ FAULTS = [
 ]
 
 
-# A stepper's module is off with so little, and says nothing of it.
-TROUBLE = [(*of, *what) for of in FAMILIES for what in FAULTS if (of[1], what[0]) != ("TMCL", "low")]
+TROUBLE = [(*of, *what) for of in FAMILIES for what in FAULTS]
 
 
 @pytest.mark.parametrize(("model", "protocol", "fault", "words"), TROUBLE)
@@ -644,3 +643,8 @@ def test_unplugged_is_said_and_plugged_in_it_is_found_again(model, protocol):
             until(lambda: not turns(twin))
             servo.spin(RATE)
             read_for(servo, 0.05)
+
+
+def test_a_servo_that_was_removed_is_refused_with_what_to_use_instead():
+    with pytest.raises(DeviceError, match=r"no twin of a servo PD42-3-1140; removed in 0\.2: "):
+        machine_of("PD42-3-1140", None, Load(), 0, 0.0)

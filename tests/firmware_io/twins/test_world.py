@@ -137,7 +137,7 @@ def test_gravity_on_the_head_is_the_slope_of_its_potential_energy(tmp_path):
             (angles.T_world_rot(joint_rad) @ [0.01, -0.02, -0.05, 1])[2],
             (angles.T_world_laser(joint_rad) @ [0.002, 0, -0.03, 1])[2],
         ]
-        return 9.81 * np.dot([0.3, 0.37], heights_m)
+        return 9.80665 * np.dot([0.3, 0.37], heights_m)
 
     for joint_rad in np.linspace(-3, 3, 7):
         torque_nm = -(energy_J(joint_rad + 1e-5) - energy_J(joint_rad - 1e-5)) / 2e-5

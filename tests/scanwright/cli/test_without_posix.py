@@ -1,0 +1,83 @@
+"""Without the modules of POSIX systems, as on Windows, everything that drives no device works."""
+
+import subprocess
+import sys
+
+REFUSED = "devices need Linux or macOS; everything that drives no device works here too"
+SCRIPT = """
+import multiprocessing, signal, sys
+from importlib import import_module
+for name in ("fcntl", "termios", "resource", "pwd", "grp", "pty", "tty"):
+    sys.modules[name] = None
+for name in ("pthread_sigmask", "setitimer", "SIGHUP", "SIGQUIT"):
+    delattr(signal, name)
+multiprocessing.get_all_start_methods = lambda: ["spawn"]
+
+from pathlib import Path
+import numpy as np
+import scanwright as sw
+from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.samples import Scan
+from scanwright.cli.app import run as main
+
+def run(*words):
+    sys.argv = ["scanwright", *words]
+    try:
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code or 0
+    print("ran", words[0], code, flush=True)
+
+Path("ahead.toml").write_text(sys.argv[1], encoding="utf-8")
+angles = sw.load_task("ahead.toml").angle_set((0, 0, 0, -60))
+seen = sw.simulate(angles, noise_mm=1.0)
+with RecordingWriter(Path("seen.mcap"), {}) as recording:
+    messages = [(t, None, p) for t, p in zip(seen.joint_log.time_ns, seen.joint_log.position_rad)]
+    messages += [(t, k, None) for k, t in enumerate(seen.time_ns[:, 0])]
+    for t, k, p in sorted(messages, key=lambda message: message[0]):
+        if k is None:
+            recording.joint(10**18 + int(t), float(p))
+        else:
+            recording.scan(Scan(
+                stamp_ns=10**18 + int(t), angle_min_rad=float(seen.bearing_rad[k, 0]),
+                angle_increment_rad=float(np.diff(seen.bearing_rad[k, :2])[0]),
+                time_increment_s=float(np.diff(seen.time_ns[k, :2])[0]) / 1e9, scan_time_s=0.1, range_min_m=0.1,
+                range_max_m=30.0, range_m=seen.range_m[k], intensity=np.empty(0, np.float32)))
+Path("angles.json").write_text(angles.to_json(), encoding="utf-8")
+run("evaluate", "ahead.toml", "--angles=0,0,0,-60")
+run("import", "seen.mcap", "--scan", "/scan", "--angle", "/joint_states", "--angle-unit=rad", "-o", "imported.mcap")
+run("assemble", "imported.mcap", "--angles", "angles.json", "-o", "cloud.ply")
+run("calibrate", "imported.mcap", "--angles", "angles.json", "-o", "calibrated.json")
+run("map", "cloud.ply", "-o", "map.yaml")
+run("check", "ahead.toml")
+for module in ("api.parts", "api.tasks", "pipeline.build", "pipeline.comparison", "study.study", "cli.pages"):
+    import_module(f"scanwright.{module}")
+from scanwright.design.errors import BuildError
+from scanwright.pipeline.folder import fresh_folder
+with fresh_folder(Path("out/ahead")) as folder:
+    (folder / "a.txt").write_text("a", encoding="utf-8")
+    try:
+        with fresh_folder(Path("out/ahead")):
+            print("two builds at once")
+    except BuildError as error:
+        print("refused:", error)
+print("built", sorted(path.name for path in Path("out").rglob("*")))
+run("scan", "out/ahead")
+run("doctor")
+"""
+
+
+def test_what_drives_no_device_works_and_devices_are_refused_in_one_line(tmp_path, cheapest_task):
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, cheapest_task], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    codes = dict(line.split()[1:] for line in done.stdout.splitlines() if line.startswith("ran "))
+    assert codes == dict.fromkeys(("evaluate", "import", "assemble", "calibrate", "map"), "0") | dict.fromkeys(
+        ("check", "scan", "doctor"), "2"
+    )
+    assert "another build of this folder is at work" in done.stdout
+    assert "two builds" not in done.stdout and "built ['a.txt', 'ahead']" in done.stdout
+    errors = [line for line in done.stderr.splitlines() if line.startswith("scanwright: ")]
+    assert "holds" in errors[0] and errors[1:] == [f"scanwright: {REFUSED}"] * 2
