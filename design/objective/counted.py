@@ -10,6 +10,7 @@ With `quadrature = "equal_angle"` the directions are the nodes of the paper's gr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -87,6 +88,7 @@ def counted_J(
     beams = _turned(_turned(in_laser, X, alpha_laser), Y, beta_laser) + lever
     beams /= np.linalg.norm(beams, axis=1, keepdims=True)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
+    to_rot = _turned(_turned(np.eye(3), X, -alpha_rot), Y, -beta_rot)  # of the three axes
     lines, first, repeats, span = _lines(loaded)
     objective = density.objective
     moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
@@ -95,7 +97,7 @@ def counted_J(
         found = _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)
         directions, value, area, required, phase = found
         turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
-        in_rot = _turned(_turned(directions, X, -alpha_rot), Y, -beta_rot)
+        in_rot = directions @ to_rot
         counts, keep = np.zeros(len(value), dtype=np.int64), value > 0
         counts[keep] = repeats * _counts(
             in_rot[keep], beams[order], turned[keep], mine[keep], lines, first, ball, blocked[order]
@@ -158,17 +160,22 @@ def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:
 
 def _net(count: int, rng: np.random.Generator) -> Array:
     """The first points of a Sobol net in three dimensions, shifted digit by digit, shape (count, 3), 0 to below 1."""
+    return ((_digits(count) ^ rng.integers(1 << BITS, size=3, dtype=np.uint64)) + 0.5) / float(1 << BITS)
+
+
+@lru_cache(maxsize=16)
+def _digits(count: int) -> Array:
     bits = np.arange(BITS, dtype=np.uint64)
-    numbers = [np.ones(BITS, dtype=np.uint64) for _ in range(3)]
-    for k in range(1, BITS):
-        numbers[1][k] = 2 * numbers[1][k - 1] ^ numbers[1][k - 1]
-        numbers[2][k] = 3 if k == 1 else 2 * numbers[2][k - 1] ^ 4 * numbers[2][k - 2] ^ numbers[2][k - 2]
-    directions = np.stack(numbers, axis=1) << (BITS - 1 - bits)[:, None]
-    points = np.zeros((count, 3), dtype=np.uint64) ^ rng.integers(1 << BITS, size=3, dtype=np.uint64)
+    numbers = [[1, 1, 1], [1, 3, 3]]
+    for k in range(2, BITS):
+        (_, _, before), (_, second, third) = numbers[k - 2 :]
+        numbers.append([1, 2 * second ^ second, 2 * third ^ 4 * before ^ before])
+    directions = np.array(numbers, dtype=np.uint64) << (BITS - 1 - bits)[:, None]
+    points = np.zeros((count, 3), dtype=np.uint64)
     index = np.arange(count, dtype=np.uint64)
     for bit in range(count.bit_length()):
-        points ^= np.where((index >> np.uint64(bit) & np.uint64(1))[:, None] > 0, directions[bit], np.uint64(0))
-    return (points + 0.5) / float(1 << BITS)
+        points ^= np.where(((index >> np.uint64(bit)) & np.uint64(1))[:, None] > 0, directions[bit], np.uint64(0))
+    return points
 
 
 def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.random.Generator) -> list[Array]:

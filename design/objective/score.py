@@ -25,6 +25,7 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.sphere.directions import sample_sets
 from scanwright.design.sphere.polar_rule import PolarRule
+from scanwright.design.sphere.total_weight import require_drawn
 
 MOST_NODES = 200_000
 ROUNDING = 1e-6  # floor of the stated error
@@ -203,6 +204,8 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     R = R_world_rot(angles_rad[0], angles_rad[1])
     beams = problem.beams_rot(angles_rad[2:])
     sets = sample_sets(moment.field, problem.grid_step_deg, nodes // SETS, SETS)
+    if not problem.grid_step_deg:
+        require_drawn(moment.field, np.concatenate([samples.weights for samples in sets]) / SETS)
     directions = np.concatenate([samples.directions for samples in sets]) @ R
     z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
     blind = blind_to_sweep(problem, directions, beams, z.mean)

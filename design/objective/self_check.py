@@ -23,8 +23,9 @@ from scanwright.design.task.task import LoadedTask
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
 NEAR = 5e-3  # a wrong field is off by far more
 SETS = 16
-DRAWN = 256, 1024, 4096  # directions of each set, in all regions together, until the count is near enough
-AGAIN = 16384  # the same before a difference is an error: one count in a thousand is off by more than it states
+FIRST, FINER = 256, 4  # directions of each set, in all regions together, and times more until the count is near enough
+MOST_WORK = 2e5  # directions of one set times the beams that are near to each: 0.3 s of processor in all
+AGAIN = 8  # times more before a difference is an error: one count in a thousand is off by more than it states
 
 
 def require_counted(
@@ -54,8 +55,9 @@ def require_counted(
             _require_least(loaded, angles_rad, found)
             _require_log(loaded, angles_rad)
         return
-    for most in (DRAWN, (AGAIN,)):
-        J, J_error = _counted(loaded, angles_rad, most, shadow, lever)
+    points = FIRST
+    for more in (1, AGAIN):
+        J, J_error, points = _counted(loaded, angles_rad, more * points, shadow, lever)
         if np.isinf(J_error):
             raise TaskError("weight: masks leave too little of the regions to draw directions in: widen them")
         if J == found.J or abs(J - found.J) <= found.J_error + J_error:
@@ -68,20 +70,22 @@ def require_counted(
 def _counted(
     loaded: LoadedTask,
     angles_rad: Setting,
-    drawn: tuple[int, ...],
+    points: int,
     shadow: Shadow | None,
     lever: tuple[float, float, float],
-) -> tuple[float, float]:
-    """J by counting, and four standard errors of it."""
-    for points in drawn:
+) -> tuple[float, float, int]:
+    """J by counting, four standard errors of it, and the directions of each set that it took."""
+    ball_deg = loaded.task.density.ball_radius_deg
+    near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, ball_deg / 60))
+    while True:
         count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
-        if SURE * count.J_error <= NEAR:
-            break
-    return count.J, SURE * count.J_error
+        if SURE * count.J_error <= NEAR or FINER * points * near > MOST_WORK:
+            return count.J, SURE * count.J_error, points
+        points *= FINER
 
 
 def _require_least(loaded: LoadedTask, angles_rad: Setting, found: Score) -> None:
-    count = counted_J(loaded, angles_rad, 0, DRAWN[0], 2)
+    count = counted_J(loaded, angles_rad, 0, FIRST, 2)
     if found.J + found.J_error < count.J:
         raise NumericalError(f"min_density = {found.least}, but a count over simulated beams finds {count.least}")
 

@@ -20,7 +20,7 @@ from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
 from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from scanwright.design.search.limits import allowed_planes, blinding_words
-from scanwright.design.search.mounts.preference import simplest_first
+from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits

@@ -18,7 +18,7 @@ from scanwright.design.search.coarse import Progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.limits import line_gaps_deg
-from scanwright.design.search.mounts.preference import simplest_first
+from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.search import SearchResult, search
 from scanwright.design.task.named_products import fastest_rpm
 from scanwright.design.task.task import LoadedTask

@@ -19,7 +19,6 @@ from numba import njit
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Ints, Vector
-from scanwright.design.errors import NumericalError
 from scanwright.design.sphere.corners import (
     LOOK_RAD,
     MANY_EDGES,
@@ -30,15 +29,14 @@ from scanwright.design.sphere.corners import (
 )
 from scanwright.design.sphere.directions import Samples, weighted_samples
 from scanwright.design.sphere.regions import Field
-from scanwright.design.sphere.total_weight import total_weight
+from scanwright.design.sphere.total_weight import is_total, require_drawn, weight_error
 
 GRID = 180  # segments of a region of many edges, for those who ask for all of its breaks
 MANY_CORNERS = 64  # above this segments between corners would cost more nodes than the bends
 NEARER = 4.0  # three times the nodes of a rule of order 1.3; of smooth pieces it is 2
 PER_NODE = 256  # directions for each node of a region of many edges or corners
 MOST_DIRECTIONS = 2_000_000
-WEIGHT_OFF = 1e-3  # share of the integral of the weight that the sum over the nodes may be off by
-FINER = 1, 3, 9, 27  # times the nodes until it is not
+FINER = 1, 3, 9, 27  # times the nodes, until their weights sum to the integral of the weight
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +76,13 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
     """
     if not has_all_breaks(field):
         return _sampled_rule(field, axis, breaks_rad, nodes)
-    segments, expected = weighted_segments(field, axis, breaks_rad), total_weight(field)
+    segments = weighted_segments(field, axis, breaks_rad)
     for finer in FINER:
         rule = _rule_on(field, axis, segments, nodes * finer)
         got = float(rule.fine.sum())
-        if abs(got - expected) <= WEIGHT_OFF * expected + rule.own_error():
+        if is_total(field, got, rule.own_error()):
             return rule
-    about = np.round(axis, 4).tolist()
-    raise NumericalError(f"weight: about the axis {about} it sums to {got:.6g}, and not to {expected:.6g}")
+    raise weight_error(field, got, f"about the axis {np.round(axis, 4).tolist()}")
 
 
 def _rule_on(field: Field, axis: Vector, ends: Float[ndarray, "segments 2"], nodes: int) -> PolarRule:
@@ -116,7 +113,9 @@ def _sampled_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " break
 
 @lru_cache(maxsize=8)
 def _samples(field: Field, wanted: int) -> Samples:
-    return weighted_samples(field, wanted)
+    samples = weighted_samples(field, wanted)
+    require_drawn(field, samples.weights)
+    return samples
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -18,6 +18,8 @@ from scanwright.design.sphere.corners import edge_corners, polar_about, touched_
 from scanwright.design.sphere.regions import Field
 
 UP = np.array([0.0, 0.0, 1.0])
+WEIGHT_OFF = 1e-3  # share of the integral of the weight that the sum of a quadrature may be off by
+SURE = 5.0  # standard errors of a sum of weights that are drawn
 RELATIVE_ERROR = 1e-5  # a hundredth of what a quadrature may be off by
 MOST_HALVINGS = 40
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -48,6 +50,34 @@ def total_weight(field: Field) -> float:
         settled += float(halves[~again].sum())
         ends, sums = ends[np.repeat(again, 2)], halves[again].ravel()
     raise NumericalError("weight: its integral over the sphere does not settle")
+
+
+def is_total(field: Field, got: float, own_error: float) -> bool:
+    """Whether the sum of the weights of a quadrature is the integral of the weight.
+
+    Args:
+        field: the weights.
+        got: their sum.
+        own_error: what the sum is off by as its nodes are few.
+    """
+    expected = total_weight(field)
+    return abs(got - expected) <= WEIGHT_OFF * expected + own_error
+
+
+def weight_error(field: Field, got: float, where: str) -> NumericalError:
+    """Return the error of a quadrature that loses weight, or has some of it twice."""
+    return NumericalError(f"weight: {where} it sums to {got:.6g}, and not to {total_weight(field):.6g}")
+
+
+def require_drawn(field: Field, weights: Float[ndarray, " n"]) -> None:
+    """Compare the sum of the weights of directions that are drawn with the integral of the weight.
+
+    Raises:
+        NumericalError: they differ by more than a draw of so many explains.
+    """
+    got = float(weights.sum())
+    if not is_total(field, got, SURE * float(np.linalg.norm(weights / weights.max()) * weights.max())):
+        raise weight_error(field, got, f"over {len(weights)} directions")
 
 
 def _panel_sums(field: Field, ends: Float[ndarray, "panels 2"]) -> Float[ndarray, " panels"]:

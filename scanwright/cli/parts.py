@@ -82,8 +82,8 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     from scanwright import api
 
     checks = api.check(out, say=Progress())
-    warn(api.load_task(out / "task.toml").misfits())
     _complain_of(checks)
+    warn(api.load_task(out / "task.toml").misfits())
     if as_json:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
     else:

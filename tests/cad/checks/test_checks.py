@@ -351,7 +351,7 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     monkeypatch.setattr(room, "check_scanner", lambda _scanner, _say: answer)
     code, out, complaints = command("check", tmp_path, "--json")
     assert code == 1
-    assert complaints == [
+    assert complaints[:2] == [
         "scanwright: check failed: a and b: gap: 0.1 mm, under 0.4",
         "scanwright: 1 of 1 checks failed: do not make these parts",
     ]

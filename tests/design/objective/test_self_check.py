@@ -113,7 +113,7 @@ def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monke
     cells[8:20, 4:40] = rng.random((12, 36)) < 0.25
     loaded = a_task([{"shape": "map", "file": "w.npy"}], maps=[cells])
     monkeypatch.setattr(polar_rule, "edge_corners", lambda _: Corners(np.empty((0, 3)), np.empty((0, 0))))
-    monkeypatch.setattr(polar_rule, "WEIGHT_OFF", np.inf)
+    monkeypatch.setattr(polar_rule, "is_total", lambda *_: True)
     problem = problem_of(loaded)
     best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 30.0})).best[0]
     with pytest.raises(NumericalError):

@@ -81,7 +81,7 @@ def test_the_best_that_keeps_them_is_the_best_of_the_grid_that_does(task, limits
     within = [s for s in everything if s.blind_weight <= blind and s.least >= (limits.min_density or 0)]
     best = min(within, key=lambda s: s.J)
     assert min(everything, key=lambda s: s.J).J < best.J, "nothing to constrain: the test proves nothing"
-    assert found.best[0].score.J <= best.J + best.J_error
+    assert found.best[0].score.J <= best.J + 3e-3, "unrefined, the coarse J of two neighbours may be in another order"
     for family in found.best:
         assert family.score.blind_weight <= blind and family.score.least >= (limits.min_density or 0)
 

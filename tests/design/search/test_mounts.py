@@ -12,8 +12,8 @@ from scanwright.design.objective.score import score
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.gain import gain_lines, gains
-from scanwright.design.search.mounts.preference import simplest_first
 from scanwright.design.search.mounts.reference import angles_used, reference_mounts
+from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import Limits, load_task
