@@ -32,6 +32,8 @@ from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.objective.counted import Counted, counted_J
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import Score, score
+from scanwright.design.objective.self_check import require_counted
+from scanwright.design.shadow import Shadow
 from scanwright.design.task.task import load_task, shipped_tasks
 
 SMALL_ERROR = 1e-3  # what most scores state at the default
@@ -49,14 +51,16 @@ class Claim:
         score: what the program states; None where it refuses the task.
         truth: the count; None where no direction has a weight.
         refusal: why the program refuses.
-        took_s: the program, and the count.
+        alarm: what the program's own check says of a score, if it takes it for wrong.
+        took_s: the program, its own check, and the count.
     """
 
     drawn: RandomTask
     score: Score | None
     truth: Counted | None
     refusal: str
-    took_s: tuple[float, float]
+    alarm: str
+    took_s: tuple[float, float, float]
 
     @property
     def off(self) -> float:
@@ -103,16 +107,24 @@ def random_claim(
     """
     drawn = random_task(rng, folder, field, small=small)
     start = perf_counter()
-    found, refusal = None, ""
+    found, refusal, alarm = None, "", ""
     bearings = drawn.loaded.lidar.bearings_rad()[drawn.beams]
     try:
         problem = problem_of(drawn.loaded)
         found = score(problem.with_beams(bearings, problem.lines, problem.sweep), drawn.angles_rad)
     except ScanwrightError as error:
         refusal = str(error)
+    checked = perf_counter()
+    if found is not None:
+        try:
+            shadow = None if drawn.beams.all() else Shadow(~drawn.beams, None)
+            require_counted(drawn.loaded, drawn.angles_rad, found, shadow)
+        except ScanwrightError as error:
+            alarm = str(error)
     middle = perf_counter()
     truth = _counted(drawn, bearings, int(rng.integers(1 << 30)), np.inf if found is None else found.J_error, most_work)
-    return Claim(drawn, found, truth, refusal, (middle - start, perf_counter() - middle))
+    took_s = checked - start, middle - checked, perf_counter() - middle
+    return Claim(drawn, found, truth, refusal, alarm, took_s)
 
 
 def _counted(drawn: RandomTask, bearings_rad: Array, seed: int, asked: float, most_work: float) -> Counted | None:
@@ -173,11 +185,13 @@ def print_errors(pairs: range, seed: int, fields: Iterable[str], most_work: floa
             field = None if set(fields) == set(FIELDS) else str(rng.choice(list(fields)))
             claims.append(random_claim(rng, Path(folder), field, most_work=most_work))
         claim = claims[-1]
+        if claim.alarm:
+            print(f"ALARM pair {i}: {claim.alarm}: {claim.words()}", flush=True)
         if not claim.kept:
             print(f"BROKEN pair {i}, off by {claim.off:.1e}: {claim.words()}", flush=True)
         if sum(claim.took_s) > 20:
             print(
-                f"SLOW pair {i}, {claim.took_s[0]:.1f} s and count {claim.took_s[1]:.1f} s: {claim.words()}", flush=True
+                f"SLOW pair {i}, {claim.took_s[0]:.1f} s and count {claim.took_s[2]:.1f} s: {claim.words()}", flush=True
             )
         if (i + 1) % 25 == 0:
             print(f"{i + 1} pairs, {sum(not claim.kept for claim in claims)} broken", flush=True)
@@ -186,6 +200,7 @@ def print_errors(pairs: range, seed: int, fields: Iterable[str], most_work: floa
     stated = np.array([found.J_error for found in scores if found is not None])
     off = np.array([claim.off for claim in judged])
     print(f"stated errors kept: {sum(claim.kept for claim in claims)} of {len(pairs)}")
+    print(f"taken for wrong by the program's own check: {sum(bool(claim.alarm) for claim in claims)}")
     print(f"refused as empty, and rightly: {sum(claim.kept for claim in claims if claim.score is None)}")
     large = int((stated > SMALL_ERROR).sum())
     print(f"stated: median {np.median(stated):.1e}, largest {stated.max():.1e}, above {SMALL_ERROR:g} in {large} pairs")
@@ -197,14 +212,14 @@ def print_errors(pairs: range, seed: int, fields: Iterable[str], most_work: floa
         f"the count's own error: largest {counted.max():.1e}; not within the stated one in {len(unsure)} pairs, "
         f"{sum(claim.kept for claim in unsure)} of them kept"
     )
-    print("seconds by kind: program (median, largest), count (median, largest), pairs")
-    taken: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    print("seconds by kind: program, its own check, count (median, largest of each), pairs")
+    taken: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for claim in claims:
         for kind in dict.fromkeys(claim.drawn.kinds):
             taken[kind].append(claim.took_s)
     for kind, seconds in sorted(taken.items()):
-        (own, count), (most_own, most_count) = np.median(seconds, axis=0), np.max(seconds, axis=0)
-        print(f"  {kind:16} {own:6.2f} {most_own:6.2f} {count:6.2f} {most_count:6.2f} {len(seconds):5}", flush=True)
+        figures = np.stack([np.median(seconds, axis=0), np.max(seconds, axis=0)], axis=1).ravel()
+        print(f"  {kind:16} {' '.join(f'{figure:6.2f}' for figure in figures)} {len(seconds):5}", flush=True)
     return all(claim.kept for claim in claims)
 
 

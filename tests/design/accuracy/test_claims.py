@@ -144,7 +144,7 @@ def every_segment(field, axis, more_rad):
 
 def every_direction(field, _, wanted, count):
     sets = [spiral(4 * wanted + 17 * index, turn_rad=float(index)) for index in range(count)]
-    return tuple(Samples(directions, field.weight_at(directions)) for directions in sets)
+    return tuple(Samples(d, field.weight_at(d) * (4 * np.pi / len(d))) for d in sets)
 
 
 @pytest.mark.parametrize("motion", [{}, SWEEP], ids=["spin", "sweep"])
