@@ -38,8 +38,8 @@ X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 class Counted:
     """J, three standard errors of it, the least count met, and the share of weight where none was.
 
-    Of `worst` the error is 0: the least count that was found. It is infinite if less than two sets have a direction of
-    weight. `weighted` is the share of the directions drawn that have a weight.
+    Of `worst` the error is 0: the least count that was found. It is infinite if that of some set is: it met no beam.
+    `weighted` is the share of the directions drawn that have a weight.
     """
 
     J: float
@@ -74,7 +74,7 @@ def counted_J(
         lever: the optical centre off the axis, in the rotation frame, as a share of the range.
 
     Raises:
-        TaskError: no direction that is drawn has a weight.
+        TaskError: next to no direction that is drawn has a weight.
     """
     layers = layers_of(loaded)
     density = loaded.task.density
@@ -130,14 +130,14 @@ def counted_J(
             keep = value > 0
             if keep.any():
                 least = min(least, int(counts[keep].min()))
-    if not weighted > 0:
+    if len(moments) < 2:
         raise TaskError(EMPTY)
     if objective == "worst":
         return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
         each = np.array([_joined(objective, m) for m in moments])
-        J_error = float(3 * np.std(each, ddof=1) / sets**0.5) if len(each) > 1 else np.inf
+        J_error = float(3 * np.std(each, ddof=1) / sets**0.5)
     return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
 
 

@@ -58,8 +58,6 @@ def require_counted(
     points = FIRST
     for more in (1, AGAIN):
         J, J_error, points = _counted(loaded, angles_rad, more * points, shadow, lever)
-        if np.isinf(J_error):
-            raise TaskError("weight: masks leave too little of the regions to draw directions in: widen them")
         if J == found.J or abs(J - found.J) <= found.J_error + J_error:
             return
     raise NumericalError(
@@ -78,7 +76,10 @@ def _counted(
     ball_deg = loaded.task.density.ball_radius_deg
     near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, ball_deg / 60))
     while True:
-        count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
+        try:
+            count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
+        except TaskError as error:
+            raise TaskError("weight: masks leave too little of the regions to count beams in: widen them") from error
         if SURE * count.J_error <= NEAR or FINER * points * near > MOST_WORK:
             return count.J, SURE * count.J_error, points
         points *= FINER
