@@ -64,7 +64,8 @@ def build(
     if built.failed:
         hint(f"next: read the failed checks in {report}, and change the task")
         raise typer.Exit(1)
-    hint(f"next: open {report}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
+    coupon = f"then print {built.folder / 'print/fit_coupon.3mf'} and try it"
+    hint(f"next: open {report}; {'print no part yet, for the reasons above' if built.misfits else coupon}")
 
 
 @app.command()
