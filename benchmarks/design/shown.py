@@ -168,7 +168,7 @@ def _studio(drawn: RandomTask, _: Path) -> None:
 
 
 def _quiet(_: str) -> None:
-    """Progress that nobody reads."""
+    """Ignore progress."""
 
 
 def main() -> None:

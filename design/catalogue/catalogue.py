@@ -4,7 +4,7 @@ One TOML file per product. Every value is written with its source and whether it
 
     mass_g = { value = 370.0, source = "Hokuyo UTM-30LX data sheet", verified = true }
 
-so that a build can say which of its dimensions nobody has measured. `known_wrong` lists values that do not agree with
+so that a build can list its unverified dimensions. `known_wrong` lists values that do not agree with
 the real device and that the record cannot hold right yet: a build warns of them. A user's own catalogue file adds
 products or replaces shipped ones of the same name.
 """

@@ -1,4 +1,4 @@
-"""The integral of a weight over the sphere, by a rule of its own: what every quadrature of the same weight must sum to.
+"""The integral of a weight over the sphere, by a separate rule: every quadrature of that weight must sum to it.
 
 Circles about the world's z axis, the axis of bands and maps: between the polar angles at which a circle touches an
 edge or passes a corner the mean along it is smooth. Panels between all of these, of weight zero or not, are halved

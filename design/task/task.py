@@ -121,7 +121,7 @@ class Task(Record):
     def _masks_hide(cls, masks: tuple[MaskRegion, ...]) -> tuple[MaskRegion, ...]:
         for i, mask in enumerate(masks):
             if not mask.value > 0:
-                raise ValueError(f"{i}: a mask of value = 0 hides nothing, as masks unite: leave it out")
+                raise ValueError(f"mask.{i}.value = 0 hides nothing, as masks unite: leave the mask out")
         return masks
 
     @field_validator("motion", mode="before")

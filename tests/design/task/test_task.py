@@ -123,7 +123,10 @@ WRONG = {
         weight('shape = "mesh"\nfile = "m.stl"\nrpy_deg = [0, 0, 1e300]', "mask"),
         ["mask.0.rpy_deg", "360"],
     ),
-    "mask that hides nothing": (weight('shape = "all"\nvalue = 0', "mask"), ["mask", "hides nothing", "leave it out"]),
+    "mask that hides nothing": (
+        weight('shape = "all"\nvalue = 0', "mask"),
+        ["mask.0.value", "hides nothing", "leave the mask out"],
+    ),
     "sweep of no width": (
         swap('mode = "spin"', 'mode = "sweep"\nlimits_deg = [10, 10]'),
         ["motion", "limits_deg", "does not rise"],
