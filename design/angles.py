@@ -27,8 +27,10 @@ from pydantic import Field, ValidationError
 from scanwright.design import frames
 from scanwright.design.arrays import Pose, Rotation, Setting, Vector
 from scanwright.design.errors import TaskError
+from scanwright.design.files.faults import explain
+from scanwright.design.files.record import Record
+from scanwright.design.files.text_files import A_FILE_FOR_A_FOLDER, read_text
 from scanwright.design.motion import Motion
-from scanwright.design.record import A_FILE_FOR_A_FOLDER, Record, explain, read_text
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""

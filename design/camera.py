@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 
 from scanwright.design import frames
 from scanwright.design.arrays import Pose
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 Pixels = Annotated[int, Field(strict=True, ge=1, le=100_000)]
 Focal = Annotated[float, Field(gt=0)]

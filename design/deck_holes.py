@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 Length = Annotated[float, Field(gt=0, le=400)]
 DeckScrew = Literal["M3", "M4", "M5", "M6"]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, Strict, model_validator
 
 from scanwright.design.arrays import Array
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 SHORTEST_S, LONGEST_S = 1e-3, 600.0
 NARROWEST_SWEEP_DEG = 0.1  # about one step of a servo's encoder

@@ -12,7 +12,7 @@ from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
 from scanwright.design.deck_holes import Circle, Rectangle
 from scanwright.design.errors import removal
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 
 class Modules(Record):

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from scanwright.design.errors import BuildError
-from scanwright.design.record import read_npz
+from scanwright.design.files.numpy_files import read_npz
 
 AXIS_STEPS = 720  # equal steps of the axis angle, from 0, in [0, 2 pi)
 

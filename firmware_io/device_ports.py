@@ -11,10 +11,10 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-from scanwright.design.atomic_file import place_in, whole_file
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import DeviceError
+from scanwright.design.files.atomic_file import place_in, whole_file
 
 _FILE = "emulated.json"
 

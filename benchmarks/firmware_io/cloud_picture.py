@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from scanwright.design import frames
 from scanwright.design.arrays import Floats
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.clouds.ply import read_ply
 
 _WIDTH_IN = 11.0

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 
 from scanwright.design.accuracy.front import dominators
 from scanwright.design.accuracy.machine import this_machine
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.files.atomic_file import whole_file
 
 T = TypeVar("T")
 REPEATS = 3

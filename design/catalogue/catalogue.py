@@ -33,7 +33,8 @@ from scanwright.design.catalogue.products import (
     SlipRing,
 )
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.record import Fault, faults_of, read_toml, tell
+from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.files.text_files import read_toml
 
 SHIPPED = Path(__file__).parent
 LIDAR_GROUP, SERVO_GROUP = "scanwright.lidars", "scanwright.servos"

@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import to_jsonable_python
 
 from scanwright.design.catalogue.known_error import KnownError
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]

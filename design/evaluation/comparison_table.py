@@ -6,10 +6,10 @@ import csv
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.catalogue.products import Multibeam, Product
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.stated_error import error_words
 from scanwright.design.task.task import LoadedTask, load_task

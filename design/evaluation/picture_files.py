@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import whole_file
 
 DPI = 110  # of the PNG, and of what the SVG holds as pixels: maps and dense meshes
 NO_DATE = {"Date": None, "Creator": None}

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from scanwright.design.arrays import Array
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 from scanwright.design.task.equivalent_settings import BOUNDS, advice
 from scanwright.design.task.shapes import Number, Span
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from scanwright.design.arrays import Array
 from scanwright.design.errors import TaskError
-from scanwright.design.record import read_npy, read_text
+from scanwright.design.files.numpy_files import read_npy
+from scanwright.design.files.text_files import read_text
 
 _MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg a pixel
 

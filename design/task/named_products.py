@@ -9,8 +9,8 @@ import numpy as np
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
 from scanwright.design.errors import TaskError
+from scanwright.design.files.faults import Fault
 from scanwright.design.motion import Motion, Shortest, Spin, Sweep
-from scanwright.design.record import Fault
 
 NAMED: dict[str, type[Product]] = {"sensor": Lidar, "servo": Servo, "slip_ring": SlipRing, "printer": Printer}
 """Keys of a task that name a product, and of which kind it is."""

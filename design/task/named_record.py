@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.record import read_toml
+from scanwright.design.files.text_files import read_toml
 
 
 def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:

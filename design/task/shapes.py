@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from scanwright.design.record import Record
+from scanwright.design.files.record import Record
 
 Number = Annotated[float, Strict()]
 """An int or a float of the file; text and true are no numbers."""

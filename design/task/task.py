@@ -23,8 +23,9 @@ from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.deck_holes import DeckHoles
 from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
-from scanwright.design.record import Fault, Record, faults_of, tell
 from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
 from scanwright.design.scene.surface import Surface, cast_surface
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanwright.design.angles import AngleSet
-from scanwright.design.atomic_file import check_place
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.concurrency.ahead import ahead
 from scanwright.design.errors import RecordingError, suggest
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.assembly.beam_outcome import Verdict, between_surfaces
 from scanwright.firmware_io.assembly.cloud_rows import COLUMNS, cloud_fields, cloud_rows

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from scanwright.design.angles import AngleSet
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
 from scanwright.firmware_io.calibration.estimate import Estimate, estimate

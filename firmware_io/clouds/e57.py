@@ -15,8 +15,8 @@ import numpy as np
 import pye57
 from pye57 import libe57
 
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.clouds.cloud import (
     COLUMN_TYPES,
     Cloud,

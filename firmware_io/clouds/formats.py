@@ -9,8 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.atomic_file import check_place
 from scanwright.design.errors import RecordingError, require, suggest
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.foreign import of_file
 

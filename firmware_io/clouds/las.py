@@ -14,8 +14,8 @@ from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design import frames
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
 from scanwright.firmware_io.foreign import foreign
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_npz
+from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.numpy_files import read_npz
 from scanwright.firmware_io.clouds.cloud import Cloud
 
 _COLUMN = "column."

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, PointCloud
 
 from scanwright.design.arrays import Pose
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
 from scanwright.firmware_io.foreign import foreign
 

@@ -18,8 +18,8 @@ from jaxtyping import Float64
 from numpy import ndarray
 from numpy.typing import NDArray
 
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
 from scanwright.firmware_io.foreign import foreign
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_text
+from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
 from scanwright.firmware_io.foreign import foreign
 

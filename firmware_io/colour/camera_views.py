@@ -15,7 +15,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Pose
 from scanwright.design.camera import Camera
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_text
+from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.poses.trajectory import Trajectory

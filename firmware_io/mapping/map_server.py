@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 _SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}

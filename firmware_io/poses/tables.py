@@ -9,7 +9,7 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_text
+from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 
 Row = tuple[int, Sequence[float]]

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError, suggest
-from scanwright.design.record import read_text
+from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.bags import Source, number_at

@@ -17,8 +17,8 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.bags import Bag, Message, open_bag
 from scanwright.firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanwright.design.arrays import Floats, Times
-from scanwright.design.atomic_file import check_place
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.angle_sources import (
     AngleUnit,

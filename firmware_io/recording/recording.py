@@ -27,8 +27,8 @@ from mcap.writer import Writer
 from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Times
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError, suggest
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of

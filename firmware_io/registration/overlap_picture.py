@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from scanwright.design import frames
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.registration.register import Registration
 from scanwright.firmware_io.registration.sensor_view import SensorView
 

@@ -10,9 +10,9 @@ from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design.arrays import Pose
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_text
+from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.angles import AngleSet
-from scanwright.design.atomic_file import check_place
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from scanwright.firmware_io.registration.merge import merge
 from scanwright.firmware_io.registration.overlap_picture import overlap_picture

@@ -19,9 +19,9 @@ import numpy as np
 from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array, Pose
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import RecordingError
-from scanwright.design.record import read_text
+from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.text_files import read_text
 
 URDF = "scanner.urdf"
 _RANGE_M = 10.0

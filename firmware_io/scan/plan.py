@@ -7,10 +7,10 @@ from datetime import datetime
 from pathlib import Path
 
 from scanwright.design.angles import CALIBRATED, AngleSet, angles_in_use
-from scanwright.design.atomic_file import check_place, place_in
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
 from scanwright.design.errors import DeviceError, RecordingError
+from scanwright.design.files.atomic_file import check_place, place_in
 from scanwright.design.motion import Motion, Spin
 from scanwright.firmware_io.device_ports import Ports, find_ports
 from scanwright.firmware_io.lidar.lidar import StampAt

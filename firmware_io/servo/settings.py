@@ -12,7 +12,8 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from scanwright.design.errors import DeviceError
-from scanwright.design.record import Record, explain
+from scanwright.design.files.faults import explain
+from scanwright.design.files.record import Record
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
 from scanwright.firmware_io.servo.families import all_tables

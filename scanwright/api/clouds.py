@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
-from scanwright.design.atomic_file import check_place
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal
 
 from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
 from scanwright.design.angles import AngleSet
-from scanwright.design.atomic_file import check_place
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.assembly.own_body import own_body_beside
 from scanwright.firmware_io.clouds.formats import check_target
 from scanwright.firmware_io.ros import robot_frames

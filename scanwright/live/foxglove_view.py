@@ -17,8 +17,8 @@ from pathlib import Path
 from mcap.writer import Writer
 
 from scanwright.design.angles import angles_in_use, load_angles
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError, TaskError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.assembly.own_body import own_body_beside
 from scanwright.firmware_io.recording.mcap_chunks import read_note
 from scanwright.firmware_io.recording.metadata import NOTE, held_by

@@ -16,9 +16,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from scanwright.design.atomic_file import place_in
 from scanwright.design.concurrency.processes import ctrl_c_held_back
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in
 from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
 
 try:

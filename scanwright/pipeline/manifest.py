@@ -15,8 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from scanwright.design.atomic_file import place_in
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in
 from scanwright.design.task.task import LoadedTask
 
 MANIFEST = "manifest.json"

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from scanwright.design.atomic_file import place_in, whole_file
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in, whole_file
 from scanwright.design.left_out import LeftOut
 from scanwright.design.search.search import SearchResult
 from scanwright.design.task.shapes import MapRegion, MeshRegion

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pydantic import TypeAdapter, ValidationError
 
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.record import faults_of
+from scanwright.design.files.faults import faults_of
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import SMALLEST_BALL_DEG, Task
 

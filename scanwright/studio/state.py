@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from scanwright.design.arrays import Array
 from scanwright.design.errors import TaskError
-from scanwright.design.record import explain
+from scanwright.design.files.faults import explain
 from scanwright.design.task.shapes import ConeRegion, MaskRegion, Region
 from scanwright.design.task.task import LoadedTask
 

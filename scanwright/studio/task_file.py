@@ -9,7 +9,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from scanwright.design.errors import TaskError
-from scanwright.design.record import explain
+from scanwright.design.files.faults import explain
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask, Task, load_task
 from scanwright.pipeline.records import rename_files

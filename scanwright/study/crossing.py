@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.errors import TaskError
-from scanwright.design.record import explain
+from scanwright.design.files.faults import explain
 from scanwright.design.task.named_products import motion_faults
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting

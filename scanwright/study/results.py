@@ -15,8 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.atomic_file import place_in, whole_file
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in, whole_file
 from scanwright.pipeline.manifest import code_digest, versions
 
 MARK = "results.json"

@@ -17,8 +17,8 @@ import numpy as np
 from scanwright.cad.checks.check import failure_lines
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.arrays import Array
-from scanwright.design.atomic_file import place_in
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task

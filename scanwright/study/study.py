@@ -14,8 +14,9 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from scanwright.design.errors import TaskError, suggest
+from scanwright.design.files.faults import explain
+from scanwright.design.files.record import Record
 from scanwright.design.motion import LONGEST_S, SHORTEST_S
-from scanwright.design.record import Record, explain
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.named_record import named_table
 from scanwright.design.task.task import Limits, LoadedTask, load_task

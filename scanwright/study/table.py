@@ -10,8 +10,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.atomic_file import place_in, whole_file
 from scanwright.design.errors import BuildError
+from scanwright.design.files.atomic_file import place_in, whole_file
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.study.crossing import AXES
 from scanwright.study.front import COLUMNS, costs

@@ -32,7 +32,7 @@ from benchmarks.scanwright.wrong_inputs.accidents import damage, number
 from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, Job, furnish, jobs
 from scanwright.cli.app import run
 from scanwright.design.errors import ScanwrightError
-from scanwright.design.record import MOST_TOLD
+from scanwright.design.files.faults import MOST_TOLD
 from scanwright.firmware_io.clouds.formats import read_clouds
 
 _MOST_BYTES = 2 << 30

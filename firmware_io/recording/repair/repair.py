@@ -20,8 +20,8 @@ import numpy as np
 from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 
-from scanwright.design.atomic_file import check_place, whole_file
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import check_place, whole_file
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
 from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages

@@ -7,7 +7,7 @@ import pytest
 
 from scanwright.design.catalogue.catalogue import SHIPPED as PRODUCTS
 from scanwright.design.errors import TaskError
-from scanwright.design.record import _key_lines
+from scanwright.design.files.faults import _key_lines
 from scanwright.design.task.task import Task, load_task
 
 BASE = """name = "mine"

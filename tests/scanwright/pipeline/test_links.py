@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from scanwright.cli.app import run as scanwright_command
 from scanwright.design.angles import Angles, AngleSet
-from scanwright.design.atomic_file import whole_file
 from scanwright.design.errors import BuildError, DeviceError
 from scanwright.design.evaluation.comparison_table import write_csv
+from scanwright.design.files.atomic_file import whole_file
 from scanwright.firmware_io.device_ports import Ports, announced
 from scanwright.pipeline import records
 from scanwright.pipeline.folder import fresh_folder

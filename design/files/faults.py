@@ -1,130 +1,20 @@
-"""What is read from a file is checked before anyone uses it: records, tables of TOML, arrays of NumPy."""
+"""Faults of a record read from a file: which key, on which line, and a suggestion."""
 
 from __future__ import annotations
 
-import codecs
-import io
 import tomllib
-import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, get_args
+from typing import Any, get_args
 
-import numpy as np
-from numpy.lib import format as npy
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from scanwright.design.errors import ScanwrightError, TaskError, suggest
+from scanwright.design.errors import suggest
+from scanwright.design.files.text_files import read_text
 
-_NUMBERS = "biuf"
 MOST_TOLD = 20  # faults of one file
 _LONGEST_STATEMENT = 1000  # lines
-_MOST_BYTES = 1 << 30  # an archive may be packed a thousandfold: beyond this it is hardly packed, or refused
-
-
-class Record(BaseModel):
-    """Immutable; a misspelt key is an error and not a default; NaN and infinity are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
-
-
-A_FILE_FOR_A_FOLDER = "this is a file; name the folder of a build, which holds"
-"""What is told to those who name a file of a build folder where the folder is meant; a file's name follows."""
-
-
-def read_text(path: Path) -> str:
-    """The text of a file in UTF-8, also where it begins with a byte order mark, as Windows' Notepad writes it.
-
-    Raises:
-        OSError: the file cannot be read.
-        ValueError: it is not UTF-8.
-    """
-    data = path.read_bytes()
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise ValueError("UTF-16 text: save it as UTF-8")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError("not UTF-8 text") from error
-    return io.StringIO(text, newline=None).read()
-
-
-def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The table of a TOML file.
-
-    Raises:
-        TaskError: the file cannot be read or is not TOML.
-    """
-    try:
-        return tomllib.loads(read_text(path))
-    except NotADirectoryError as error:
-        raise TaskError(f"{path.parent}: {A_FILE_FOR_A_FOLDER} {path.name}") from error
-    except OSError as error:
-        raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
-    except RecursionError as error:
-        raise TaskError(f"{path}: not a TOML file: nested too deeply") from error
-    except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
-        raise TaskError(f"{path}: not a TOML file: {error}") from error
-
-
-def read_npy(path: Path, refusal: type[ScanwrightError]) -> NDArray[Any]:
-    """The array of an `.npy` file: numbers, no objects.
-
-    Raises:
-        ScanwrightError: a `refusal`: the file cannot be read, or is no such array.
-    """
-    try:
-        with path.open("rb") as stream:
-            return _array(stream, path.stat().st_size)
-    except OSError as error:
-        raise refusal(f"{path}: cannot read: {error.strerror}") from error
-    except Exception as error:
-        raise refusal(f"{path}: not an array of NumPy: {_first_line(error)}") from error
-
-
-def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[Any]]:
-    """The arrays of an `.npz` archive by name: numbers, no objects.
-
-    Raises:
-        ScanwrightError: a `refusal`: the file cannot be read, or is no such archive.
-    """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-            most = max(_MOST_BYTES, 4 * path.stat().st_size)
-            if (size := sum(member.file_size for member in members)) > most:
-                raise ValueError(f"{size:,} bytes unpacked: at most {most:,}")
-            held = {}
-            for member in members:
-                with archive.open(member) as stream:
-                    held[member.filename.removesuffix(".npy")] = _array(stream, member.file_size)
-            return held
-    except OSError as error:
-        raise refusal(f"{path}: cannot read: {error.strerror or _first_line(error)}") from error
-    except Exception as error:
-        raise refusal(f"{path}: not an archive of NumPy, or damaged: {_first_line(error)}") from error
-
-
-def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
-    version = npy.read_magic(stream)
-    read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]
-    shape, fortran, kind = read_header(stream)
-    if kind.kind not in _NUMBERS:
-        raise ValueError(f"an array of {kind}: numbers only")
-    count = 1
-    for side in shape:
-        count *= side
-    if min(shape, default=0) < 0 or count * kind.itemsize > size:
-        raise ValueError(f"an array of shape {shape}, {kind}, in {size:,} bytes")
-    data = stream.read(count * kind.itemsize)
-    found = np.frombuffer(data, kind, count).reshape(shape, order="F" if fortran else "C")
-    return found.astype(kind.newbyteorder("="))
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""Files of people and programs: read with checks, written in one step."""

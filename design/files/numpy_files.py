@@ -1,0 +1,74 @@
+"""Arrays of NumPy from `.npy` and `.npz` files: numbers only, of the size that the file can hold."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from scanwright.design.errors import ScanwrightError
+
+_NUMBERS = "biuf"
+_MOST_BYTES = 1 << 30  # an archive can be packed a thousandfold: a larger one is hardly packed, or refused
+
+
+def read_npy(path: Path, refusal: type[ScanwrightError]) -> NDArray[Any]:
+    """The array of an `.npy` file: numbers, no objects.
+
+    Raises:
+        ScanwrightError: a `refusal`: the file cannot be read, or is no such array.
+    """
+    try:
+        with path.open("rb") as stream:
+            return _array(stream, path.stat().st_size)
+    except OSError as error:
+        raise refusal(f"{path}: cannot read: {error.strerror}") from error
+    except Exception as error:
+        raise refusal(f"{path}: not an array of NumPy: {_first_line(error)}") from error
+
+
+def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[Any]]:
+    """The arrays of an `.npz` archive by name: numbers, no objects.
+
+    Raises:
+        ScanwrightError: a `refusal`: the file cannot be read, or is no such archive.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+            most = max(_MOST_BYTES, 4 * path.stat().st_size)
+            if (size := sum(member.file_size for member in members)) > most:
+                raise ValueError(f"{size:,} bytes unpacked: at most {most:,}")
+            held = {}
+            for member in members:
+                with archive.open(member) as stream:
+                    held[member.filename.removesuffix(".npy")] = _array(stream, member.file_size)
+            return held
+    except OSError as error:
+        raise refusal(f"{path}: cannot read: {error.strerror or _first_line(error)}") from error
+    except Exception as error:
+        raise refusal(f"{path}: not an archive of NumPy, or damaged: {_first_line(error)}") from error
+
+
+def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
+    version = npy.read_magic(stream)
+    read_header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]
+    shape, fortran, kind = read_header(stream)
+    if kind.kind not in _NUMBERS:
+        raise ValueError(f"an array of {kind}: numbers only")
+    count = 1
+    for side in shape:
+        count *= side
+    if min(shape, default=0) < 0 or count * kind.itemsize > size:
+        raise ValueError(f"an array of shape {shape}, {kind}, in {size:,} bytes")
+    data = stream.read(count * kind.itemsize)
+    found = np.frombuffer(data, kind, count).reshape(shape, order="F" if fortran else "C")
+    return found.astype(kind.newbyteorder("="))
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]
