@@ -7,8 +7,8 @@ servo="/dev/serial/by-id/...")`. The folder needs no more than an `angles.json`.
 from pathlib import Path
 
 import scanwright as sw
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.world import room
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.world import room
 
 TASK = {
     "name": "twins",

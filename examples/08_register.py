@@ -10,8 +10,8 @@ import numpy as np
 import scanwright as sw
 from scanwright.design.frames import Rz, apply, rigid
 from scanwright.design.scene.ray_caster import build_scene
-from scanwright.firmware_io.twins.simulated import simulated_recording
-from scanwright.firmware_io.twins.world import furnished_room
+from scanwright.firmware_io.emulators.simulated import simulated_recording
+from scanwright.firmware_io.emulators.world import furnished_room
 
 TASK = {
     "name": "stands",

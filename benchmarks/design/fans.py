@@ -26,7 +26,7 @@ from scanwright.design.motion import Spin
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.design.task.task import LoadedTask, Task
-from scanwright.firmware_io.twins.simulated import simulated_recording
+from scanwright.firmware_io.emulators.simulated import simulated_recording
 
 PERIOD_S, BALL_DEG, BOX_M, TENTHS = 20.0, 2.0, 3.0, 10
 SERVO = "MX-64R"

@@ -28,12 +28,12 @@ from threading import Event, Timer
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import ScanwrightError
+from scanwright.firmware_io.emulators.scanner import EmulatedScanner, emulated_scanner
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.recording.repair.repair import repair
 from scanwright.firmware_io.scan import acquire
 from scanwright.firmware_io.scan.plan import plan_scan
-from scanwright.firmware_io.twins.scanner import EmulatedScanner, emulated_scanner
-from scanwright.firmware_io.twins.world import room
 
 ANGLES = AngleSet.model_validate(
     {

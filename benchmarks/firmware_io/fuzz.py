@@ -17,13 +17,13 @@ from unittest.mock import patch
 
 from benchmarks.firmware_io.devices.damaged_lidars import LANGUAGES
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.emulators.servo import dynamixel_packets, feetech_packets
 from scanwright.firmware_io.servo.bus import bus, serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from scanwright.firmware_io.servo.feetech.packets import STS
-from scanwright.firmware_io.twins.servo import dynamixel_packets, feetech_packets
 
 _SERVO_SCRAPS = [b"\xff\xff\x01\x02", b"\xff\xff\xfd\x00\x01", b"\xff\xff\xff", b"\x00", b"\xfd", b"\xfe"]
 _BLOCK = Register(36, 8)

@@ -40,7 +40,7 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import score
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.design.task.task import load_task
-from scanwright.firmware_io.twins.simulated import simulated_recording
+from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.report.answer import mounting_rad, problem_as_built
 
 MOVIE = Path(__file__).parents[2] / "docs/pictures/from_task_to_cloud.webp"

@@ -33,7 +33,7 @@ from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.design.shadow import load_own_body
 from scanwright.design.task.task import load_task
-from scanwright.firmware_io.twins.simulated import simulated_recording
+from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.sentences import sentences
 

@@ -24,8 +24,8 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.frames import Rz, rigid
 from scanwright.design.scene.ray_caster import build_scene
+from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.firmware_io.recording.arrays import RecordingArrays
-from scanwright.firmware_io.twins.simulated import simulated_recording
 
 PICTURE = Path(__file__).parents[2] / "docs/pictures/robot.png"
 DECK_M = np.array([0.30, 0.0, 0.62])  # the deck that the scanner hangs from, in the robot's frame on the floor

@@ -19,15 +19,15 @@ from scanwright.firmware_io.lidar.scip.driver import open_scip
 from scanwright.firmware_io.lidar.sick.driver import open_sick
 from scanwright.firmware_io.lidar.slamtec.driver import open_slamtec
 
-# where no model is named they are tried in this order: who only listens first
+_EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers must not import emulators
+
+# If no model is named, they are tried in this order: first the one that only listens.
 FAMILIES = (
-    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, "scanwright.firmware_io.twins.ldrobot:ldrobot_twin"),
-    LidarFamily(
-        "scip", "Hokuyo (SCIP 2.0)", open_scip, "scanwright.firmware_io.twins.lidar:scip_twin", stamp_choice=True
-    ),
-    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, "scanwright.firmware_io.twins.slamtec:slamtec_twin"),
-    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, "scanwright.firmware_io.twins.sick.cola_twin:sick_twin"),
-    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, "scanwright.firmware_io.twins.sick.lms_twin:lms_twin"),
+    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, f"{_EMULATORS}.ldrobot:ldrobot_twin"),
+    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, f"{_EMULATORS}.lidar:scip_twin", stamp_choice=True),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec:slamtec_twin"),
+    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, f"{_EMULATORS}.sick.cola_twin:sick_twin"),
+    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, f"{_EMULATORS}.sick.lms_twin:lms_twin"),
 )
 
 

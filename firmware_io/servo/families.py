@@ -25,8 +25,8 @@ class ServoFamily:
         name: of the family.
         tables: of its models.
         bauds: bits per second, those first that servos are set to most.
-        twin: "package.module:Class" of its `firmware_io.twins.servo.machine.ServoMachine`, made of (control table, what
-            hangs on the horn, time in ns, angle of the horn); a text, since twins live a storey above drivers.
+        twin: "package.module:Class" of its `firmware_io.emulators.servo.machine.ServoMachine`, made of (control table,
+            load on the horn, time in ns, angle of the horn); a text, since drivers must not import emulators.
     """
 
     name: str
@@ -44,13 +44,13 @@ FAMILIES = (
         "Dynamixel",
         DYNAMIXEL_TABLES,
         (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000, 500_000, 200_000, 9600),
-        "scanwright.firmware_io.twins.servo.dynamixel_machine:DynamixelMachine",
+        "scanwright.firmware_io.emulators.servo.dynamixel_machine:DynamixelMachine",
     ),
     ServoFamily(
         "Feetech",
         FEETECH_TABLES,
         (1_000_000, 500_000, 115_200, 250_000, 128_000, 57_600, 76_800, 38_400),
-        "scanwright.firmware_io.twins.servo.feetech_machine:FeetechMachine",
+        "scanwright.firmware_io.emulators.servo.feetech_machine:FeetechMachine",
     ),
 )
 

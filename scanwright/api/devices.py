@@ -188,8 +188,8 @@ def simulate(
         TaskError: the sensor is not in the catalogue.
         DeviceError: the angle set does not say how the servo moves.
     """
-    from scanwright.firmware_io.twins.simulated import simulated_recording
-    from scanwright.firmware_io.twins.world import room
+    from scanwright.firmware_io.emulators.simulated import simulated_recording
+    from scanwright.firmware_io.emulators.world import room
 
     place = room(None if scene is None else Path(scene))
     return simulated_recording(as_angle_set(angles), place, turns=turns, sigma_mm=noise_mm, seed=seed)

@@ -123,7 +123,7 @@ def accuracy(
     from scanwright.design.accuracy.report import report_precision, report_search, report_stress
 
     if stress:
-        from scanwright.firmware_io.twins.servo_plant import plant_of
+        from scanwright.firmware_io.emulators.servo_plant import plant_of
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)

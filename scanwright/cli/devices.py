@@ -85,9 +85,9 @@ def emulate(
     """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
-    from scanwright.firmware_io.twins.head import read_load
-    from scanwright.firmware_io.twins.scanner import emulated_scanner
-    from scanwright.firmware_io.twins.world import room
+    from scanwright.firmware_io.emulators.head import read_load
+    from scanwright.firmware_io.emulators.scanner import emulated_scanner
+    from scanwright.firmware_io.emulators.world import room
 
     angles = load_angles(out / "angles.json")
     place = room(scene, unit_m, at)

@@ -8,7 +8,7 @@ from pathlib import Path
 from scanwright.design.accuracy.trials import report_trials
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import LoadedTask
-from scanwright.firmware_io.twins.servo_plant import plant_of
+from scanwright.firmware_io.emulators.servo_plant import plant_of
 from scanwright.trials.axis import axis_trials
 from scanwright.trials.solver import solver_trials
 

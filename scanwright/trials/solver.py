@@ -11,8 +11,8 @@ import numpy as np
 
 from scanwright.design.accuracy.trials import Trial, timed
 from scanwright.design.arrays import Floats
-from scanwright.firmware_io.twins.dynamics import HornMotion, Solver
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, Plant
+from scanwright.firmware_io.emulators.dynamics import HornMotion, Solver
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant
 
 METHODS: tuple[Literal["LSODA", "Radau", "BDF"], ...] = ("LSODA", "Radau", "BDF")
 TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8

@@ -18,10 +18,10 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import build_scene, cast
 from scanwright.firmware_io.assembly.deskew import deskew
+from scanwright.firmware_io.emulators.dynamics import HornMotion, Motion
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant, equations
+from scanwright.firmware_io.emulators.world import furnished_room
 from scanwright.firmware_io.samples import JointLog, Scan
-from scanwright.firmware_io.twins.dynamics import HornMotion, Motion
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, Plant, equations
-from scanwright.firmware_io.twins.world import furnished_room
 
 SETTLED = 25.0  # time constants of rotor and load
 GOAL_RAD_S = 1.0

@@ -12,13 +12,13 @@ from scanwright.design.catalogue import catalogue
 from scanwright.design.catalogue.catalogue import SHIPPED, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.lidar import families as lidar_families
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.servo import families as servo_families
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.world import room
 
 # Ten turns a second of four beams, one line of text each: "range range range range" in millimetres.
 LIDAR = """
@@ -29,7 +29,7 @@ import numpy as np
 from scanwright.firmware_io.lidar.lidar import LidarFamily, TimedScan
 from scanwright.firmware_io.lidar.sensor_line import SensorLine
 from scanwright.firmware_io.samples import Scan
-from scanwright.firmware_io.twins.lidar_line import LidarLine
+from scanwright.firmware_io.emulators.lidar_line import LidarLine
 
 
 class Acme:
@@ -121,7 +121,7 @@ NO_FAMILY = 7
 
 
 def Twin(table, load, time_ns, angle_rad):
-    from scanwright.firmware_io.twins.servo.feetech_machine import FeetechMachine
+    from scanwright.firmware_io.emulators.servo.feetech_machine import FeetechMachine
 
     made = FeetechMachine(table, load, time_ns, angle_rad)
     made.memory[3], made.memory[6] = 4711, 2

@@ -2,9 +2,9 @@
 
 from collections import deque
 
-from scanwright.firmware_io.twins.servo.machine import answers
-from scanwright.firmware_io.twins.servo.models import machine_of
-from scanwright.firmware_io.twins.servo_plant import Load
+from scanwright.firmware_io.emulators.servo.machine import answers
+from scanwright.firmware_io.emulators.servo.models import machine_of
+from scanwright.firmware_io.emulators.servo_plant import Load
 
 
 class VirtualBus:

@@ -8,7 +8,7 @@ import pytest
 
 from scanwright.cad.geometry import mesh_trials as meshes
 from scanwright.design.accuracy.trials import Trial, best_trials
-from scanwright.firmware_io.twins.servo_plant import plant_of
+from scanwright.firmware_io.emulators.servo_plant import plant_of
 from scanwright.trials import axis
 from scanwright.trials import solver as solvers
 

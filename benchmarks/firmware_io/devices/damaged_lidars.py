@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.emulators import ldrobot as ldrobot_twins
+from scanwright.firmware_io.emulators import slamtec as slamtec_twins
+from scanwright.firmware_io.emulators.sick import lms_twin as lms_twins
 from scanwright.firmware_io.lidar.ldrobot import protocol as ldrobot
 from scanwright.firmware_io.lidar.lms2xx import protocol as lms
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
 from scanwright.firmware_io.lidar.sick import cola, scan_data
 from scanwright.firmware_io.lidar.slamtec import protocol as slamtec
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
-from scanwright.firmware_io.twins import ldrobot as ldrobot_twins
-from scanwright.firmware_io.twins import slamtec as slamtec_twins
-from scanwright.firmware_io.twins.sick import lms_twin as lms_twins
 
 _SCIP = [b"\n", b"\n\n", b"99b\n", b"MD0000003901000\n", b"ME0003001201000\n", b";", b"0", b"\xff"]
 _COLA = [b"\x02", b"\x03", b"\x02" * 4, b"\x02sSN ", b"sFA", b" ", b"FFFFFFFF", b"\x00\x00", b"-1", b"\xff"]

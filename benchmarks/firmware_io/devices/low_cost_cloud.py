@@ -27,10 +27,10 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.scan.acquire import acquire
 from scanwright.firmware_io.scan.plan import plan_scan
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.world import room
 
 _ASIDE_RAD = math.radians(0.5)
 _LEAST_M = 1e-6

@@ -22,6 +22,7 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.emulators.lidar_line import Machine
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
@@ -30,7 +31,6 @@ from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
 from scanwright.firmware_io.lidar.slamtec import dialogue
 from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.samples import Scan
-from scanwright.firmware_io.twins.lidar_line import Machine
 
 MODELS = ["LD06", "LD19", "STL27L", "LMS 200"]
 MODELS += [f"RPLIDAR {series}" for series in ("A1", "A2", "A3", "S1", "S2", "C1")]

@@ -17,8 +17,8 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, build_scene, cast
+from scanwright.firmware_io.emulators.world import furnished_room, rays
 from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
-from scanwright.firmware_io.twins.world import furnished_room, rays
 
 FLOOR_M = -0.9
 SPEED_M_S = 1.0

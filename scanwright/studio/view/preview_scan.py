@@ -14,7 +14,7 @@ from scanwright.design.frames import Rx, Ry, Rz
 from scanwright.design.scanner import Scanner
 from scanwright.design.scene.ray_caster import Scene, build_scene, load_scene
 from scanwright.design.task.shapes import Placed
-from scanwright.firmware_io.twins.world import furnished_room, measure_ranges, range_model, see
+from scanwright.firmware_io.emulators.world import furnished_room, measure_ranges, range_model, see
 
 MOST_RAYS = 150_000  # what a page draws at once
 SEED = 0

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.emulators import ldrobot as twins
+from scanwright.firmware_io.emulators.ldrobot import LdrobotTwin
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver, protocol
-from scanwright.firmware_io.twins import ldrobot as twins
-from scanwright.firmware_io.twins.ldrobot import LdrobotTwin
 
 # A packet that the maker's documents take apart.
 EXAMPLE = bytes.fromhex(

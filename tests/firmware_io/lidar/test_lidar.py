@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError
+from scanwright.firmware_io.emulators import hokuyo_models, lidar_machine
+from scanwright.firmware_io.emulators.lidar import LidarTwin
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.scip import dialogue, protocol
 from scanwright.firmware_io.lidar.scip.driver import ScipLidar, open_scip
 from scanwright.firmware_io.lidar.scip.raw_scan import to_laser_scan
-from scanwright.firmware_io.twins import hokuyo_models, lidar_machine
-from scanwright.firmware_io.twins.lidar import LidarTwin
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
 

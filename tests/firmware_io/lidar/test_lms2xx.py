@@ -9,11 +9,11 @@ from virtual_line import VirtualLine
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceFaultError, ProtocolError
+from scanwright.firmware_io.emulators.sick.lms_twin import LmsTwin, lms_twin, write_telegram
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lms2xx import driver, protocol
 from scanwright.firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
-from scanwright.firmware_io.twins.sick.lms_twin import LmsTwin, lms_twin, write_telegram
 
 # As users of the telegram listing write them, with their sums.
 REQUESTS = [

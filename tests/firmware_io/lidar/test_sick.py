@@ -8,11 +8,11 @@ import pytest
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
+from scanwright.firmware_io.emulators.sick.cola_twin import SickMachine, SickTwin
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.sick import driver
 from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
 from scanwright.firmware_io.lidar.sick.driver import open_sick
-from scanwright.firmware_io.twins.sick.cola_twin import SickMachine, SickTwin
 
 MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
 

@@ -12,9 +12,9 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
+from scanwright.firmware_io.emulators.slamtec import IDENTITIES, SlamtecTwin
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
-from scanwright.firmware_io.twins.slamtec import IDENTITIES, SlamtecTwin
 
 # What the maker's protocol manual and SDK write.
 REQUESTS = [

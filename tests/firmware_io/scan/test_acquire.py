@@ -29,6 +29,9 @@ from scanwright.design.motion import Spin, StopAndGo, Sweep
 from scanwright.design.scene.ray_caster import cast
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.clouds.ply import read_ply
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.lidar.scip import dialogue
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING
 from scanwright.firmware_io.recording.recording import open_recording
@@ -39,9 +42,6 @@ from scanwright.firmware_io.scan.plan import plan_scan
 from scanwright.firmware_io.scan.setpoints import course
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.world import room
 
 ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}

@@ -13,12 +13,12 @@ import pytest
 
 from scanwright.design.angles import AngleSet
 from scanwright.firmware_io import device_ports, serial_port
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.servo.dynamixel_packets import take
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.scan import doctor
 from scanwright.firmware_io.servo.families import all_tables
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.servo.dynamixel_packets import take
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.world import room
 
 PING, READ, WRITE = 1, 2, 3
 

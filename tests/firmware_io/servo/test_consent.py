@@ -12,16 +12,16 @@ from scanwright.cli.servo_setup import asking_first
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.device_ports import announced
+from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.servo.machine import Request
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.ros import drive as ros_drive
 from scanwright.firmware_io.servo import servo as servo_driver
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.fitness import ServoSetupError
 from scanwright.firmware_io.servo.servo import open_servo
 from scanwright.firmware_io.servo.settings import set_up
-from scanwright.firmware_io.twins.scanner import emulated_scanner
-from scanwright.firmware_io.twins.servo.machine import Request
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.world import room
 
 MODELS = [
     ("AX-12A", "1.0"),

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.emulators.servo import feetech_packets
+from scanwright.firmware_io.emulators.servo.machine import answers
+from scanwright.firmware_io.emulators.servo.models import machine_of
+from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo.bus import bus as servo_bus
 from scanwright.firmware_io.servo.bus import serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.feetech.packets import STS, begun, request
 from scanwright.firmware_io.servo.feetech.tables import TABLES
-from scanwright.firmware_io.twins.servo import feetech_packets
-from scanwright.firmware_io.twins.servo.machine import answers
-from scanwright.firmware_io.twins.servo.models import machine_of
-from scanwright.firmware_io.twins.servo_plant import Load
 
 (STS3215,) = TABLES
 

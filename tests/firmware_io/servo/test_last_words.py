@@ -10,12 +10,12 @@ import pytest
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.design.motion import Spin
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
 from scanwright.firmware_io.scan import acquire, axis_thread, lidar_scans
 from scanwright.firmware_io.scan.axis_thread import turning_servo
 from scanwright.firmware_io.servo import guard
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
 UNHEARD = "could not be stopped: take its power"

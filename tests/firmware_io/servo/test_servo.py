@@ -17,6 +17,7 @@ from patience import until
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.emulators.servo.dynamixel_packets import packet_2, status
 from scanwright.firmware_io.servo import guard
 from scanwright.firmware_io.servo.bus import bus as servo_bus
 from scanwright.firmware_io.servo.bus import serial_line
@@ -28,7 +29,6 @@ from scanwright.firmware_io.servo.find import find_servo
 from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
 from scanwright.firmware_io.servo.reading import nearest_turn
 from scanwright.firmware_io.servo.servo import open_servo
-from scanwright.firmware_io.twins.servo.dynamixel_packets import packet_2, status
 
 REGISTERS = [
     getattr(table, name) for table in TABLES for name in ("wheel_speed", "joint_speed", "goal", "load", "torque")

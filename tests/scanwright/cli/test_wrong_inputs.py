@@ -14,7 +14,7 @@ from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, furnish
 from scanwright.design.errors import TaskError
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
-from scanwright.firmware_io.twins.world import range_model
+from scanwright.firmware_io.emulators.world import range_model
 
 LONG = "x" * 300
 

@@ -19,7 +19,7 @@ from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import load_task
-from scanwright.firmware_io.twins.world import furnished_room
+from scanwright.firmware_io.emulators.world import furnished_room
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html

@@ -5,7 +5,7 @@ Written from the table of frames in Feetech's protocol manual, and not from the 
 
 from __future__ import annotations
 
-from scanwright.firmware_io.twins.servo.machine import Request
+from scanwright.firmware_io.emulators.servo.machine import Request
 
 _LONGEST = 250
 

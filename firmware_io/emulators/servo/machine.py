@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.servo.bus.registers import ControlTable
-from scanwright.firmware_io.twins.dynamics import HornMotion
 
 BROADCAST = 254
 

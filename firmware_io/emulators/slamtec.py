@@ -15,8 +15,8 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
-from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
-from scanwright.firmware_io.twins.world import turned_deg
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.world import turned_deg
 
 _FIRMWARE = (1, 29)
 _CHUNK_NS = 8_000_000

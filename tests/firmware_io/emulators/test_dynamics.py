@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanwright.firmware_io.twins.dynamics import HornMotion, Solver
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
+from scanwright.firmware_io.emulators.dynamics import HornMotion, Solver
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 
 SECOND = 1_000_000_000
 MX, AX = plant_of("MX-64R"), plant_of("AX-12A")

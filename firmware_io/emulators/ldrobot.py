@@ -13,8 +13,8 @@ import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
-from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
-from scanwright.firmware_io.twins.world import turned_deg
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.world import turned_deg
 
 BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
 _POINTS = 12

@@ -12,7 +12,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Rotation, Vector
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.twins.servo_plant import Load
+from scanwright.firmware_io.emulators.servo_plant import Load
 
 _GRAVITY_M_S2 = np.array([0.0, 0.0, -frames.STANDARD_GRAVITY_M_S2])
 

@@ -25,10 +25,10 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
+from scanwright.firmware_io.emulators.servo.machine import ServoMachine, answers
+from scanwright.firmware_io.emulators.servo.models import machine_of
+from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo.fitness import set_up_counts
-from scanwright.firmware_io.twins.servo.machine import ServoMachine, answers
-from scanwright.firmware_io.twins.servo.models import machine_of
-from scanwright.firmware_io.twins.servo_plant import Load
 
 _TICK_S = 0.02  # between two looks of the servo at itself
 

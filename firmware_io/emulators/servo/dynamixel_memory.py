@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.firmware_io.twins.servo.memory import TableItem, ro, rw, signed
+from scanwright.firmware_io.emulators.servo.memory import TableItem, ro, rw, signed
 
 
 def _protocol_1(

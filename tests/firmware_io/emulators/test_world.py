@@ -12,10 +12,10 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.design.scene.ray_caster import Hits, build_scene, cast
 from scanwright.firmware_io.assembly.deskew import place
+from scanwright.firmware_io.emulators.head import read_load
+from scanwright.firmware_io.emulators.servo_plant import Load
+from scanwright.firmware_io.emulators.world import RangeModel, furnished_room, measure_ranges, range_model, rays, see
 from scanwright.firmware_io.samples import JointLog, Scan
-from scanwright.firmware_io.twins.head import read_load
-from scanwright.firmware_io.twins.servo_plant import Load
-from scanwright.firmware_io.twins.world import RangeModel, furnished_room, measure_ranges, range_model, rays, see
 
 BEARINGS_RAD = load_catalogue().get("UTM-30LX", Lidar).bearings_rad()
 MODEL = RangeModel(sigma_m=0.01, quantum_m=0.001, range_min_m=0.1, range_max_m=30, incidence_max_rad=np.radians(85))

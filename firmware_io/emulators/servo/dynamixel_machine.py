@@ -11,15 +11,15 @@ from collections.abc import Sequence
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.emulators.dynamics import HornMotion
+from scanwright.firmware_io.emulators.servo import dynamixel_groups as groups
+from scanwright.firmware_io.emulators.servo.dynamixel_control import count_of, show, wanted
+from scanwright.firmware_io.emulators.servo.dynamixel_memory import INDIRECT, ITEMS
+from scanwright.firmware_io.emulators.servo.dynamixel_packets import fast_status, status, take
+from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
+from scanwright.firmware_io.emulators.servo.memory import ACCESS, RANGE, Memory
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 from scanwright.firmware_io.servo.bus.registers import ControlTable
-from scanwright.firmware_io.twins.dynamics import HornMotion
-from scanwright.firmware_io.twins.servo import dynamixel_groups as groups
-from scanwright.firmware_io.twins.servo.dynamixel_control import count_of, show, wanted
-from scanwright.firmware_io.twins.servo.dynamixel_memory import INDIRECT, ITEMS
-from scanwright.firmware_io.twins.servo.dynamixel_packets import fast_status, status, take
-from scanwright.firmware_io.twins.servo.machine import BROADCAST, Request
-from scanwright.firmware_io.twins.servo.memory import ACCESS, RANGE, Memory
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
-from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
 
 _NEVER_NS = 1 << 62
 _BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady

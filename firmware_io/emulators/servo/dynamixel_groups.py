@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.firmware_io.twins.servo.machine import Request
+from scanwright.firmware_io.emulators.servo.machine import Request
 
 SYNC_READ, BULK_READ, FAST_SYNC_READ, FAST_BULK_READ = 0x82, 0x92, 0x8A, 0x9A
 SYNC_WRITE, BULK_WRITE = 0x83, 0x93

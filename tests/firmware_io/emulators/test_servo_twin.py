@@ -20,15 +20,15 @@ from pyax12.connection import Connection
 
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io import serial_port
+from scanwright.firmware_io.emulators.servo.dynamixel_packets import crc16, packet_2, status, take
+from scanwright.firmware_io.emulators.servo.machine import answers
+from scanwright.firmware_io.emulators.servo.models import machine_of
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo import servo as servo_driver
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.dynamixel.tables import TABLES
 from scanwright.firmware_io.servo.fitness import ServoSetupError
-from scanwright.firmware_io.twins.servo.dynamixel_packets import crc16, packet_2, status, take
-from scanwright.firmware_io.twins.servo.machine import answers
-from scanwright.firmware_io.twins.servo.models import machine_of
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.servo_plant import Load
 
 MODELS = [("MX-64R", "1.0"), ("MX-106", "1.0"), ("MX-64R", "2.0"), ("XM430-W350", "2.0"), ("XL330-M288", "2.0")]
 MODELS += [("STS3215", "STS")]

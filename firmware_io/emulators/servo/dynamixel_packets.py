@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scanwright.firmware_io.twins.servo.machine import BROADCAST, Request
+from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
 
 
 def packet_checksum(body: bytes) -> int:

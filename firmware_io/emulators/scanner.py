@@ -17,11 +17,11 @@ from scanwright.design.errors import SceneError
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.device_ports import Ports
+from scanwright.firmware_io.emulators.lidar_line import LidarLine
+from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo_plant import Load
+from scanwright.firmware_io.emulators.world import looking, range_model, rays
 from scanwright.firmware_io.lidar.families import family_of
-from scanwright.firmware_io.twins.lidar_line import LidarLine
-from scanwright.firmware_io.twins.servo.twin import ServoTwin
-from scanwright.firmware_io.twins.servo_plant import Load
-from scanwright.firmware_io.twins.world import looking, range_model, rays
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from scanwright.firmware_io.emulators.dynamics import Motion
+from scanwright.firmware_io.emulators.servo.memory import Memory
+from scanwright.firmware_io.emulators.servo_plant import Actuation
 from scanwright.firmware_io.servo.bus.registers import ControlTable
-from scanwright.firmware_io.twins.dynamics import Motion
-from scanwright.firmware_io.twins.servo.memory import Memory
-from scanwright.firmware_io.twins.servo_plant import Actuation
 
 
 def wanted(table: ControlTable, memory: Memory, turns: int) -> Actuation:

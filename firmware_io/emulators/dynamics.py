@@ -1,8 +1,8 @@
 """How a servo's horn really turns: motor, gear with play, control loop, and an off-axis mass that gravity pulls.
 
-Its equations are those of `firmware_io/twins/servo_plant.py`. The gear's teeth are stiff (`stiffness_nm_rad` on a rotor
-of some 1e-3 kg m2: a millisecond) against turns of seconds, so a stiff solver integrates it, only as far as somebody
-asks.
+Its equations are those of `firmware_io/emulators/servo_plant.py`. The gear's teeth are stiff (`stiffness_nm_rad` on a
+rotor of some 1e-3 kg m2: a millisecond) against turns of seconds, so a stiff solver integrates it, up to the time that
+is requested.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy import ndarray
 from scipy.integrate import BDF, LSODA, Radau
 
 from scanwright.design.arrays import Floats
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, Plant, effort, equations, walked_rad
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant, effort, equations, walked_rad
 
 _SOLVERS = {"LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 

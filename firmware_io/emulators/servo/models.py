@@ -5,9 +5,9 @@ from __future__ import annotations
 from pkgutil import resolve_name
 
 from scanwright.design.errors import DeviceError, removal
+from scanwright.firmware_io.emulators.servo.machine import ServoMachine
+from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo.families import all_families, all_tables
-from scanwright.firmware_io.twins.servo.machine import ServoMachine
-from scanwright.firmware_io.twins.servo_plant import Load
 
 
 def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> ServoMachine:

@@ -10,10 +10,10 @@ import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import ProtocolError
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
 from scanwright.firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
 from scanwright.firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
 from scanwright.firmware_io.lidar.sick.values import Reader
-from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
 
 _NEVER_NS = 1 << 62
 _SEND_NS = 3_000_000  # from the last beam to the telegram: between the captures of an LMS100 and of a TiM55x

@@ -6,10 +6,10 @@ import time
 
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
+from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_machine import LidarMachine, Look
 from scanwright.firmware_io.lidar.scip import measurement
-from scanwright.firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
-from scanwright.firmware_io.twins.lidar_line import LidarLine, Sight
-from scanwright.firmware_io.twins.lidar_machine import LidarMachine, Look
 
 _HEAD = 32  # bytes of a scan before its ranges: echo, status, stamp
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scanwright.design.arrays import Floats, Times
+from scanwright.firmware_io.emulators.hokuyo_models import Identity, Quartz
 from scanwright.firmware_io.lidar.lidar import StampAt
 from scanwright.firmware_io.lidar.scip import measurement, protocol
-from scanwright.firmware_io.twins.hokuyo_models import Identity, Quartz
 
 Look = Callable[[Times], tuple[Floats, Floats]]
 

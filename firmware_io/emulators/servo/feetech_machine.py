@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
+from scanwright.firmware_io.emulators.dynamics import HornMotion
+from scanwright.firmware_io.emulators.servo import feetech_packets
+from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
+from scanwright.firmware_io.emulators.servo.memory import Memory, TableItem, ro, rw
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 from scanwright.firmware_io.servo.bus.registers import ControlTable
-from scanwright.firmware_io.twins.dynamics import HornMotion
-from scanwright.firmware_io.twins.servo import feetech_packets
-from scanwright.firmware_io.twins.servo.machine import BROADCAST, Request
-from scanwright.firmware_io.twins.servo.memory import Memory, TableItem, ro, rw
-from scanwright.firmware_io.twins.servo_plant import Actuation, Load, plant_of
 
 _BOOT_S = 0.5
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar as Lidar
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
+from scanwright.firmware_io.emulators.lidar import LidarTwin
+from scanwright.firmware_io.emulators.lidar_machine import LidarMachine, clustered
 from scanwright.firmware_io.lidar.scip import measurement, protocol
-from scanwright.firmware_io.twins.hokuyo_models import IDENTITIES, Quartz
-from scanwright.firmware_io.twins.lidar import LidarTwin
-from scanwright.firmware_io.twins.lidar_machine import LidarMachine, clustered
 
 MS = 1_000_000
 

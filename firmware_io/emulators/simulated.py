@@ -15,9 +15,9 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.design.motion import Motion, Spin, Sweep
 from scanwright.design.scene.ray_caster import Scene
+from scanwright.firmware_io.emulators.world import measure_ranges, range_model, see
 from scanwright.firmware_io.recording.arrays import RecordingArrays
 from scanwright.firmware_io.samples import JointLog
-from scanwright.firmware_io.twins.world import measure_ranges, range_model, see
 
 JOINT_HZ = 200.0
 
