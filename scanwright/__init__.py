@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from scanwright.api import write_cloud as write_cloud
     from scanwright.api.devices import Scanned as Scanned
     from scanwright.cad.assembly.assembly import Assembly as Assembly
-    from scanwright.cad.checks.check import Check as Check
     from scanwright.design.angles import AngleSet as AngleSet
     from scanwright.design.errors import BuildError as BuildError
     from scanwright.design.errors import DeviceError as DeviceError
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     from scanwright.design.errors import UnsafeError as UnsafeError
     from scanwright.design.evaluation.comparison import ComparisonRow as ComparisonRow
     from scanwright.design.evaluation.evaluation import Evaluation as Evaluation
+    from scanwright.design.findings import Finding as Finding
     from scanwright.design.search.optimum import Optimum as Optimum
     from scanwright.design.task.task import LoadedTask as LoadedTask
     from scanwright.design.task.task import Task as Task
@@ -74,7 +74,6 @@ if TYPE_CHECKING:
 _TYPES = {
     "Scanned": "scanwright.api.devices",
     "Assembly": "scanwright.cad.assembly.assembly",
-    "Check": "scanwright.cad.checks.check",
     "AngleSet": "scanwright.design.angles",
     "BuildError": "scanwright.design.errors",
     "DeviceError": "scanwright.design.errors",
@@ -90,6 +89,7 @@ _TYPES = {
     "UnsafeError": "scanwright.design.errors",
     "ComparisonRow": "scanwright.design.evaluation.comparison",
     "Evaluation": "scanwright.design.evaluation.evaluation",
+    "Finding": "scanwright.design.findings",
     "Optimum": "scanwright.design.search.optimum",
     "LoadedTask": "scanwright.design.task.task",
     "Task": "scanwright.design.task.task",
@@ -115,13 +115,13 @@ __all__ = [
     "Build",
     "BuildError",
     "Calibration",
-    "Check",
     "Cloud",
     "ComparisonRow",
     "DeviceError",
     "DeviceFaultError",
     "DeviceTimeoutError",
     "Evaluation",
+    "Finding",
     "ImportSummary",
     "InstallError",
     "LidarDriver",

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
-from scanwright.cad.checks.remarks import products_of
+from scanwright.cad.checks.products import products_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
 from scanwright.cad.layout.belt.stack import BeltStack

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.findings import PartFinding
 from scanwright.cad.kernel import require_kernel
 from scanwright.cad.layout.layout import config_hash, mount_offset_mm
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -52,7 +52,7 @@ class PartsResult:
     meshes: dict[str, TriMesh]
     t_world_rot_mm: tuple[float, float, float]
     parts: tuple[PartReport, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     left_out: tuple[LeftOut, ...]
     files: tuple[str, ...]
 
@@ -83,7 +83,7 @@ def build_parts(
     from scanwright.cad.assembly.assembly import alone, as_tree
     from scanwright.cad.assembly.make import make_parts
     from scanwright.cad.assembly.masses import link_bodies
-    from scanwright.cad.checks.remarks import findings_of, left_out_of
+    from scanwright.cad.checks.remarks import left_out_of, remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
@@ -117,7 +117,7 @@ def build_parts(
         meshes=meshes_of_parts,
         t_world_rot_mm=offset,
         parts=tuple(reports),
-        findings=(*findings_of(scanner, assembly, bodies), *labels.findings),
+        findings=(*remarks_of(scanner, assembly), *labels.findings),
         left_out=(*left_out_of(assembly), *labels.left_out),
         files=tuple(sorted(files)),
     )

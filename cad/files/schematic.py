@@ -14,6 +14,7 @@ from xml.sax.saxutils import escape
 
 from scanwright.design.electrics.network import Box, Network, Wire
 from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.findings import sentence
 
 ROW = 22.0  # from pin to pin
 LINE = 15.0  # from line to line of text in a box
@@ -118,7 +119,7 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
 
 def _warnings(network: Network, width: float) -> list[str]:
     """Lines of the cautions, and of broken rules before them, as wide as the sheet."""
-    broken = [f"DO NOT BUILD THIS: {fault.where}: {fault.message}." for fault in broken_rules(network)]
+    broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in broken_rules(network)]
     cautions = [f"CAUTION: {caution}" for caution in network.cautions]
     return [
         line

@@ -15,13 +15,13 @@ from scanwright.cad.files.part_files import PartsResult, write_files
 from scanwright.cad.files.plates import plate_files, plates_of
 from scanwright.cad.files.threemf import threemf_bytes
 from scanwright.cad.files.wiring import wiring_files
-from scanwright.cad.findings import PartFinding
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.fit_coupon import fit_coupon
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.layout import config_hash
 from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -32,7 +32,7 @@ class Exports:
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
 
 
 def export_scanner(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scanwright.design.findings import Finding
+
 Pin = tuple[str, str]  # box and pin
 
 
@@ -120,7 +122,7 @@ class Drop:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """All of it; `cautions` are for a person before wiring, `unknown` facts that the catalogue lacks, in words."""
+    """All of it; `cautions` are for a person before wiring, `unknown` warn of values that the catalogue lacks."""
 
     boxes: tuple[Box, ...]
     wires: tuple[Wire, ...]
@@ -130,4 +132,4 @@ class Network:
     supply_a: float
     risks: tuple[str, ...]
     cautions: tuple[str, ...]
-    unknown: tuple[str, ...]
+    unknown: tuple[Finding, ...]

@@ -14,7 +14,7 @@ from scanwright.pipeline.manifest import require_as_built
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.checks.check import Check
+    from scanwright.design.findings import Finding
 
 
 def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
@@ -61,7 +61,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
     return make_parts(loaded.scanner(as_angle_set(angles)))
 
 
-def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
+def check(folder: str | Path, *, say: Say = quiet) -> list[Finding]:
     """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
 
     The parts are made again from `task.toml` and `angles.json`; a folder may hold these two alone.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,7 +26,7 @@ from scanwright.cli.help import Commands
 from scanwright.design.errors import notes_of, require
 
 if TYPE_CHECKING:
-    from scanwright.cad.checks.check import Check, Severity
+    from scanwright.design.findings import Finding, Severity
 
 app = Commands("Parts")
 
@@ -81,16 +80,18 @@ def report(out: BuildFolder) -> None:
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build folder: room, beams, loads, print. Exit 1 if one fails."""
     from scanwright import api
+    from scanwright.cad.checks.checks_json import entries_of
+    from scanwright.design.findings import errors_in, sentence
 
     checks = api.check(out, say=Progress())
     _complain_of(checks)
     warn(api.load_task(out / "task.toml").misfits())
     if as_json:
-        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
+        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": entries_of(checks)})
     else:
-        show(f"{entry.severity:7} {entry.message}" for entry in checks)
+        show(f"{entry.severity:7} {sentence(entry)}" for entry in checks)
         print(_tally(Counter(entry.severity for entry in checks)))
-    raise typer.Exit(1 if any(entry.severity == "error" for entry in checks) else 0)
+    raise typer.Exit(1 if errors_in(checks) else 0)
 
 
 @app.command()
@@ -123,16 +124,16 @@ def study(
         raise typer.Exit(130) from None
 
 
-def _complain_of(checks: Sequence[Check]) -> None:
+def _complain_of(checks: Sequence[Finding]) -> None:
     """Print the failed checks on standard error, before any result."""
-    from scanwright.cad.checks.check import failure_lines
+    from scanwright.cad.checks.checks_json import failure_lines
 
     for line in failure_lines(checks):
         complain(line)
 
 
 def _tally(found: Counter[Severity]) -> str:
-    """How many checks came to what, as the report says it."""
+    """Return the number of checks of each severity, as in the report."""
     named: tuple[Severity, ...] = ("error", "warning", "note")
     counts = [f"{found[severity]} {severity}{'' if found[severity] == 1 else 's'}" for severity in named]
-    return ", ".join([*counts, f"{found['pass']} passed"])
+    return ", ".join([*counts, f"{found['ok']} passed"])

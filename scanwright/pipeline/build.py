@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.checks.check import Check, failed_of, read_checks
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.concurrency.processes import Packed, processes_beside
+from scanwright.design.findings import Finding, errors_in, sentence
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
@@ -20,7 +22,6 @@ from scanwright.pipeline.ros2.package import write_package
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.cad.files.part_files import PartReport, PartsResult
-    from scanwright.cad.findings import PartFinding
     from scanwright.design.evaluation.as_built import AsBuilt
     from scanwright.design.evaluation.metres import PlaneFigures
     from scanwright.design.left_out import LeftOut
@@ -60,7 +61,7 @@ class Made:
     optimum: Optimum
     chosen: Chosen
     as_built: AsBuilt
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
 
 
@@ -80,14 +81,14 @@ class Build:
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[Finding, ...]
     made: Made | None
     misfits: tuple[str, ...] = ()
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[Finding, ...]:
         """The checks that failed; the parts are safe to make only if there are none."""
-        return failed_of(self.checks)
+        return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
         """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
@@ -99,7 +100,7 @@ class Build:
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
-            *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
+            *finding_lines(self.made.findings, in_full),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
 
@@ -109,26 +110,20 @@ class PartsMade:
     """What came of the parts: facts, findings, what was left out, and the parts for those who have the kernel."""
 
     parts: tuple[PartReport, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     left_out: tuple[LeftOut, ...]
     result: Packed[PartsResult]
 
 
-def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
-    return [f"{finding.severity}: {finding.message}" for finding in findings]
-
-
-def _gathered(findings: Sequence[PartFinding]) -> list[str]:
-    """Each finding, but those about a value of a product as one list of what to measure."""
-    to_measure: dict[str, list[str]] = {}
-    for finding in findings:
-        if finding.value:
-            to_measure.setdefault(finding.subject, []).append(finding.value)
-    lines = _one_by_one([finding for finding in findings if not finding.value])
-    if to_measure:
-        lines.append("warning: measure these on your own before you print, nobody has verified them (-v says more):")
-        lines += [f"  {product}: {', '.join(values)}" for product, values in to_measure.items()]
-    return lines
+def finding_lines(findings: Sequence[Finding], in_full: bool) -> list[str]:
+    """Return one line for each finding; unless `in_full`, unverified values are one line for each product."""
+    each = [finding for finding in findings if in_full or finding.code != "unverified"]
+    counts = Counter(finding.subject for finding in findings if finding not in each)
+    todo = "measure yours before you print, report.html lists them"
+    return [
+        *(f"{finding.severity}: {sentence(finding)}" for finding in each),
+        *(f"warning: {product}: unverified values that shape parts: {n}: {todo}" for product, n in counts.items()),
+    ]
 
 
 def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
@@ -226,7 +221,7 @@ def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Sa
 
 def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, say: Say
-) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
+) -> tuple[tuple[Finding, ...], tuple[LeftOut, ...]]:
     """What goes to the workshop, in the folder, but the drawings; findings, and what was left out."""
     from scanwright.cad.files.workshop_files import export_scanner
 

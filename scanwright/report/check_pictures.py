@@ -1,4 +1,4 @@
-"""Where a check looked: the bodies that its `where` names, and a small picture of the scanner with them in front.
+"""The bodies that a check is about, and a small picture of the scanner with them in front.
 
 What is named is dark, and shows through what stands before it in a lighter shade; all else is pale. The pictures
 read in grey. They are cast like beams, in a parallel projection from where the 3D view of the page starts.
@@ -24,8 +24,10 @@ MARGIN = 1.04
 COLOURS = 32
 NAMED, OTHER = np.array([190.0, 60.0, 0.0]), np.array([235.0, 235.0, 232.0])
 THROUGH = 0.7  # of the named colour where another body stands before it
-SERVO, BEARING = ("servo_case", "servo_horn"), ("bearing_outer", "bearing_inner")
-PREFIXES = {"lidar": "lidar_", "slip ring": "ring_"}
+LIDAR = "lidar"
+BEAM_CODES = ("beams_hidden", "beams_partly_hidden")  # their subject is a range of beams
+PREFIXES = {LIDAR: ("lidar_",), "slip ring": ("ring_",), "servo": ("servo_case", "servo_horn")}
+PREFIXES["bearing"] = ("bearing_outer", "bearing_inner")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,31 +45,29 @@ class PlacedBody:
     colour: tuple[float, ...] = (0.6, 0.6, 0.6)
 
 
-def bodies_named(where: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]) -> tuple[str, ...]:
-    """Names of the bodies that a check's `where` is about, in alphabetical order; none where it is no place.
+def bodies_named(
+    code: str, subject: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return the bodies that a check is about, in alphabetical order.
 
     Args:
-        where: as in `checks.json`: bodies or groups of them, joined by "and".
+        code: of the check.
+        subject: of the check: bodies or groups of bodies, joined by "and".
         bodies: of the scanner.
-        bought: by the number of a product what it is, as the parts list has them: lidar, servo, slip ring, bearing.
+        bought: lidar, servo, slip ring or bearing by the number of the product, as in the parts list.
     """
-    found: set[str] = set()
-    for word in where.split(" and "):
+    names: set[str] = set()
+    for word in [LIDAR] if code in BEAM_CODES else subject.split(" and "):
         kind = bought.get(word, word)
         if word in bodies:
-            found.add(word)
-        elif kind == "servo":
-            found |= set(SERVO) & bodies.keys()
-        elif kind == "bearing":
-            found |= set(BEARING) & bodies.keys()
+            names.add(word)
         elif word in ("rotor", "everything that turns"):
-            found |= {name for name, body in bodies.items() if body.turns}
+            names |= {name for name, body in bodies.items() if body.turns}
         elif word == "parts that move together":
-            found |= bodies.keys()
-        elif kind in PREFIXES or word == "fan" or word.startswith("beams at "):
-            prefix = PREFIXES.get(kind, PREFIXES["lidar"])
-            found |= {name for name in bodies if name.startswith(prefix)}
-    return tuple(sorted(found))
+            names |= bodies.keys()
+        else:
+            names |= {name for name in bodies if name.startswith(PREFIXES.get(kind, ()))}
+    return tuple(sorted(names))
 
 
 class CheckPictures:

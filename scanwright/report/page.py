@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.arrays import Array
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.findings import Finding, Severity
 from scanwright.design.objective.holes import percent
 from scanwright.design.shadow import load_own_body
 from scanwright.design.task.task import load_task
@@ -30,7 +32,7 @@ from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_gl
 from scanwright.report.sentences import sentences
 
 REPORT = "report.html"
-SEVERITIES = ("error", "warning", "note", "pass")
+SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
 PLANES_CSV = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
 AXES_CSV = ("alpha_rot_deg", "beta_rot_deg", "J")
 DIRECTIONS = {
@@ -144,8 +146,11 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
     }
 
 
-def _checks(folder: Path) -> dict[str, list[dict[str, Any]]] | None:
-    return read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
+def _checks(folder: Path) -> dict[Severity, list[Finding]] | None:
+    checks = read(folder / "checks.json", read_checks)
+    if checks is None:
+        return None
+    return {severity: [check for check in checks if check.severity == severity] for severity in SEVERITIES}
 
 
 def _planes(path: Path) -> Array:
@@ -195,20 +200,13 @@ def _not_drawn(folder: Path) -> str:
     return ""
 
 
-def _by_severity(checks: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Checks by severity, the worst first; a severity not known here comes with the errors."""
-    known = {severity: [c for c in checks if c["severity"] == severity] for severity in SEVERITIES}
-    known["error"] += [c for c in checks if c["severity"] not in SEVERITIES]
-    return known
-
-
 def _places(
-    assembly: Any, checks: dict[str, list[dict[str, Any]]], bom: list[dict[str, str]] | None
+    assembly: Any, checks: dict[Severity, list[Finding]], bom: list[dict[str, str]] | None
 ) -> dict[str, dict[str, Any]]:
-    """By the `where` of a check the bodies that it names and a picture of them; what is no place is not there."""
+    """Return the bodies of each subject of a check and a picture of them; a subject without bodies is left out."""
     bodies = placed_bodies(assembly)
     pictures = CheckPictures(bodies)
     bought = {row.get("number", ""): row.get("part", "") for row in bom or () if row.get("kind") == "bought"}
-    wheres = dict.fromkeys(str(check.get("where", "")) for found in checks.values() for check in found)
-    named = {where: bodies_named(where, bodies, bought) for where in wheres}
-    return {where: {"bodies": names, "picture": pictures.picture(names)} for where, names in named.items() if names}
+    codes = {check.subject: check.code for each in checks.values() for check in each}
+    named = {subject: bodies_named(code, subject, bodies, bought) for subject, code in codes.items()}
+    return {subject: {"bodies": names, "picture": pictures.picture(names)} for subject, names in named.items() if names}

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
-from scanwright.cad.checks.remarks import products_of
-from scanwright.cad.checks.retention import material_of
+from scanwright.cad.checks.loads.retention import material_of
+from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.files.manual.scenes import StepScene, scenes_of
 from scanwright.cad.geometry.mesh import TriMesh

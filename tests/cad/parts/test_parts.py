@@ -230,14 +230,14 @@ def test_the_shaft_fits_the_horn_and_passes_the_ring(built):
 
 def test_findings_name_what_to_do(built):
     found = {finding.code: finding for finding in built.result.findings}
-    assert "aluminium or steel" in found["turn_from_metal"].message
-    unverified = [finding.message for finding in built.result.findings if finding.code == "unverified"]
-    assert any("UH1256-02-0610-06S: length_mm = 45.0" in message and "measure" in message for message in unverified)
+    assert "aluminium or steel" in found["turn_from_metal"].hint
+    unverified = [finding for finding in built.result.findings if finding.code == "unverified"]
+    assert any("UH1256-02-0610-06S: length_mm = 45.0" in f.message and "measure" in f.hint for f in unverified)
     assert "tilt_moment" not in found
     left_out = [out.what for out in built.result.left_out if out.unit == "parts"]
     if built.name == "upright":
         assert left_out == ["bearing_cage", "counterweight", *MODULES, "base_mount"]
-        assert "M2.5" in found["servo_on_deck"].message
+        assert "M2.5" in found["servo_on_deck"].hint
     else:
         bearing = [] if built.name in BEARING else ["bearing_cage"]
         assert left_out == bearing + ([] if built.name in BALANCED else ["counterweight"]) + MODULES

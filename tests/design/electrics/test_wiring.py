@@ -11,6 +11,7 @@ from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
 from scanwright.design.electrics.rules import broken_rules
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
 from scanwright.design.electrics.wiring import network_of
+from scanwright.design.findings import sentence
 from scanwright.design.scanner import scanner_of
 
 CATALOGUE = load_catalogue()
@@ -45,7 +46,7 @@ def test_every_combination_keeps_the_rules_unless_its_ring_is_too_weak(servo):
         device = CATALOGUE.get(lidar, Lidar)
         most = max(device.peak_a or 0.0, device.inrush_a or 0.0)
         weak = ring is not None and max(group.amps for group in CATALOGUE.get(ring, SlipRing).ways) < most
-        known = {fault.where for fault in broken_rules(made) if not made.unknown}
+        known = {fault.subject for fault in broken_rules(made) if not made.unknown}
         assert known == ({"ring"} if weak else set()), (lidar, ring, known)
 
 
@@ -90,7 +91,7 @@ def test_a_supply_that_no_converter_gives_is_refused():
     scanner = scanner_of(angle_set(), "fdm-0.4", CATALOGUE)
     odd = scanner.servo.model_copy(update={"supply_v": (6.0, 8.4)})
     made = network_of(replace(scanner, servo=odd))
-    assert "MX-64R: gets 11.71 V, wants 6 to 8.4" in [f"{fault.where}: {fault.message}" for fault in broken_rules(made)]
+    assert "MX-64R: gets 11.71 V, accepts 6 to 8.4" in [sentence(fault) for fault in broken_rules(made)]
     assert "Do not connect MX-64R: it accepts 6 to 8.4 V" in " ".join(made.cautions)
 
 
@@ -124,7 +125,7 @@ def test_a_pin_that_must_be_tied_is_a_wire_and_a_one_way_line_has_no_rx(lidar, r
     assert [wire.end for wire in ties] == [("lidar", "GND")]
     assert broken_rules(made) == []
     loose = replace(made, wires=tuple(wire for wire in made.wires if wire not in ties))
-    assert "pin PWM is not connected" in [fault.message for fault in broken_rules(loose)]
+    assert "lidar: pin PWM is not connected" in [fault.message for fault in broken_rules(loose)]
     assert ("lidar", "RX") not in {wire.end for wire in made.wires}
     (sent,) = (wire for wire in made.wires if wire.start[0] == "plug" and wire.net == "TX")
     assert sent.start == ("plug", "RX")  # what the lidar sends the computer receives
@@ -161,7 +162,7 @@ def test_each_rule_sees_what_it_is_there_for():
     assert broken_rules(made) == []
 
     def said(**change):
-        return [f"{fault.where}: {fault.message}" for fault in broken_rules(replace(made, **change))]
+        return [sentence(fault) for fault in broken_rules(replace(made, **change))]
 
     assert "servo: pin V is not connected" in said(wires=tuple(w for w in made.wires if w.end != ("servo", "V")))
     astray = (*made.wires, replace(made.wires[0], end=("servo", "VCC")))
@@ -176,9 +177,9 @@ def test_each_rule_sees_what_it_is_there_for():
     assert "F2: 4 A blows at the 4.1 A of MX-64R" in said(branches=small)
     assert "supply: gives 5 A, all together draw 6.6" in said(supply_a=5.0)
     low = tuple(replace(drop, volts=9.0) for drop in made.drops)
-    assert "UTM-30LX: gets 9.00 V, wants 10.8 to 13.2" in said(drops=low)
+    assert "UTM-30LX: gets 9.00 V, accepts 10.8 to 13.2" in said(drops=low)
     high = tuple(replace(drop, idle_v=13.5) for drop in made.drops)
-    assert "UTM-30LX: gets 13.50 V, wants 10.8 to 13.2" in said(drops=high)
+    assert "UTM-30LX: gets 13.50 V, accepts 10.8 to 13.2" in said(drops=high)
     red = (*made.wires[1:], replace(made.wires[0], colour="red", source=""))
     assert "switch: the colour red of + in has no source" in said(wires=red)
 
