@@ -21,6 +21,7 @@ class Box:
         right: pins away from it.
         column: its place from left to right.
         free: pins that stay open on purpose.
+        bought: whether the parts list has a row for it.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Box:
     right: tuple[str, ...]
     column: int
     free: tuple[str, ...] = ()
+    bought: bool = False
 
 
 @dataclass(frozen=True, slots=True)
