@@ -20,9 +20,11 @@ from scanwright.cad.checks.table import CLEARANCE_MM, OVERLAP_MM3
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
+from scanwright.design.scene import ray_caster
 
 CHORD_MM = 0.01  # error of an image's edges: a fortieth of the clearance
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
+RAY = np.array([0.5377, 0.3021, math.sqrt(1 - 0.5377**2 - 0.3021**2)])  # along no edge of any part
 FAR_MM = 5.0  # distances beyond it are not computed: twelve times the clearance
 
 
@@ -155,21 +157,13 @@ def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
 
 
 def _contains(outer: TriMesh, inner: TriMesh) -> bool:
-    """Whether a corner of `inner` lies in `outer`: crossings of one ray, counted."""
+    """Return whether a corner of `inner` is in `outer`: the first face that a ray from it meets is seen from inside."""
     point = inner.vertices[0]
-    low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
-    if not ((point > low) & (point < high)).all():
+    if not ((point > outer.vertices.min(axis=0)) & (point < outer.vertices.max(axis=0))).all():
         return False
-    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
-    ray = np.array([0.5377, 0.3021, math.sqrt(1 - 0.5377**2 - 0.3021**2)])  # along no edge of any part
-    p = np.cross(ray, c - a)
-    det = np.einsum("ij,ij->i", b - a, p)
-    safe = np.where(np.abs(det) > 1e-12, det, 1.0)
-    u = np.einsum("ij,ij->i", point - a, p) / safe
-    q = np.cross(point - a, b - a)
-    v, t = q @ ray / safe, np.einsum("ij,ij->i", c - a, q) / safe
-    crossed = (np.abs(det) > 1e-12) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
-    return bool(crossed.sum() % 2)
+    scene = ray_caster.build_scene(outer.vertices[outer.faces] / 1000)
+    (face,) = ray_caster.cast(scene, point / 1000, RAY[None]).triangle
+    return bool(face >= 0 and scene.normals[face] @ RAY > 0)
 
 
 def _apart(one: TriMesh, other: TriMesh) -> bool:

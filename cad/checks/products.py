@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.layout.drive import DriveLayout
@@ -59,8 +58,12 @@ def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Finding
     ]
 
 
-def unverified(product: Product, assembly: Assembly) -> list[Finding]:
-    """Return a warning for each unverified value of a product that shapes a part."""
+def unverified(products: Iterable[Product], assembly: Assembly) -> list[Finding]:
+    """Return a note for each unverified value of a product that shapes a part."""
+    return [note for product in products for note in _unverified(product, assembly)]
+
+
+def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
     provenance, shaping = product.provenance(), dict(SHAPING)
     for field in product.unverified():
         parts = [part.name for part in assembly.parts.values() if f"{product.kind}.{field}" in part.shaped_by]
@@ -68,22 +71,12 @@ def unverified(product: Product, assembly: Assembly) -> list[Finding]:
             shaping[f"{product.kind}.{field}"] = " and ".join(parts)
     for part in reversed(assembly.parts.values()):  # the first part that describes a value wins
         shaping |= part.shapes
-    return [
-        Finding(
-            "unverified",
-            "warning",
-            product.name,
-            f"{product.name}: {field} = {_shown(getattr(product, field))} is not verified ({provenance[field].source})",
-            hint=f"measure yours, it shapes {shaping[f'{product.kind}.{field}']}",
-        )
-        for field in product.unverified()
-        if f"{product.kind}.{field}" in shaping
-    ]
-
-
-def unverified_checks(products: Iterable[Product], assembly: Assembly) -> list[Finding]:
-    """Return the same of all products as notes: they fail no build."""
-    return [replace(found, severity="note") for product in products for found in unverified(product, assembly)]
+    for field in product.unverified():
+        if f"{product.kind}.{field}" in shaping:
+            value, source = _shown(getattr(product, field)), provenance[field].source
+            message = f"{product.name}: {field} = {value} is not verified ({source})"
+            hint = f"measure yours, it shapes {shaping[f'{product.kind}.{field}']}"
+            yield Finding("unverified", "note", product.name, message, hint=hint)
 
 
 def _shown(value: object) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.checks.products import products_of, unverified
 from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import Joint
@@ -17,15 +16,13 @@ from scanwright.design.scanner import Scanner
 
 
 def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
-    """Return the remarks on parts and products; failed checks are in `cad.checks.run`."""
+    """Return the remarks on parts; those on products are checks."""
     layout = assembly.layout
     remarks = [
         _turn_from_metal(part.name, part.why_metal) for part in assembly.parts.values() if part.process == "turned"
     ]
     if layout.deck.flat:
         remarks.append(_screwed_to_deck(scanner, layout.drive.mounted))
-    for product in products_of(scanner, layout.drive):
-        remarks += unverified(product, assembly)
     return tuple(remarks)
 
 

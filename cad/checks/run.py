@@ -20,7 +20,7 @@ from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.checks.loads.mount import mount_checks
 from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.printing import printing_checks
-from scanwright.cad.checks.products import known_errors, module_checks, products_of, unverified_checks
+from scanwright.cad.checks.products import known_errors, module_checks, products_of, unverified
 from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.design.findings import Finding
@@ -75,6 +75,6 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *module_checks(scanner, left_out_of(assembly)),
-        *unverified_checks(products, assembly),
+        *unverified(products, assembly),
     ]
     return checks, shadow

@@ -11,9 +11,9 @@ from scanwright.design.scanner import Scanner
 def wiring_checks(scanner: Scanner) -> list[Finding]:
     """Return every broken rule of the wiring, or one finding that it keeps them; then the values it lacks."""
     network = network_of(scanner)
-    kept = (
+    summary = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "
         "supply is overloaded, and every device gets its voltage"
     )
-    ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", kept)
+    ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", summary)
     return [*(broken_rules(network) or [ok]), *network.unknown]

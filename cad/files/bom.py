@@ -30,7 +30,7 @@ from scanwright.design.scanner import Scanner
 JOINTS = "joints of the layout"
 STEPS, WIRING_TEXT = "assembly.md", "wiring.md"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
-PAPER_V = 12.0
+PAPER_V = 12.0  # of its supply
 WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports and failed prints
 
 

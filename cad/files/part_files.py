@@ -41,9 +41,9 @@ class PartsResult:
     Attributes:
         assembly: the solids.
         meshes: canonical mesh of each made part, with its label.
-        t_world_rot_mm: where the optical centre stands in the world.
-        parts: facts of each made part.
-        findings: what a person should know.
+        t_world_rot_mm: optical centre in the world.
+        parts: properties of each made part.
+        findings: remarks for a person.
         left_out: what this scanner does not need.
         files: relative to the build folder.
     """
@@ -57,7 +57,7 @@ class PartsResult:
     files: tuple[str, ...]
 
     def masses_g(self) -> dict[str, float]:
-        """Of the made parts by name."""
+        """Return the masses of the made parts by name."""
         return {report.name: report.mass_g for report in self.parts}
 
 
@@ -69,14 +69,14 @@ def build_parts(
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `layout.mount_offset_mm`, or zero.
         folder: the build folder; `parts/` is made in it.
-        progress: called with a line of text before each step.
-        make: who makes the parts, `make.make_parts` or one that may have them already.
+        progress: callback for progress.
+        make: makes the parts, if not `make.make_parts`.
 
     Raises:
         InstallError: the CAD kernel is not installed.
-        BuildError: a part cannot be made, or the angle set names another place of the optical centre.
+        BuildError: a part cannot be made, or the angle set states another place of the optical centre.
     """
-    offset = mount_offset_mm(scanner)  # refuses what cannot be built before seconds go into the kernel
+    offset = mount_offset_mm(scanner)  # rejects what cannot be built before the kernel is loaded
     _check_offset(scanner, offset)
     progress("loading the CAD kernel")
     require_kernel("the making of parts")
@@ -138,9 +138,9 @@ def _report(name: str, volume: float, density: float, mesh: TriMesh) -> PartRepo
 
 
 def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:
-    given = scanner.angles.t_world_rot_mm
-    if any(given) and max(abs(a - b) for a, b in zip(given, offset, strict=True)) > 1e-3:
+    stated = scanner.angles.t_world_rot_mm
+    if any(stated) and max(abs(a - b) for a, b in zip(stated, offset, strict=True)) > 1e-3:
         raise BuildError(
-            f"{BASE_MOUNT}: t_world_rot_mm = {list(given)}: the mount of these angles puts the optical centre at "
+            f"{BASE_MOUNT}: t_world_rot_mm = {list(stated)}: the mount of these angles puts the optical centre at "
             f"{list(offset)}; build the angle set again, or set it to 0"
         )

@@ -58,15 +58,15 @@ def wiring_text(network: Network, title: str) -> str:
 
 
 def _power(network: Network) -> Section:
-    lasting, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("lasting_a", "peak_a"))
+    continuous, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("lasting_a", "peak_a"))
     items = [
         *(
             f"{branch.name}, {branch.feeds}: {branch.lasting_a:.2g} A continuous, {branch.peak_a:.2g} A at most, fuse "
             f"{branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
             for branch in network.branches
         ),
-        f"all at 12 V: {lasting:.2g} A continuous ({12 * lasting:.0f} W), {peak:.2g} A at most ({12 * peak:.0f} W); "
-        f"supply {network.supply_a:g} A",
+        f"all at 12 V: {continuous:.2g} A continuous ({12 * continuous:.0f} W), {peak:.2g} A at most "
+        f"({12 * peak:.0f} W); supply {network.supply_a:g} A",
         *(
             f"{drop.device} gets {drop.idle_v:.2f} V at rest and {drop.volts:.2f} V at its largest current, and "
             f"accepts {drop.least:g} to {drop.most:g} V ({LEADS_M:g} m of wires, and the ring if it is behind it)"

@@ -1,4 +1,4 @@
-"""What a build hands to the workshop beside STEP, STL and drawings: print files, the scanner to look at, parts list."""
+"""Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True)
 class Exports:
-    """What was written, relative to the build folder, what was not, and what a person should know."""
+    """Written files, relative to the build folder, files not included, and remarks for a person."""
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
@@ -47,7 +47,7 @@ def export_scanner(
         scanner: angles and products.
         made: its parts, of `part_files.build_parts`.
         folder: the build folder.
-        progress: called with a line of text before each step.
+        progress: callback for progress.
     """
     assembly, digest, masses = made.assembly, config_hash(scanner), made.masses_g()
     joints = joints_of(assembly.layout)

@@ -100,7 +100,7 @@ class Build:
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
-            *finding_lines(self.made.findings, in_full),
+            *finding_lines(self.made.findings, self.checks, in_full),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
 
@@ -115,15 +115,13 @@ class PartsMade:
     result: Packed[PartsResult]
 
 
-def finding_lines(findings: Sequence[Finding], in_full: bool) -> list[str]:
-    """Return one line for each finding; unless `in_full`, unverified values are one line for each product."""
-    each = [finding for finding in findings if in_full or finding.code != "unverified"]
-    counts = Counter(finding.subject for finding in findings if finding not in each)
+def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_full: bool) -> list[str]:
+    """Return one line for each finding and each unverified value; unless `in_full`, only a count of these."""
+    unverified = [check for check in checks if check.code == "unverified"]
+    lines = [f"{each.severity}: {sentence(each)}" for each in (*findings, *(unverified if in_full else ()))]
+    counts = Counter(check.subject for check in unverified) if not in_full else {}
     todo = "measure yours before you print, report.html lists them"
-    return [
-        *(f"{finding.severity}: {sentence(finding)}" for finding in each),
-        *(f"warning: {product}: unverified values that shape parts: {n}: {todo}" for product, n in counts.items()),
-    ]
+    return lines + [f"warning: {name}: unverified values that shape parts: {n}: {todo}" for name, n in counts.items()]
 
 
 def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:

@@ -1,6 +1,6 @@
 """`report.html` from the files of a build folder: no search, no kernel, no network; equal files give equal bytes.
 
-Whatever a file is missing for is left out with one line that says so; only `angles.json` has to be there.
+If a file is missing, the page names it and omits what needs it; only `angles.json` is required.
 """
 
 from __future__ import annotations
@@ -42,19 +42,19 @@ DIRECTIONS = {
     "right": (0, -1.1, 0),
     "up": (0, 0, 1.1),
     "down": (0, 0, -1.1),
-}  # of the world, beside the ball
+}  # of the world, around the ball
 
 
 def report_html(folder: Path, begin: Begin = in_turn) -> str:
-    """The page.
+    """Return the page.
 
     Args:
         folder: of the build.
-        begin: who does the shares of it that need the task, and the bodies of the scanner.
+        begin: runs the shares that need the task, and the bodies of the scanner.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
-        BuildError: another file is not as a build writes it.
+        BuildError: no build wrote another file in this form.
     """
     angles = load_angles(folder / "angles.json")
     on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
@@ -102,13 +102,13 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
 
 
 def _wiring_words(path: Path) -> tuple[str, str]:
-    """HTML of the cautions, which stand before the picture, and of all that follows it."""
+    """Return HTML of the cautions before the picture, and of the text after it."""
     cautions, heading, words = read_text(path).partition("\n## Power")
     return steps_html(cautions), steps_html(heading + words)
 
 
 def _on_task(folder: Path) -> dict[str, Any]:
-    """What cannot be said without the task."""
+    """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
         return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said", "mounts"))
@@ -119,23 +119,23 @@ def _on_task(folder: Path) -> dict[str, Any]:
     setting = mounting_rad(angles)
     planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_own_body)
     shadow = None if own_body is None else own_body[0]
-    found = answer(loaded, angles, shadow)
-    mounts = [mount.gain.mount for mount in found.as_built.mounts]
+    result = answer(loaded, angles, shadow)
+    mounts = [mount.gain.mount for mount in result.as_built.mounts]
     sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
         "objective": task.density.objective,
         "ball_deg": task.density.ball_radius_deg,
-        "answer": found,
+        "answer": result,
         "sphere": sphere,
         "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
-        "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), figures),
+        "said": sentences(angles, result, 2 * np.tan(problem.ball_rad), figures),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 
 
 def _on_bodies(folder: Path) -> dict[str, Any]:
-    """What shows the scanner, and what it hides."""
+    """Return what shows the scanner and its hidden beams."""
     angles, checks, bom = load_angles(folder / "angles.json"), _checks(folder), read(folder / "bom.csv", read_table)
     own_body = read(folder / "own_body.npz", load_own_body)
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
@@ -173,7 +173,7 @@ def _environment() -> Environment:
 
 
 def _manifest(path: Path) -> dict[str, Any]:
-    """The manifest without the report's own digest: a report made again must be the same."""
+    """Return the manifest without the report's own digest, so that a report made again is the same."""
     manifest: dict[str, Any] = read_json(path)
     return manifest | {"files": {name: facts for name, facts in manifest["files"].items() if name != REPORT}}
 
@@ -191,7 +191,7 @@ def _motion(angles: AngleSet) -> str:
 
 
 def _not_drawn(folder: Path) -> str:
-    """Why the page draws no scanner; empty where it does."""
+    """Return why the page draws no scanner; empty if it does."""
     path = folder / "assembly.glb"
     if not path.is_file():
         return "assembly.glb is not in this folder."

@@ -92,11 +92,11 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -
     else:
         x, y = rotor.centre_m[:2]
         azimuth = round(math.degrees(math.atan2(-y, -x))) % 360
-        play = "a backlash that its maker does not state"
+        backlash = "a backlash that its maker does not state"
         if servo.backlash_deg is not None:
             off = math.radians(servo.backlash_deg) * FAR_MM
-            play = f"a backlash of {servo.backlash_deg:g} deg ({off:.0f} mm at 10 m)"
-        what = f"back and forth through {play}: an encoder on the output shaft measures that, one on the motor does not"
+            backlash = f"a backlash of {servo.backlash_deg:g} deg ({off:.0f} mm at 10 m)"
+        what = f"back and forth through {backlash}: only an encoder on the output shaft measures that"
         grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
         hint = f"balance it with {grams:.0f} g at {BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x"
     return Finding("flanks", severity, SERVO, f"{moment}, {what}", tidy(torque), limit, "N m", hint)

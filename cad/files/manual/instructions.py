@@ -1,4 +1,4 @@
-"""`assembly.md`: how to put one scanner together, with the screws that its own parts ask for, and a picture a step."""
+"""`assembly.md`: how to assemble one scanner, with the screws of its own parts and a picture of each step."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def instructions_text(
     plates: Sequence[Sequence[str]],
     config_hash: str,
 ) -> str:
-    """The Markdown file.
+    """Return the Markdown file.
 
     Args:
         scanner: angles and products.
@@ -98,7 +98,7 @@ def instructions_text(
 
 
 def _joined(assembly: Assembly) -> str:
-    """What is left to be joined when all parts are together: the leads with a way are joined in their own step."""
+    """Return what to connect when all parts are together: leads with a path are connected in their own step."""
     if assembly.layout.scanner.slip_ring is None:
         return IN_A_LOOP
     laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
@@ -106,25 +106,25 @@ def _joined(assembly: Assembly) -> str:
 
 
 def _misfits(products: Sequence[Product]) -> Iterator[str]:
-    """Lines about products that the parts do not fit."""
+    """Yield lines about products that the parts do not fit."""
     for product in products:
         if reasons := product.misfit():
             yield from (f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), "")
 
 
 def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:
-    """The lines of one print plate."""
+    """Return the lines of one print plate."""
     name = f"print/plate_{number}"
     return f"Plate {number}, `{name}.3mf`: {', '.join(parts)}.", "", f"![Plate {number} on the bed]({name}.png)", ""
 
 
 def picture_name(number: int) -> str:
-    """The file of a step's picture, relative to the build folder."""
+    """Return the file of a step's picture, relative to the build folder."""
     return f"assembly/step_{number:02d}.png"
 
 
 def screws_in_words(assembly: Assembly, joint: Joint) -> str:
-    """One joint as a sentence, with the torque of its screws."""
+    """Return one joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
     where = {
@@ -134,14 +134,14 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
         "deck": f"through the foot into the deck, with {nuts}",
         "grub": f"in {joint.part}, against {joint.onto}",
     }[joint.fixing]
-    held = ", in heat-set inserts" if joint.inserts else ""
+    inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
-        held = f", through {nuts} in its bore"
-    return f"{what} {where}{held}, {torque_in_words(assembly, joint)}."
+        inserts = f", through {nuts} in its bore"
+    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}."
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
-    """How tight the screws of a joint are."""
+    """Return the torque of the screws of a joint."""
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
 
@@ -154,7 +154,7 @@ def step_files(
     plates: Sequence[Sequence[str]],
     config_hash: str,
 ) -> dict[str, bytes]:
-    """`assembly.md` and the picture of each step.
+    """Return `assembly.md` and the picture of each step.
 
     Args:
         scanner: angles and products.
@@ -174,9 +174,9 @@ def step_files(
 
 
 def _words(assembly: Assembly, scene: StepScene) -> str:
-    """The words of a step with its screws in their places."""
+    """Return the text of a step with its screws in their places."""
     text = scene.step.words
     for joint, mark in scene.joints:
-        said = f"**{screws_in_words(assembly, joint)}**"
-        text = text.replace(mark, f"{said} {mark}", 1) if mark else f"{text} {said}"
+        screws = f"**{screws_in_words(assembly, joint)}**"
+        text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
     return " ".join(re.sub(r"\{.*?\}", "", text).split())

@@ -222,7 +222,7 @@ def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
     problem, built = problem_of(loaded), np.radians([0.0, -55.61, -78.72, 79.75])
     planes = np.array([[-80.0, 75.0, -6.1285, 0.0, -55.0], [-80.0, 80.0, -6.128, 0.0, -55.0], [0.0, 0.0, np.inf, 0, 0]])
     found = other_mounts(problem, loaded.task, built, planes)
-    ((kept,), (broken,)) = found.kept, found.broken
+    ((kept,), (broken,)) = found.within, found.broken
     assert (kept.angles_deg, kept.breaks) == ((0, -55, -80, 80), "")
     assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
     assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
@@ -232,7 +232,7 @@ def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
     assert found.alone.endswith("What keeps all that the task asks costs 0.086% of the beams per ball against it.")
     allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
     assert (
-        len(other_mounts(problem, allowed, built, planes).kept) == 2
+        len(other_mounts(problem, allowed, built, planes).within) == 2
         and not other_mounts(problem, allowed, built, planes).alone
     )
     limited = allowed.model_copy(update={"limits": Limits(min_density=50)})
