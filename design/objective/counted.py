@@ -19,7 +19,7 @@ from scanwright.design.arrays import Array, Ints, Mask, Setting
 from scanwright.design.errors import TaskError
 from scanwright.design.motion import Spin, StopAndGo, Sweep
 from scanwright.design.objective.drawn_regions import Layer, Nodes, drawn_in, layers_of, nodes_in, value_and_required
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import EMPTY
 from scanwright.design.task.task import LoadedTask
 
@@ -56,7 +56,7 @@ def counted_J(
     points: int = POINTS,
     sets: int = SETS,
     bearings_rad: Array | None = None,
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Counted:
     """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].

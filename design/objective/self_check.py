@@ -17,7 +17,7 @@ from scanwright.design.objective.counted import counted_J
 from scanwright.design.objective.named_objectives import log
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import Score, score
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
@@ -32,7 +32,7 @@ def require_counted(
     loaded: LoadedTask,
     angles_rad: Setting,
     found: Score,
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
     """Compare the score of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count.
@@ -69,7 +69,7 @@ def _counted(
     loaded: LoadedTask,
     angles_rad: Setting,
     points: int,
-    shadow: Shadow | None,
+    shadow: SelfOcclusion | None,
     lever: tuple[float, float, float],
 ) -> tuple[float, float, int]:
     """J by counting, four standard errors of it, and the directions of each set that it took."""
