@@ -2,6 +2,7 @@
 
     ScanwrightError            wrong input
      +-- TaskError             task or catalogue file: missing, malformed or inconsistent       (ValueError)
+     |    +-- MissingFileError there is no such file                                            (FileNotFoundError)
      +-- NumericalError        a result fails the program's own check: a bug; exit code 1       (ArithmeticError)
      +-- BuildError            a part, a drawing or a build folder cannot be made as requested  (ValueError)
      +-- RecordingError        recording: unreadable, or without the data that is required      (ValueError)
@@ -57,6 +58,10 @@ class ScanwrightError(Exception):
 
 class TaskError(ScanwrightError, ValueError):
     """A task file or a catalogue file is missing, malformed or inconsistent."""
+
+
+class MissingFileError(TaskError, FileNotFoundError):
+    """A task file, a catalogue file or an angle set does not exist."""
 
 
 class NumericalError(ScanwrightError, ArithmeticError):

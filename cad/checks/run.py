@@ -22,7 +22,7 @@ from scanwright.cad.checks.remarks import left_out_of, products_of, unverified
 from scanwright.cad.checks.retention import retention_checks
 from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
 from scanwright.design.catalogue.products import Product
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
@@ -129,8 +129,8 @@ def electric_checks(scanner: Scanner) -> list[Check]:
     """Every broken rule of the wiring, or one word that it keeps them; and what the catalogue does not know of it."""
     network = network_of(scanner)
     faults = [
-        Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
-        for fault in broken_rules(network)
+        Check("wiring", "error", None, None, "", fault.subject, f"{fault.subject}: {fault.message}")
+        for fault in check_network(network)
     ]
     kept = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "

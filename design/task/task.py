@@ -23,7 +23,7 @@ from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.deck_holes import DeckHoles
 from scanwright.design.errors import ScanwrightError, TaskError
-from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
 from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
@@ -264,7 +264,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     """The task of a table, with its products and maps; all that is wrong is told at once."""
     task, faults = _sound_part(table)
     if task is None:
-        raise TaskError(tell(faults, source))
+        raise TaskError(format_faults(faults, source))
     try:
         products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
         own_products = ""
@@ -291,7 +291,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     ]
     surface = None if task.scene is None else tried("scene", partial(_surface, task.scene, source.parent))
     if faults or own_products:
-        raise TaskError("\n".join(each for each in (own_products, tell(faults, source)) if each))
+        raise TaskError("\n".join(each for each in (own_products, format_faults(faults, source)) if each))
     return LoadedTask(task, source, products, tuple(each for each in maps if each is not None), surface)
 
 
@@ -300,7 +300,7 @@ def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
     try:
         return Task.model_validate(table), []
     except ValidationError as error:
-        faults = faults_of(error, Task)
+        faults = faults_in(error, Task)
     wrong = {fault.path[0] for fault in faults if fault.path}
     wrong |= {"motion"} if wrong & {"servo", "slip_ring"} else set()  # what these cannot do is asked for by the motion
     sound = {key: value for key, value in table.items() if key not in wrong}
