@@ -22,7 +22,7 @@ from scanwright.design.camera import Camera
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.deck_holes import DeckHoles
-from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
 from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
@@ -32,6 +32,7 @@ from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.map_file import read_map
 from scanwright.design.task.named_products import NAMED, motion_faults
 from scanwright.design.task.named_record import named_table, names_in
+from scanwright.design.task.objective_names import SHIPPED_OBJECTIVES, objectives
 from scanwright.design.task.shapes import (
     LITTLE,
     BoxRegion,
@@ -68,9 +69,7 @@ class DensityRules(Record):
     ball_radius_deg: Number = Field(
         default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="beams this near to a direction count for it"
     )
-    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = Field(
-        default="log", description="what J is; see Definitions"
-    )
+    objective: str = Field(default="log", description="what J is; see Definitions", examples=[*SHIPPED_OBJECTIVES])
     required: Required = None
     background: Value = Field(default=0.0, description="how much directions matter that no weight names")
     quadrature: Literal["solid_angle", "equal_angle"] = Field(
@@ -79,6 +78,13 @@ class DensityRules(Record):
     grid_step_deg: GridStep = Field(default=1.0, description="of the paper's sum")
     tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
     budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
+
+    @field_validator("objective")
+    @classmethod
+    def _is_an_objective(cls, name: str) -> str:
+        if name not in (known := objectives()):
+            raise ValueError(f"no objective of that name{suggest(name, known)}")
+        return name
 
 
 class Limits(Record):
