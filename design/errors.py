@@ -18,9 +18,9 @@
 A command prints the message and exits with 2; any other exception is a bug and prints its traceback. The message is
 one line, or one line for each fault of a file: file, line, field, value, bound and a suggestion, as far as they apply.
 
-Messages name fields in Python form, `min_range_m = 9: at most 5`. The command line prints the fields that are options
-of the running command as options, `--min-range-m`. It recognises fields by their underscore. An error lists fields
-without one, which can also be plain words of a sentence, in `fields`: `TaskError("pole = 'x': ...", "pole")`.
+Messages name fields in Python form, `min_range_m = 9: at most 5`. The command line prints fields that are options of
+the running command as options, `--min-range-m`. It recognises a field by an underscore, at the start of the message
+before ":" or " = ", or in backquotes: "pole = 'x': three numbers", "name `angles` or `poses`".
 """
 
 from __future__ import annotations
@@ -45,15 +45,7 @@ REMOVED: dict[str, str] = {  # names in files and commands of version 0.1, and w
 
 
 class ScanwrightError(Exception):
-    """Base of every error that the user can fix.
-
-    Attributes:
-        fields: names of fields in the message that have no underscore.
-    """
-
-    def __init__(self, message: str = "", *fields: str) -> None:
-        super().__init__(message)
-        self.fields = fields
+    """Base of every error that the user can fix."""
 
 
 class TaskError(ScanwrightError, ValueError):

@@ -243,13 +243,11 @@ def angles_in(text: str) -> tuple[float, float, float, float]:
     try:
         alpha_rot, beta_rot, alpha_laser, beta_laser = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise TaskError(
-            f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling"
-        ) from error
+        raise TaskError(f"angles = '{text}': four numbers in degrees, such as 0,90,0,-90 for rolling") from error
     try:
         setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
     except TaskError as error:
-        raise TaskError(f"--angles = '{text}': {error}") from error
+        raise TaskError(f"angles = '{text}': {error}") from error
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
@@ -284,7 +282,5 @@ def _parse_lever(text: str) -> Lever:
     except ValueError:
         x_mm = y_mm = range_m = 0.0
     if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
-        raise TaskError(
-            f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
-        )
+        raise TaskError(f"lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as 5,-3,1.0")
     return Lever(x_mm, y_mm, range_m)

@@ -101,10 +101,10 @@ class Task(Record):
     """One task file with every default written out."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="of the task and its build folder")
-    sensor: str = Field(description="the 2D lidar: `scanwright catalogue --kind lidar` lists them")
-    servo: str = Field(description="what turns it: `scanwright catalogue --kind servo` lists them")
+    sensor: str = Field(description="the 2D lidar, by its name in the catalogue")
+    servo: str = Field(description="what turns it, by its name in the catalogue")
     slip_ring: str | None = Field(default=None, description="what lets its cable turn for ever; a sweep needs none")
-    printer: str = Field(default="fdm-0.4", description="how the parts are made: `scanwright catalogue --kind printer`")
+    printer: str = Field(default="fdm-0.4", description="how the parts are made, by its name in the catalogue")
     catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
     deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
     modules: Modules = Field(default=NO_MODULES, description="parts that it works without: none by default")
