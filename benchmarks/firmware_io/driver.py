@@ -63,11 +63,11 @@ def _drive(out: Path, seconds: float) -> None:
     plan = replace(plan_scan(out, turns=turns), intensity=True)
     readings: list[_Reading] = []
 
-    def say(line: str) -> None:
-        if line[:4].strip().endswith("%"):  # once a second, while it records
+    def progress(_step: str, fraction: float | None = None) -> None:
+        if fraction is not None:  # once a second, while it records
             readings.append(_Reading.now())
 
-    summary = acquire.acquire(plan, say)
+    summary = acquire.acquire(plan, progress)
     settled = [one for one in readings if one.wall_s - readings[0].wall_s >= min(_SETTLED_S, seconds / 2)]
     first, last = settled[0], settled[-1]
     share = (last.processor_s - first.processor_s) / (last.wall_s - first.wall_s)

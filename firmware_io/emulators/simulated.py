@@ -1,7 +1,6 @@
-"""A recording without devices, faster than time: what a scanner whose servo obeys to the letter measures in a scene.
+"""A recording without devices, faster than real time, of a scanner whose servo follows its motion exactly.
 
-The twins behind ports (`scanner.py`) are the whole of it, with their packets, clocks, ripple and faults; this is for
-arrays to try things on.
+The emulators behind ports (`scanner.py`) add packets, clocks, ripple and faults.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ class Recorder:
 
     def __enter__(self) -> Recorder:
         try:
-            self._file = _WholeWrites(self._path)
+            self._file = _AtomicWrites(self._path)
         except OSError as error:
             raise self._error(error, "") from error
         self._messages = MessageWriter(self._file, self._path, self._note, self._attached, Writer)
@@ -125,7 +125,7 @@ def recorder_of(
     return Recorder(path, note, attached)
 
 
-class _WholeWrites:
+class _AtomicWrites:
     """A new file that grows by what was written between two flushes, or not at all."""
 
     def __init__(self, path: Path) -> None:

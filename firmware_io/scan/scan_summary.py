@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-ON_THE_WAY = "scans taken on the way"  # between two stops: left out by design
+BETWEEN_STOPS = "scans taken on the way"  # between two stops: left out by design
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class ScanSummary:
     @property
     def lost_data(self) -> bool:
         """Whether data are missing that the motion does not leave out by design."""
-        return bool(self.reconnects or set(self.left_out) - {ON_THE_WAY})
+        return bool(self.reconnects or set(self.left_out) - {BETWEEN_STOPS})
 
     def lines(self) -> list[str]:
         """The same in words."""

@@ -179,19 +179,19 @@ class TelegramSplitter:
     def feed(self, received: bytes) -> list[Telegram]:
         """The telegrams that are whole now."""
         self._buffer += received
-        found: list[Telegram] = []
+        telegrams: list[Telegram] = []
         while self._buffer:
             used, telegram, broken = _first(self._buffer)
             if not used:
                 break
             self._buffer = self._buffer[used:]
             if telegram is not None:
-                found.append(telegram)
+                telegrams.append(telegram)
                 self._lost = False
             else:
                 self.bad += broken or not self._lost
                 self._lost = True
-        return found
+        return telegrams
 
     @property
     def rest(self) -> bytes:

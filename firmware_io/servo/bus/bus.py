@@ -122,13 +122,13 @@ class ServoBus:
 
     def ping(self, servo_id: int, wait_s: float) -> list[int]:
         """Which servos answer a ping of one, or of all, in time; damaged answers are left out."""
-        found: set[int] = set()
+        answering: set[int] = set()
         with self._port_errors():
             self._send(self.packets.ping(servo_id), wait_s)
-            while not self._line.isPacketTimeout() and servo_id not in found:
+            while not self._line.isPacketTimeout() and servo_id not in answering:
                 with suppress(DeviceTimeoutError, ProtocolError):
-                    found.add(self.packets.receive(self._line).id)
-        return sorted(found)
+                    answering.add(self.packets.receive(self._line).id)
+        return sorted(answering)
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo of protocol 2.0; raises as `read` does."""

@@ -61,14 +61,14 @@ class ServoUnit:
         torque = self.table.torque
         return self.bus.write_packet(self.id, torque, torque.encode(0)), self.bus.packets.acknowledged(self.id)
 
-    def told(self, answer: ServoAnswer) -> str | None:
+    def reported_fault(self, answer: ServoAnswer) -> str | None:
         """What the servo reports of itself with an answer, in words; None where it is well."""
         if not answer.conditions:
             return None
         fault = self.table.hardware_error
         return self.table.names(answer.conditions if fault is None else self.count(fault))
 
-    def set_kept(self, register: Register, count: int) -> int:
+    def set_permanent(self, register: Register, count: int) -> int:
         """Set an entry that outlasts the power, torque being off; its count before. Written if it differs: it wears.
 
         Raises:
@@ -133,7 +133,7 @@ class ServoUnit:
         return renamed
 
     def answer_everything(self) -> None:
-        """Set it to answer everything; this outlasts the power if `ControlTable.is_kept` says so."""
+        """Set it to answer everything; this outlasts the power if `ControlTable.is_permanent` says so."""
         level = self.table.status_return
         with_answer = level.encode(self.table.answers_all)
         try:
