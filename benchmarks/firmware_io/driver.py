@@ -72,7 +72,8 @@ def _drive(out: Path, seconds: float) -> None:
     first, last = settled[0], settled[-1]
     share = (last.processor_s - first.processor_s) / (last.wall_s - first.wall_s)
     rate_hz = summary.scans / summary.duration_s
-    asked_hz = (summary.joint_samples + summary.left_out.get("servo angles of uncertain time", 0)) / summary.duration_s
+    uncertain = summary.left_out.get("servo angles with uncertain timestamp", 0)
+    asked_hz = (summary.joint_samples + uncertain) / summary.duration_s
     print(f"{summary.duration_s:.0f} s of {rate_hz:.1f} scans/s with intensities and {asked_hz:.0f} servo reads/s:")
     print(f"  {share:.1%} of one core over the last {last.wall_s - first.wall_s:.0f} s")
     print(f"  memory {first.memory_bytes / 1e6:.1f} MB, then {last.memory_bytes / 1e6:.1f} MB at the end")

@@ -134,7 +134,7 @@ class HornMotion:
         if at_s.size == 0:
             return np.empty((6, 0))
         if at_s.min() < self._first_s():
-            raise ValueError(f"the motion {at_s.min() - self._first_s():.3f} s before what is kept is gone")
+            raise ValueError(f"the motion {self._first_s() - at_s.min():.3f} s before the history")
         last = float(at_s.max())
         while self._integrator.t < last:
             self._integrator.step()

@@ -104,7 +104,7 @@ class SensorLine:
         for _ in range(_READS):
             if not self._look(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
                 return
-        raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; is another program busy?")
+        raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
     def close(self) -> None:
         """Let go of the port; what is closed stays so."""
@@ -166,7 +166,7 @@ class SensorLine:
             yield
         # A port that we closed after it vanished is None to pyserial, and -1 to select.
         except (OSError, TypeError, ValueError) as error:
-            raise DeviceError(f"{self.name}: the connection broke ({error}); plug it in again") from error
+            raise DeviceError(f"{self.name}: connection lost ({error}); plug it in again") from error
 
 
 def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:

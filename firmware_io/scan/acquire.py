@@ -86,7 +86,7 @@ def _unturned_until_opened() -> Iterator[Event]:
         yield opened
     except KeyboardInterrupt as stop:
         if not opened.is_set():
-            stop.add_note("the servo had not been told to turn")
+            stop.add_note("the servo was not started")
         raise
 
 
@@ -133,7 +133,7 @@ def _wait_until_steady(
 
     while time.monotonic_ns() < axis.begins_ns or math.isnan(axis.turning()[0]):
         if time.monotonic() > patience_s():
-            raise DeviceError("the servo tells no angle: is it in its dead sector all the time?")
+            raise DeviceError("the servo reports no angle: it may be in its dead sector all the time")
         wait()
     if not isinstance(motion, Spin):
         return read
@@ -217,7 +217,7 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                 )
     if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
-    dropped_why = "scans that the sensor dropped, or that waited while this computer was held up"
+    dropped_why = "scans that the sensor lost, or that waited because this computer was busy"
     lost = {dropped_why: lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
     even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
     return ScanSummary(

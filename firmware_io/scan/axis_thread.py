@@ -102,7 +102,7 @@ class AxisThread:
                 and self.window
                 and state.time_ns - self.window[-1].time_ns < max(_GAP_NS, _GAP_BOUNDS * state.time_bound_ns)
             ):
-                self.left_out["servo angles of uncertain time"] += 1  # the host was busy during the transaction
+                self.left_out["servo angles with uncertain timestamp"] += 1  # the host was busy during the transaction
             else:
                 self.window.append(state)
                 good.append(state)
@@ -136,7 +136,7 @@ def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
     start_rad = servo.read().position_rad
     if math.isnan(start_rad):
         raise DeviceError(
-            f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
+            f"{servo}: it is in its dead sector and reports no angle: turn the head to the front manually"
         )
     axis, done = AxisThread(motion, start_rad, servo.step_rad), Event()
     thread = Thread(target=_follow, args=(servo, axis, done), name="servo", daemon=True)

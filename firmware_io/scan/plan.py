@@ -109,7 +109,7 @@ def plan_scan(
     if turns < 1:
         raise DeviceError(f"turns = {turns}: at least 1")
     if angles.motion is None:
-        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set does not say how the servo moves")
+        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set has no motion of the servo")
     if turns * angles.motion.duration_s > _LONGEST_S:
         most = int(_LONGEST_S / angles.motion.duration_s)
         raise DeviceError(f"turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
@@ -117,7 +117,7 @@ def plan_scan(
     if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
         raise DeviceError(
             f"{out / 'angles.json'}: motion.mode = 'spin': {angles.servo} measures its angle in "
-            f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or take a servo such as MX-64R"
+            f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or choose a servo such as MX-64R"
         )
     if recording is not None:
         _check_name(recording)
@@ -145,4 +145,4 @@ def _check_name(recording: Path) -> None:
     if recording.suffix != ".mcap":
         raise RecordingError(f"{recording}: recordings are MCAP files; name it {recording.with_suffix('.mcap').name}")
     if recording.exists():
-        raise RecordingError(f"{recording}: exists already, and a recording is never written over")
+        raise RecordingError(f"{recording}: exists; a recording is never overwritten")

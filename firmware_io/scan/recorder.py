@@ -99,7 +99,9 @@ class Recorder:
             raise self._failure
 
     def _lost(self, error: OSError) -> RecordingError:
-        return self._error(error, f"; what came before is safe: make room, then `scanwright repair {self._path}`")
+        return self._error(
+            error, f"; what came before is on the disk: free space, then `scanwright repair {self._path}`"
+        )
 
     def _error(self, error: OSError, advice: str) -> RecordingError:
         return RecordingError(f"{self._path}: cannot write: {error.strerror or error}{advice}")

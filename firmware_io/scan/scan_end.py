@@ -11,7 +11,7 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 
-_SERVO_UNKNOWN = "what the servo does was not heard: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "state of the servo unknown: look, and cut its power if it turns"
 _HEADINGS: dict[Outcome, str] = {
     "done": "The scan is done.",
     "lossy": "The scan is done, but data were lost.",

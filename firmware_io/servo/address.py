@@ -48,7 +48,7 @@ def set_address(
         }
         changes = [(one, was, count) for one, count in wanted.items() if (was := unit.count(one)) != count]
         if not changes:
-            yield f"{unit}: it has that number and speed already"
+            yield f"{unit}: number and speed are right already"
             return
         check_torque(unit)
         _refuse_collision(unit, wanted)

@@ -48,7 +48,7 @@ def find_servo(
     """
     if model is not None and model not in {table.model for table in all_tables()}:
         known = f"known: {', '.join(sorted({table.model for table in all_tables()}))}"
-        raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; {removal(model) or known}")
+        raise DeviceError(f"{bus.port}: model = {model!r}: no driver for this model; {removal(model) or known}")
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
     met: set[str] = set()
@@ -62,7 +62,7 @@ def find_servo(
             if isinstance(identity, ControlTable):
                 if model not in (None, identity.model):
                     wrong = f"the model of servo {unit.id} is {identity.model}, not {model}"
-                    raise DeviceError(f"{bus.port}: {wrong}: look at cable and task")
+                    raise DeviceError(f"{bus.port}: {wrong}: check cable and task")
                 return ServoUnit(bus, identity, unit.id, was_mute)
             here = bus.baud, bus.packets.protocol, unit.id
             if identity is not None:
@@ -81,7 +81,7 @@ def find_servo(
         met |= set(strangers)
     missing = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
     speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _line_settings(model, baud)))
-    raise DeviceTimeoutError(f"{bus.port}: {missing} at {speeds} baud: look at its power, its cable, its id")
+    raise DeviceTimeoutError(f"{bus.port}: {missing} at {speeds} baud: check its power, cable and number")
 
 
 def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
@@ -99,8 +99,8 @@ def listen_first(bus: ServoBus) -> None:
     """
     if noise := bus.listen(_LISTEN_S):
         raise DeviceError(
-            f"{bus.port}: {len(noise)} bytes came unasked, and a servo never speaks first: another program drives "
-            "this bus, or something else hangs on this port; nothing was sent to it"
+            f"{bus.port}: {len(noise)} bytes came before any request: another program drives this bus, or no "
+            "servo is on this port; nothing was sent"
         )
 
 

@@ -40,7 +40,7 @@ def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) ->
     set_agreed(unit, changes, undo_folder)
     notes = [f"{change.register} was {change.now}, {change.why}: set to {change.needed}" for change in changes]
     if reported := unit.reported_fault(unit.present()):
-        notes.append(f"it reported {reported} and was reset: find out why before it turns again")
+        notes.append(f"it reported {reported} and was reset: find the cause before it turns again")
         _recover(unit)
     bus.return_delay_ns = unit.value(table.return_delay_ns)
     bus.lower_latency()

@@ -73,7 +73,7 @@ def set_up(
         if changes:
             yield from write_changes(unit, changes, undo_folder)
         else:
-            yield f"{unit} ({unit.table.model}): every setting is as it should be"
+            yield f"{unit} ({unit.table.model}): every setting is right"
 
 
 def wanted_changes(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> list[SettingChange]:
@@ -101,7 +101,7 @@ def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder
         if (now := unit.count(change.register)) != change.needed:
             raise DeviceError(
                 f"{unit}: {change.register}: {change.needed} was written, and it is {now} again: the servo has "
-                "restarted or does not keep it: look at its supply; nothing was moved"
+                "restarted or does not keep it: check its supply; nothing was moved"
             )
 
 
@@ -111,7 +111,8 @@ def _still_true(unit: ServoUnit, agreed: Sequence[SettingChange]) -> Sequence[Se
         muted = unit.was_mute and change.register == unit.table.status_return
         if not muted and (now := unit.count(change.register)) != change.now:
             raise DeviceError(
-                f"{unit}: {change.register} is {now}, and was {change.now} before: another servo? nothing was written"
+                f"{unit}: {change.register} is {now}, and was {change.now} before: it may be another servo; "
+                "nothing was written"
             )
     return agreed
 
@@ -181,7 +182,7 @@ def check_torque(unit: ServoUnit) -> None:
     if unit.has_torque():
         raise DeviceError(
             f"{unit} has its torque on, and holds or turns something: "
-            "end what drives it, or switch its power off and on; nothing was changed"
+            "end the program that drives it, or switch it off and on; nothing was changed"
         )
 
 

@@ -137,9 +137,7 @@ class LdrobotLidar:
             DeviceError: clusters, which it has not.
         """
         if cluster != 1:
-            raise DeviceError(
-                f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
-            )
+            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
         self._scanning, self._intensity, self._skip = True, intensity, skip
         self._begin_anew()
 
@@ -212,7 +210,7 @@ class LdrobotLidar:
                     others = " or ".join(product.name for product in fitting)
                     raise DeviceError(f"{self._line.name}: {points_s:.0f} points/s: this is a {others}, not a {model}")
                 return matching[0]
-            raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor talks there; check power, cable and port")
+            raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor answers; check power, cable and port")
 
     def _points_s(self) -> float | None:
         """Points per second by angles and speed; None where nothing talks."""

@@ -100,11 +100,13 @@ class LmsLidar:
         """
         if intensity or cluster != 1:
             what = "intensity" if intensity else f"cluster = {cluster}"
-            raise DeviceError(f"{self._line.name}: {what}: a {self.model} tells ranges only, each beam's: leave it out")
+            raise DeviceError(
+                f"{self._line.name}: {what}: a {self.model} sends one range for each beam, nothing else; omit it"
+            )
         step_centideg = round(36_000 / self._lidar.steps_per_turn)
         reply = self._ask(protocol.variant(180, step_centideg), protocol.VARIANT, _MODE_S)
         if protocol.accepted_variant(reply) != (180, step_centideg):
-            raise DeviceError(f"{self._line.name}: it refuses 180 deg in steps of {step_centideg / 100:g} deg")
+            raise DeviceError(f"{self._line.name}: it rejects 180 deg in steps of {step_centideg / 100:g} deg")
         self._speed_up()
         self._mode(protocol.STREAM)
         self._skip = skip
@@ -231,7 +233,7 @@ class LmsLidar:
     def _mode(self, mode: int, timeout_s: float = _MODE_S) -> None:
         reply = self._ask(protocol.telegram(protocol.MODE, bytes([mode])), protocol.MODE, timeout_s)
         if reply.values[:1] != b"\0":
-            raise DeviceError(f"{self._line.name}: it refuses mode {mode:02X}")
+            raise DeviceError(f"{self._line.name}: it rejects mode {mode:02X}")
 
     def _ask(self, request: bytes, command: int, timeout_s: float = _ANSWER_S) -> protocol.LmsTelegram:
         self._line.send(request)
@@ -256,7 +258,7 @@ class LmsLidar:
             return
         if measured.status & 7 >= protocol.FATAL:
             fault = f"it reports a fault (status {measured.status:02X})"
-            raise DeviceFaultError(f"{self._line.name}: {fault}: look at its lamps")
+            raise DeviceFaultError(f"{self._line.name}: {fault}: check its lamps")
         assert self._count is not None
         for ready, over_ns, came_ns in self._count.add(measured, arrival_ns):
             for turn in range(self._interlaced):
@@ -286,7 +288,7 @@ class LmsLidar:
         )
         warning = "its window is dirty: clean it" if measured.status & protocol.POLLUTED else ""
         if not warning and self._baud < _FAST_BAUD:
-            warning = f"at {self._baud} baud most of its turns are lost: take an adapter that can {_FAST_BAUD}"
+            warning = f"at {self._baud} baud most turns are lost; use an adapter with {_FAST_BAUD} baud"
         return TimedScan(scan, arrival_ns, count.arrivals.uncertainty_ns, warning)
 
 

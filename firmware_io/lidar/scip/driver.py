@@ -106,7 +106,7 @@ class ScipLidar:
             DeviceError: it does not answer, or is gone.
         """
         status = self.information("II").get("STAT", "")
-        return (f"it says: {status}",) if _is_well(status) else ()
+        return (f"status: {status}",) if _is_well(status) else ()
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; the laser lights by itself.
@@ -200,7 +200,7 @@ class ScipLidar:
     def _scan_on(self) -> None:
         self._stamp_ms = -1
         status = self.information("II").get("STAT", "")
-        self._warning = f"it says of itself: {status}: give its power anew" if status and not _is_well(status) else ""
+        self._warning = f"status: {status}; switch it off and on" if status and not _is_well(status) else ""
         self._dialogue.insist(self._request, "00")
 
     def _synchronise(self) -> TimeSync | None:

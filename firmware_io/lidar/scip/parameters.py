@@ -87,7 +87,7 @@ def parameters(fields: Mapping[str, str]) -> Parameters:
             rpm=int(fields["SCAN"]),
         )
     except KeyError as error:
-        raise ProtocolError(f"PP: the sensor tells no {error.args[0]}") from error
+        raise ProtocolError(f"PP: {error.args[0]} is missing") from error
     except ValueError as error:
         raise ProtocolError(f"PP: {error}") from error
     ordered = 0 <= known.first_step < known.last_step < known.first_step + known.steps_per_turn

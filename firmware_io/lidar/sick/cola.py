@@ -26,7 +26,7 @@ _STX, _ETX = 0x02, 0x03
 _WORDS = (b"sRN", b"sRA", b"sWN", b"sWA", b"sMN", b"sMA", b"sAN", b"sEN", b"sEA", b"sSN", b"sFA")
 
 ERRORS = {
-    0x01: "access denied: it wants a login",
+    0x01: "access denied: login required",
     0x02: "unknown method",
     0x03: "unknown variable",
     0x04: "a condition for it is not met",

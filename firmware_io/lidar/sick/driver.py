@@ -110,7 +110,7 @@ class SickLidar:
             DeviceError: the sensor refuses, does not get ready, or is gone.
         """
         if cluster != 1:
-            raise DeviceError(f"{self._name}: cluster = {cluster}: a {self.model} cannot, take 1")
+            raise DeviceError(f"{self._name}: cluster = {cluster}: a {self.model} sends every beam; use 1")
         self._begin(intensity, skip, _READY_S)
 
     def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
@@ -238,8 +238,8 @@ class SickLidar:
     def _timed(self, scan: ScanData, arrival_ns: int) -> TimedScan:
         if scan.status & FAULT:
             if scan.status & DIRT:
-                raise DeviceFaultError(f"{self._name}: its window is too dirty to see through: clean it")
-            raise DeviceFaultError(f"{self._name}: it reports a fault of its own (status {scan.status:X})")
+                raise DeviceFaultError(f"{self._name}: its window is too dirty to measure: clean it")
+            raise DeviceFaultError(f"{self._name}: it reports a fault (status {scan.status:X})")
         first = scan.channel("DIST1")
         if first is None:
             raise ProtocolError("no DIST1")
@@ -266,7 +266,7 @@ class SickLidar:
             range_m=first.range_m(),
             intensity=intensity.astype(np.float32),
         )
-        warning = "its window is dirty, though it still sees: clean it" if scan.status & DIRT_WARNING else ""
+        warning = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
         return TimedScan(turn, arrival_ns, moment.uncertainty_ns, warning)
 
     def _step_rad(self, step_deg: float) -> float:

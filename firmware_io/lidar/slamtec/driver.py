@@ -99,15 +99,11 @@ class SlamtecLidar:
             DeviceError: clusters, which it has not; it refuses, or is gone.
         """
         if cluster != 1:
-            raise DeviceError(
-                f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
-            )
+            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
         status, code = self._dialogue.ask(protocol.HEALTH, 6, protocol.health)
         if status == 2:
-            raise DeviceFaultError(
-                f"{self._line.name}: it reports fault {code:#06x}: take its power away, and give it again"
-            )
-        self._warning = f"it reports a warning of its own health, {code:#06x}: it still scans" if status else ""
+            raise DeviceFaultError(f"{self._line.name}: it reports fault {code:#06x}; switch it off and on")
+        self._warning = f"health warning {code:#06x}; it still scans" if status else ""
         self._intensity, self._skip = intensity, skip
         self._mode = typical_mode(self._dialogue)
         self._turn_motor(on=True)

@@ -174,11 +174,11 @@ class ServoBus:
     def _checked(self, status: Status, expected: int, *, reads: bool) -> ServoAnswer:
         meaning, complete = self.packets.meaning(status.error), len(status.data) == expected
         if meaning.damaged:
-            raise ProtocolError("the request arrived damaged: look at cable and ground")
+            raise ProtocolError("the request arrived damaged: check cable and ground")
         if meaning.refusal and not (complete and reads):  # a read that brings its values was no mistake
             raise DeviceError(f"{self.port}: servo {status.id}: refused: {meaning.refusal}")
         if not complete:
-            raise ProtocolError(f"{len(status.data)} bytes where {expected} were asked for")
+            raise ProtocolError(f"{len(status.data)} bytes instead of {expected}")
         wire_ns = (len(self._line.sent) - status.length) * self._line.byte_s * 1e9
         total_ns = self._line.ended_ns - self._line.began_ns
         known_ns = (len(self._line.sent) + status.length) * self._line.byte_s * 1e9 + self.return_delay_ns

@@ -114,7 +114,9 @@ class ServoUnit:
                 if self.id in self.bus.ping(self.id, PING_S) and self.count(register) == count:
                     self._unlock(False)
                     return
-        raise DeviceTimeoutError(f"{self}: {register}: not heard with {count}: power off and on, look again")
+        raise DeviceTimeoutError(
+            f"{self}: {register}: no answer after {count} was written: switch it off and on, then try again"
+        )
 
     def set_id(self, new_id: int) -> ServoUnit:
         """Give it another number, torque being off; the servo with it, read back.
@@ -128,7 +130,7 @@ class ServoUnit:
         time.sleep(PING_S)  # whether it answers with the old number or the new is its own affair
         renamed = ServoUnit(self.bus, self.table, new_id)
         if renamed.count(register) != new_id:
-            raise DeviceError(f"{self}: does not answer as {new_id}: power off and on, look again")
+            raise DeviceError(f"{self}: no answer as {new_id}: switch it off and on, then try again")
         renamed._unlock(False)
         return renamed
 

@@ -146,7 +146,7 @@ def _checked(packet: list[int], result: int) -> bytes:
     if result == COMM_RX_TIMEOUT:
         raise DeviceTimeoutError(NO_ANSWER)
     if result != COMM_SUCCESS:
-        raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: look at cable, ground and other senders")
+        raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: check cable, ground and other senders")
     return bytes(packet)
 
 

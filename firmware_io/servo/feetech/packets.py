@@ -54,7 +54,7 @@ def status(data: bytes) -> Status:
         ProtocolError: its sum is wrong.
     """
     if data[-1] != checksum(data[2:-1]):
-        raise ProtocolError(f"damaged answer {data.hex(' ')}: look at cable, ground and other senders")
+        raise ProtocolError(f"damaged answer {data.hex(' ')}: check cable, ground and other senders")
     return Status(data[2], data[4], data[5:-1], len(data))
 
 
@@ -92,7 +92,7 @@ class Sts:
             more = line.readPort(wanted - len(received))
             if not more:
                 if came:
-                    raise ProtocolError(f"damaged answer {received.hex(' ')}: look at cable, ground and other senders")
+                    raise ProtocolError(f"damaged answer {received.hex(' ')}: check cable, ground and other senders")
                 raise DeviceTimeoutError(NO_ANSWER)
             received, came = from_header(received + more), True
         return status(received)

@@ -207,10 +207,10 @@ def test_a_port_where_something_else_or_nothing_talks(monkeypatch):
     monkeypatch.setattr(driver, "_FIRST_PACKETS_S", 0.2)
     master, slave = os.openpty()
     try:
-        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor talks there"):
+        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor answers"):
             open_lidar(os.ttyname(slave), "LD19")
         os.write(master, bytes(range(256)) * 8)
-        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor talks there"):
+        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor answers"):
             open_lidar(os.ttyname(slave), "LD19")
     finally:
         os.close(master)

@@ -204,7 +204,7 @@ def test_what_a_sensor_cannot_do_is_told():
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
     with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
         open_scip(str(tmp_path / "ttyACM7"))
-    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: look at address"):
+    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: check address"):
         open_scip("127.0.0.1:1")
     with pytest.raises(DeviceError, match="this is no serial port"):
         open_scip("/dev/null")

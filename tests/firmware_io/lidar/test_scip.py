@@ -315,7 +315,7 @@ def test_parameters_that_cannot_be_are_refused(wrong):
     }
     with pytest.raises(ProtocolError, match="PP"):
         parameters.parameters(reply | wrong)
-    with pytest.raises(ProtocolError, match="no AFRT"):
+    with pytest.raises(ProtocolError, match="AFRT is missing"):
         parameters.parameters({key: text for key, text in reply.items() if key != "AFRT"})
 
 

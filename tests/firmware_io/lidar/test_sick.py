@@ -103,8 +103,8 @@ def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
         lidar.start()
         timed = lidar.read()
         check(timed.scan, "LMS111")
-        assert timed.warning == "its window is dirty, though it still sees: clean it"
-        for status, words in ((5, "too dirty to see through: clean it"), (1, "fault of its own")):
+        assert timed.warning == "its window is dirty, but it still measures: clean it"
+        for status, words in ((5, "too dirty to measure: clean it"), (1, "it reports a fault")):
             sensor.machine.status = status
             with pytest.raises(DeviceFaultError, match=words):
                 for _ in range(1000):
@@ -170,7 +170,7 @@ def test_refusals_have_the_sensors_words(monkeypatch):
     with emulator() as sensor, open_sick(sensor.address) as lidar:
         with pytest.raises(DeviceError, match="cluster"):
             lidar.start(cluster=2)
-        with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: it wants a login"):
+        with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: login required"):
             lidar._dialogue.ask(lidar._dialogue.writer("sMN LMCstartmeas"))
         with monkeypatch.context() as other:
             other.setattr(driver, "_PASSWORD", 1)

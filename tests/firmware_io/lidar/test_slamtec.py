@@ -222,7 +222,7 @@ def test_a_warning_of_its_health_is_told_with_the_turns():
     with SlamtecEmulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
         emulator.machine.health = 1
         ours.start()
-        assert ours.read().warning == "it reports a warning of its own health, 0x8002: it still scans"
+        assert ours.read().warning == "health warning 0x8002; it still scans"
         ours.stop()
         emulator.machine.health = 0
         ours.start()

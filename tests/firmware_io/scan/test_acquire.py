@@ -153,7 +153,7 @@ def test_an_angle_is_left_out_if_this_process_was_stopped_while_it_was_asked_for
     half_ns = round(stopped_s / 2 * 1e9)
     axis.received.put(ServoState(10**9 + half_ns, half_ns, 1.0, 1.0, 0.0, 12.0, 30.0))  # it was read as the stop began
     assert len(axis.hear()) == 100
-    assert dict(axis.left_out) == {"servo angles of uncertain time": 1}
+    assert dict(axis.left_out) == {"servo angles with uncertain timestamp": 1}
 
 
 class ForgetfulServo(RoundingServo):
@@ -452,7 +452,7 @@ def test_only_scans_at_rest_are_taken_at_stops(out, emulators):
     emulators.servo.set_up(spins=False)
     summary = run(out, emulators)
     recording = open_recording(recorded(out))
-    assert summary.left_out["scans taken on the way"] > 10
+    assert summary.left_out["scans between two stops"] > 10
     assert recording.held
     for scan in recording.scans():
         assert np.ptp(recording.joint_log.angle_at(scan.time_ns)) < math.radians(0.2)
@@ -481,7 +481,7 @@ def test_scan_and_doctor_report_a_dirty_window(tmp_path, command, monkeypatch, c
     with emulated_scanner(angles, room(None)) as scanner:
         scanner.lidar.machine.status = DIRT_WARNING
         acquire.acquire(plan_scan(tmp_path, lidar=scanner.ports.lidar, servo=scanner.ports.servo))
-        received = "LMS111: its window is dirty, though it still sees: clean it"
+        received = "LMS111: its window is dirty, but it still measures: clean it"
         assert [line for line in caplog.messages if "dirty" in line] == [received]
         code, lines, _ = command("doctor", tmp_path, "--lidar", scanner.ports.lidar, "--servo", scanner.ports.servo)
     assert code == 1
@@ -518,7 +518,7 @@ def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, emulators):
     (tmp_path / "angles.json").write_text(angle_set(servo="AX-12A", motion=motion).to_json())
     with ServoEmulator("AX-12A", angle_rad=math.radians(170)) as servo:
         plan = plan_scan(tmp_path, lidar=emulators.ports.lidar, servo=servo.port)
-        with pytest.raises(DeviceError, match="stands in its dead sector"):
+        with pytest.raises(DeviceError, match="is in its dead sector"):
             acquire.acquire(plan)
 
 

@@ -73,7 +73,7 @@ def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, command
     assert "has its torque on" in said
     assert code == 1  # there is no lidar
     if model != "AX-12A":
-        assert f"{delay} is 200, so that its answers come" in said
+        assert f"{delay} is 200, so that its answers are" in said
         assert f"`scanwright servo-setup {emulator.port}` sets it" in said
 
 
@@ -108,7 +108,7 @@ def test_where_something_speaks_first_nothing_is_said(command):
         os.read(master, 1)
     os.close(master)
     os.close(slave)
-    assert "bytes came unasked" in said and "nothing was sent" in said
+    assert "bytes came before any request" in said and "nothing was sent" in said
 
 
 @pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")])
@@ -136,7 +136,7 @@ def test_what_is_already_right_is_not_written(command, tmp_path, virtual_bus):
     emulator = virtual_bus("MX-64R")
     emulator.memory[5] = 0
     _, said, _ = command("doctor", "--fix", "--servo", emulator.port)
-    assert "every setting is as it should be" in said
+    assert "every setting is right" in said
     assert not list(tmp_path.glob("servo-*"))
     assert WRITE not in instructions(emulator.heard, "1.0")
 
@@ -236,7 +236,7 @@ def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
     ("model", "says"),
     [
         ("LMS111", ["it has run for 664.1 h", "it was switched on 597 times"]),
-        ("UTM-30LX", ["it says: Sensor works well."]),
+        ("UTM-30LX", ["status: Sensor works well."]),
     ],
 )
 def test_a_lidar_tells_its_age_and_state(model, says, monkeypatch, tmp_path):

@@ -148,8 +148,8 @@ def test_noise_without_end_is_a_timeout(scanner, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "state", "value", "says"),
     [
-        ("RPLIDAR A2", "health", 1, "it reports a warning of its own health, 0x8002"),
-        ("UTM-30LX", "state", "Trouble!! Error No. 00->33", "it says of itself: Trouble!! Error No. 00->33"),
+        ("RPLIDAR A2", "health", 1, "health warning 0x8002"),
+        ("UTM-30LX", "state", "Trouble!! Error No. 00->33", "status: Trouble!! Error No. 00->33"),
         ("TiM561", "status", DIRT_WARNING, "its window is dirty"),
         ("LMS 200", "status", 0x90, "its window is dirty"),
     ],

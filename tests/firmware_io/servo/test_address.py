@@ -75,7 +75,7 @@ def test_of_several_the_one_that_is_named_is_set(command, virtual_bus):
 def test_a_servo_that_holds_something_is_left_alone_and_one_that_is_right_is_not_written(command, here, virtual_bus):
     emulator = virtual_bus("MX-64R")
     code, said, _ = command("servo-setup", emulator.port, "--id", "1", "--baud", "57600")
-    assert code == 0 and "it has that number and speed already" in said
+    assert code == 0 and "number and speed are right already" in said
     emulator.memory[24] = 1
     code, _, complaints = command("servo-setup", emulator.port, "--id", "7")
     assert code == 2 and "has its torque on" in complaints[0]

@@ -149,8 +149,8 @@ def whole(data, error=0, servo_id=1):
         (whole(b"\1\2", servo_id=7), DeviceTimeoutError, "no answer"),  # another servo's
         (whole(b"\1\2")[:-1], ProtocolError, "damaged"),
         (whole(b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
-        (whole(b""), ProtocolError, "0 bytes where 2"),
-        (whole(b"\1\2\3"), ProtocolError, "3 bytes where 2"),
+        (whole(b""), ProtocolError, "0 bytes instead of 2"),
+        (whole(b"\1\2\3"), ProtocolError, "3 bytes instead of 2"),
         (b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged"),
     ],
 )

@@ -136,8 +136,8 @@ def test_ctrl_c_waits_for_the_thread_that_could_turn_the_servo_again():
 @pytest.mark.parametrize(
     ("interrupt", "says"),
     [
-        (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo had not been told to turn"),
-        (None, "what the servo does was not heard: look, and cut its power if it turns"),
+        (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo was not started"),
+        (None, "state of the servo unknown: look, and cut its power if it turns"),
     ],
 )
 def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, command, monkeypatch, interrupt, says):

@@ -166,14 +166,14 @@ def test_every_answer_is_read_as_it_was_sent(bus, protocol):
         ("1.0", b"", DeviceTimeoutError, "no answer"),
         ("2.0", b"", DeviceTimeoutError, "no answer"),
         ("1.0", status("1.0", 1, 0, b"")[:-1], ProtocolError, "damaged"),
-        ("1.0", status("1.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),  # the SDK: IndexError
-        ("2.0", status("2.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),
+        ("1.0", status("1.0", 1, 0, b""), ProtocolError, "0 bytes instead of 2"),  # the SDK: IndexError
+        ("2.0", status("2.0", 1, 0, b""), ProtocolError, "0 bytes instead of 2"),
         ("1.0", status("1.0", 1, 8, b""), DeviceError, "out of range"),
         ("2.0", status("2.0", 1, 7, b""), DeviceError, "cannot be accessed"),
         ("1.0", status("1.0", 1, 16, b""), ProtocolError, "request arrived damaged"),
         ("2.0", status("2.0", 1, 3, b""), ProtocolError, "request arrived damaged"),
         ("1.0", status("1.0", 1, 0, b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
-        ("2.0", status("2.0", 1, 0, b"\1\2\3"), ProtocolError, "3 bytes where 2"),  # the SDK cuts it silently
+        ("2.0", status("2.0", 1, 0, b"\1\2\3"), ProtocolError, "3 bytes instead of 2"),  # the SDK cuts it silently
         ("1.0", status("1.0", 7, 0, b"\1\2"), DeviceTimeoutError, "no answer"),  # another servo's
         ("1.0", b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged|wrong length"),
     ],
@@ -360,8 +360,8 @@ def test_mutated_answers_are_right_or_typed_errors(bus, protocol):
     ("arguments", "words"),
     [
         ({"port": "/dev/nothing"}, "/dev/nothing: no such port; serial ports here: "),
-        ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': not one this program can drive; known: AX-12A"),
-        ({"port": "pty", "model": "PD42-3-1140"}, "not one this program can drive; removed in 0.2: "),
+        ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': no driver for this model; known: AX-12A"),
+        ({"port": "pty", "model": "PD42-3-1140"}, "no driver for this model; removed in 0.2: "),
     ],
 )
 def test_what_cannot_be_opened_says_why(arguments, words):

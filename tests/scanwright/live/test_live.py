@@ -150,11 +150,11 @@ def noted(error, *notes):
 
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
-TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: take its power (no answer)")
+TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: cut its power (no answer)")
 SHINES = UnsafeNote("its laser may still be on: no answer")
 ENDS = {
     "done": (scan_end.finished(summary(left_out={BETWEEN_STOPS: 8}), ["wrote 90 points"]), "wrote 90 points"),
-    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "left out 12: bad packets"),
+    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "dropped 12: bad packets"),
     "reconnected": (scan_end.finished(summary(reconnects=2)), "the lidar was away 2 times"),
     "failed": (
         scan_end.failed(noted(DeviceError("<b>nothing</b> came"), OFF)),
