@@ -139,7 +139,7 @@ class ScannerNode:
         self._scanned_s = time.monotonic()
         self._push(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """See `Watch`."""
         self._check()
         self._said = line
@@ -231,8 +231,8 @@ class ScannerNode:
         self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _KEPT)
         stamp_ns = time.time_ns()
         fixed = fixed_frames(self._scanner.angles)
-        told = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
-        self._tf_static.publish(TFMessage(transforms=told))
+        transforms = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
+        self._tf_static.publish(TFMessage(transforms=transforms))
         turning = self.node.create_publisher(TFMessage, "/tf", 100)
 
         def publish(stamp_ns: int, position_rad: float) -> None:

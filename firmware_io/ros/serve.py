@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.design.angles import angles_in_use
 from scanwright.design.errors import RecordingError
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.own_body import own_body_beside
 from scanwright.firmware_io.recording.mcap_chunks import read_note
 from scanwright.firmware_io.recording.metadata import NOTE, held_by
@@ -15,10 +16,8 @@ from scanwright.firmware_io.ros.drive import drive
 from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
-from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +45,12 @@ class Publishing:
 
 
 def serve_devices(
-    out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Publishing, viewer: Watch = NOBODY
+    out: Path,
+    plan: ScanPlan,
+    ros_args: Sequence[str],
+    progress: Progress,
+    points: Publishing,
+    viewer: Watch = UNWATCHED,
 ) -> None:
     """Publish what the devices say until Ctrl-C; they are stopped on every way out.
 
@@ -54,9 +58,9 @@ def serve_devices(
         out: build folder.
         plan: endless.
         ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
-        say: is told what is going on.
+        progress: gets each step.
         points: how they are published.
-        viewer: is told of the scan too.
+        viewer: gets the scan too.
 
     Raises:
         TaskError: the folder has no angle set.
@@ -64,11 +68,11 @@ def serve_devices(
     """
     held = plan.motion.mode == "stop_and_go"
     with running_node(_scanner(out, points, held), ros_args, replayed=False) as node:
-        drive(plan, node, say, viewer)
+        drive(plan, node, progress, viewer)
 
 
 def serve_recording(
-    out: Path, recording: Path, ros_args: Sequence[str], say: Say, points: Publishing, *, rate: float = 1.0
+    out: Path, recording: Path, ros_args: Sequence[str], progress: Progress, points: Publishing, *, rate: float = 1.0
 ) -> None:
     """Publish a recording at its own pace, with its clock on /clock; the other arguments as for `serve_devices`.
 
@@ -77,11 +81,11 @@ def serve_recording(
     """
     held = held_by(read_note(recording, NOTE))
     with running_node(_scanner(out, points, held), ros_args, replayed=True) as node:
-        say("waiting for somebody to listen to scan, joint_states or points")
+        progress("waiting for a subscriber of scan, joint_states or points")
         node.await_subscriber()
         scans, angles = replay(recording, node, rate=rate)
         node.close()
-        say(f"published {scans:,} scans and {angles:,} angles of {recording}")
+        progress(f"published {scans:,} scans and {angles:,} angles of {recording}")
         node.flush()
 
 

@@ -159,4 +159,4 @@ def tell(batch: Batch, watch: Watch) -> None:
         else:
             watch.joint(thing.time_ns, thing.position_rad)
     for line in batch.lines:
-        watch.told(line)
+        watch.message(line)
