@@ -139,7 +139,7 @@ class Progress:
     said_s: float = -math.inf
     said: str = ""
 
-    def __call__(self, line: str) -> None:
+    def __call__(self, line: str, _fraction: float | None = None, /) -> None:
         """Say it."""
         if voice() is Voice.QUIET:
             return
