@@ -361,7 +361,7 @@ def test_a_fault_stops_the_servo_and_keeps_the_recording(out, emulators, monkeyp
     assert "\n" not in str(caught.value)
     if fault != "servo unplugged":  # then nobody can tell it, protocol 1.0 has no watchdog
         until(lambda: stands(emulators))
-    assert repair(recorded(out)).whole
+    assert repair(recorded(out)).intact
 
 
 HARMLESS = {
@@ -427,7 +427,7 @@ def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recordi
     until(lambda: stands(emulators))
     summary = repair(recorded(out))
     assert stopped_ns - summary.times_ns[1] < 10 * 10**9  # a second, and ten on a busy computer
-    assert summary.whole == (number == signal.SIGINT)
+    assert summary.intact == (number == signal.SIGINT)
     if number == signal.SIGINT:
         assert process.returncode == 130
         assert "servo 1 (MX-64R) has answered that its torque is off" in complaints
