@@ -15,11 +15,11 @@ from scanwright.design.arrays import Array, Mask
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
 from scanwright.design.scene import ray_caster
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 
 
 def beam_checks(
-    scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Array], carriers: Collection[str]
+    scanner: Scanner, shadow: SelfOcclusion, triangles_m: Mapping[str, Array], carriers: Collection[str]
 ) -> list[Finding]:
     """Return how many beams are hidden, and how many by the linkage alone.
 

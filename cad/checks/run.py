@@ -25,7 +25,7 @@ from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
-from scanwright.design.shadow import Shadow, own_body_bytes
+from scanwright.design.self_occlusion import SelfOcclusion, self_occlusion_bytes
 
 Say = Callable[[str], None]
 
@@ -39,7 +39,7 @@ def check_files(scanner: Scanner, assembly: Assembly, progress: Say) -> dict[str
         progress: callback for progress.
     """
     checks, shadow = run_checks(scanner, assembly, progress)
-    own_body = own_body_bytes(shadow, scanner.lidar.bearings_rad())
+    own_body = self_occlusion_bytes(shadow, scanner.lidar.bearings_rad())
     return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}
 
 
@@ -53,7 +53,7 @@ def check_scanner(scanner: Scanner, progress: Say) -> list[Finding]:
     return run_checks(scanner, make_parts(scanner), progress)[0]
 
 
-def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Finding], Shadow]:
+def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Finding], SelfOcclusion]:
     """Return all checks, in the order of the report, and the beams that the parts hide."""
     progress("casting the beams")
     layout, meshes = assembly.layout, assembly.meshes()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
@@ -16,4 +16,4 @@ def wiring_checks(scanner: Scanner) -> list[Finding]:
         "supply is overloaded, and every device gets its voltage"
     )
     ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", summary)
-    return [*(broken_rules(network) or [ok]), *network.unknown]
+    return [*(check_network(network) or [ok]), *network.unknown]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 from scanwright.design.electrics.network import Box, Network, Wire
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.findings import sentence
 
 ROW_PX = 22.0  # from pin to pin
@@ -119,7 +119,7 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
 
 def _warnings(network: Network, width: float) -> list[str]:
     """Return the lines of broken rules and cautions, as wide as the sheet."""
-    broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in broken_rules(network)]
+    broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in check_network(network)]
     cautions = [f"CAUTION: {caution}" for caution in network.cautions]
     return [
         line

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scanwright.cad.files.schematic import schematic_svg
 from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
 from scanwright.design.electrics.network import Network
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.sizing import OVER_PEAK
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.findings import sentence
@@ -41,7 +41,7 @@ def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
 def wiring_text(network: Network, title: str) -> str:
     """Return the text: paragraphs and lists, no tables, as the report shows them."""
     sections: dict[str, Section] = {
-        "Do not build this wiring": ([sentence(broken) for broken in broken_rules(network)], []),
+        "Do not build this wiring": ([sentence(broken) for broken in check_network(network)], []),
         "Caution": ([*network.cautions], [GROUND]),
         "Power": _power(network),
         "Slip ring": _ring(network),
@@ -58,11 +58,13 @@ def wiring_text(network: Network, title: str) -> str:
 
 
 def _power(network: Network) -> Section:
-    continuous, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("lasting_a", "peak_a"))
+    continuous, peak = (
+        sum(getattr(branch, name) for branch in network.branches) for name in ("continuous_a", "peak_a")
+    )
     items = [
         *(
-            f"{branch.name}, {branch.feeds}: {branch.lasting_a:.2g} A continuous, {branch.peak_a:.2g} A at most, fuse "
-            f"{branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
+            f"{branch.name}, {branch.feeds}: {branch.continuous_a:.2g} A continuous, {branch.peak_a:.2g} A at most, "
+            f"fuse {branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
             for branch in network.branches
         ),
         f"all at 12 V: {continuous:.2g} A continuous ({12 * continuous:.0f} W), {peak:.2g} A at most "

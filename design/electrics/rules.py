@@ -9,10 +9,10 @@ from scanwright.design.electrics.sizing import OVER_PEAK, wire_a
 from scanwright.design.findings import Finding
 
 
-def broken_rules(network: Network) -> list[Finding]:
+def check_network(network: Network) -> list[Finding]:
     """Return an error for each broken rule."""
     rules = (_open, _joined, _circuits, _branches, _volts, _colours)
-    return [broken for rule in rules for broken in rule(network)]
+    return [finding for rule in rules for finding in rule(network)]
 
 
 def _open(network: Network) -> Iterator[Finding]:
@@ -25,7 +25,7 @@ def _open(network: Network) -> Iterator[Finding]:
             if (box.name, name) not in wired and name not in box.free:
                 yield _broken(box.name, f"pin {name} is not connected")
     for missing in sorted(wired - known):
-        yield _broken(missing[0], f"a wire ends in {missing[1]}, which is no pin of it")
+        yield _broken(missing[0], f"a wire ends in {missing[1]}, which is not a pin of it")
 
 
 def _joined(network: Network) -> Iterator[Finding]:
