@@ -33,7 +33,7 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """A piece of a circle, counter-clockwise; angles in rad, a whole turn for a circle."""
+    """A piece of a circle, counter-clockwise; angles in rad, a full turn for a circle."""
 
     centre: tuple[float, float]
     radius: float

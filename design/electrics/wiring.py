@@ -135,8 +135,8 @@ def _boxes(
         if load.volts != SUPPLY_V:
             title = f"{CHANGER[load.volts]} for the {load.name}"
             size = (f"at least {load.peak_a:.2g} A, set to {load.set_v:g} V",)
-            pins = ("in +", "in -"), ("out +", "out -")
-            boxes.append(Box(f"{load.name} converter", title, size, *pins, 3, bought=True))
+            sides = ("in +", "in -"), ("out +", "out -")
+            boxes.append(Box(f"{load.name} converter", title, size, *sides, 3, bought=True))
     signals = SIGNALS[servo.bus or "ttl"]
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
     boxes += [

@@ -111,7 +111,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
     """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said", "mounts"))
+        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "sentences", "mounts"))
     angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
     assembly = read(folder / "assembly.glb", load_glb)
     scanner = [] if assembly is None else about_centre(assembly, angles)
@@ -129,7 +129,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "answer": result,
         "sphere": sphere,
         "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
-        "said": sentences(angles, result, 2 * np.tan(problem.ball_rad), figures),
+        "sentences": sentences(angles, result, 2 * np.tan(problem.ball_rad), figures),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 

@@ -141,7 +141,7 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
 
 
 def _radial(joint: Joint) -> bool:
-    """Whether the screws point at the rotation axis, from around it."""
+    """Return whether the screws point at the rotation axis, from around it."""
     return all(
         abs(axis.along[2]) < 1e-6 and abs(axis.start[0] * axis.along[1] - axis.start[1] * axis.along[0]) < 1e-6
         for axis in joint.axes

@@ -20,20 +20,19 @@ from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 
 NUTS = (
-    "Put the nuts into their traps before anything else: those of a plate or an arm from below; those of a boss from "
-    "above into the slots; those of a foot from its corners. Pull each home with a screw. What has no trap is a plain "
-    "thread."
+    "Put the nuts into their pockets first: those of a plate or an arm from below; those of a boss from above into the "
+    "slots; those of a foot from its corners. Pull each in with a screw. A hole without a pocket has a plain thread."
 )
 LOCKED = (
-    "Where a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread, none on plastic, "
-    "which it makes crack. Tighten to the torque that stands behind each screw, and once more after a day, since "
-    "plastic under a head gives way. `checks.json` tells under `retention` and `screw` what each joint holds, and why."
+    "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
+    "which then cracks. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
+    "creeps. `checks.json` lists under `retention` and `screw` the margin of each joint."
 )
 LOOK = "Look, then wire"
-LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
+LAST = "Turn the linkage by hand through its range: nothing touches, no cable pulls tight. "
 TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
-IN_A_LOOP = "Leave the lidar's cables a loose loop for the whole sweep, then join them to USB and power."
+IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to USB and power."
 
 
 def instructions_text(
@@ -59,14 +58,14 @@ def instructions_text(
         "",
         f"Configuration {config_hash}: {scanner.lidar.name} on {scanner.servo.name}, alpha_rot {angles.alpha_rot:g}, "
         f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
-        "In the pictures grey stands already and colour comes, made parts orange, bought ones blue; the rotation axis "
-        "stands upright, or the lidar's where it is put in. `exploded.glb` turns under the mouse; `bom.csv` lists what "
-        "you need.",
+        "In the pictures present bodies are grey, new made parts orange, new bought ones blue; the rotation axis is "
+        "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
+        "lists what you need.",
         "",
         *_misfits(products_of(scanner, assembly.layout.drive)),
         f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
-        f"everything {print_words(scanner.printer)}: the files tell PrusaSlicer so, other slicers have to be told.",
+        f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",
         *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
         f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
