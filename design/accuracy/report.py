@@ -63,17 +63,15 @@ def work_precision_picture(path: Path, measured: MethodsMeasured, title: str) ->
     for method in methods:
         if failed := next((p.failed for p in points if p.method == method and p.failed), ""):
             axis.plot([], [], " ", label=f"{method}: {failed}")
+    count = len(measured.truths)
+    label = "error of J" if count == 1 else f"error of J, the worst of {count} settings (thin: to the median)"
     axis.axhline(floor, color="#888888", linestyle=":", linewidth=1)
     axis.annotate("error of the reference", (1, floor), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=_error_label(len(measured.truths)))
+    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=label)
     axis.grid(which="major", color="#dddddd", linewidth=0.6)
     axis.legend(fontsize=8)
     axis.set_title(f"{title}\n{this_machine()}", fontsize=10)
     save_picture(figure, path)
-
-
-def _error_label(settings: int) -> str:
-    return "error of J" if settings == 1 else f"error of J, the worst of {settings} settings (thin: to the median)"
 
 
 @dataclass(frozen=True, slots=True)

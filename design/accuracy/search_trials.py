@@ -25,9 +25,11 @@ TASKS = 5  # drawn at random
 SEED = 1
 STEPS_DEG = 30.0, 20.0, 10.0, 5.0, 2.5
 SWEPT_STEPS_DEG = STEPS_DEG[:-1]  # no symmetry reduces it: a finer grid has too many settings
-FINENESS = 0.1, 0.25, 0.5, 1.0, 2.0  # times the usual nodes of the coarse J
-MARGINS = 0.0, 0.05, MARGIN, 0.5  # of the coarse J
-ROUNDS = 0, 1, 2  # of refinement
+EFFORTS: tuple[tuple[str, str, str, tuple[float, ...]], ...] = (  # choice, field of `Effort`, label, values
+    ("nodes of the coarse J", "fineness", "{:g} times", (0.1, 0.25, 0.5, 1.0, 2.0)),
+    ("margin of the coarse J", "margin", "{:g}", (0.0, 0.05, MARGIN, 0.5)),
+    ("refinement", "rounds", "{} rounds", (0, 1, 2)),
+)
 LEAST_REGRET = 1e-7  # of J: its final score has no more digits
 
 
@@ -78,15 +80,10 @@ def _variants(ranges: AngleRanges, steps_deg: tuple[float, ...]) -> list[_Varian
     for step in sorted({*steps_deg, ranges.step_deg}, reverse=True):
         its = ranges.model_copy(update={"step_deg": step})
         variants.append(_Variant("grid of the search", f"{step:g} deg", its, USUAL, step == ranges.step_deg))
-    for fineness in FINENESS:
-        effort = replace(USUAL, fineness=fineness)
-        variants.append(_Variant("nodes of the coarse J", f"{fineness:g} times", ranges, effort, effort == USUAL))
-    for margin in MARGINS:
-        effort = replace(USUAL, margin=margin)
-        variants.append(_Variant("margin of the coarse J", f"{margin:g}", ranges, effort, effort == USUAL))
-    for rounds in ROUNDS:
-        effort = replace(USUAL, rounds=rounds)
-        variants.append(_Variant("refinement", f"{rounds} rounds", ranges, effort, effort == USUAL))
+    for choice, field, label, values in EFFORTS:
+        for value in values:
+            effort = replace(USUAL, **{field: value})
+            variants.append(_Variant(choice, label.format(value), ranges, effort, effort == USUAL))
     return variants
 
 

@@ -196,7 +196,15 @@ def _refusals(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """Cases without a result are rejected: 1 for a rejection."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
-    rows = [row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
+    rows = [
+        row(
+            "all weights zero",
+            "refused",
+            1,
+            _refused(lambda: _with(loaded, problem, [{"shape": "all", "value": 0.0}]), angles),
+            0,
+        )
+    ]
     masked = _refused(lambda: problem.with_objective(log(field_of(hidden))), angles)
     rows.append(row("everything masked", "refused", 1, masked, 0))
     try:
@@ -214,10 +222,6 @@ def _refused(make: Callable[[], Problem], angles_rad: Array) -> int:
     except TaskError as error:
         return int(str(error) == EMPTY)
     return 0
-
-
-def _all(value: float) -> dict[str, object]:
-    return {"shape": "all", "value": value}
 
 
 def _task(loaded: LoadedTask, weight: list[dict[str, object]], mask: list[dict[str, object]]) -> Task:

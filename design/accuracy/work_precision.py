@@ -66,14 +66,6 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class _Nearby:
-    """Where the minimum over beta_laser is searched, and where the reference has it [deg from the setting]."""
-
-    steps_deg: Array
-    minimum_deg: float
-
-
-@dataclass(frozen=True, slots=True)
 class MethodsMeasured:
     """Results of all methods.
 
@@ -101,7 +93,7 @@ def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, pr
     if is_smooth(problem):
         steps = NEARBY_DEG * np.linspace(-1, 1, NEARBY_POINTS)
         J = [reference(loaded, problem, _turned(first_rad, d)).J for d in steps]
-        nearby = _Nearby(steps, _minimum(steps, J))
+        nearby = steps, _minimum(steps, J)
     points: list[Point] = []
     methods = methods_for(problem)
     total = sum(len(values) for _, _, values in methods.values())
@@ -141,7 +133,7 @@ def _point(
     problem: Problem,
     settings: list[Setting],
     truths: list[Reference],
-    nearby: _Nearby | None,
+    nearby: tuple[Array, float] | None,  # steps of beta_laser, and the minimum of the reference, from the setting [deg]
     name: str,
     method: Method,
     parameter: str,
@@ -164,8 +156,10 @@ def _point(
         seconds.append(time.perf_counter() - start)
     moved = np.nan
     if nearby is not None and seconds[0] < SLOW_S:
-        around = [method(problem, _turned(first_rad, d), value) for d in nearby.steps_deg]
-        moved = abs(_minimum(nearby.steps_deg, around) - nearby.minimum_deg)
+        steps_deg, minimum_deg = nearby
+        moved = abs(
+            _minimum(steps_deg, [method(problem, _turned(first_rad, d), value) for d in steps_deg]) - minimum_deg
+        )
     off = np.abs(np.array(J) - [truth.J for truth in truths])
     times = tuple(sorted(seconds))
     return Point(name, setting, J[0], float(off.max()), float(np.median(off)), moved, times, peak, chosen)

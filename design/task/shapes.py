@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
@@ -140,6 +140,9 @@ class BoxRegion(Record):
         return self
 
 
+Pairs = tuple[tuple[str, str], ...]
+
+
 class OnPlane(Record):
     """A rectangle on a plane near the scanner, in metres: all directions in which its optical centre sees it.
 
@@ -147,6 +150,7 @@ class OnPlane(Record):
     more of the view, has a higher weight per square metre.
     """
 
+    _rising: ClassVar[Pairs]  # fields: the first of each pair must be below the second
     heading_deg: Number = Field(default=0.0, ge=-360, le=360, description="where it lies: 0 is ahead, 90 left")
     height_m: Length = Field(description="of the scanner's optical centre over the ground")
     value: Value = 1.0
@@ -187,13 +191,9 @@ class OnPlane(Record):
     def _named(self) -> str:
         """Return its description without the heading."""
 
-    @abstractmethod
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        """Return pairs of fields: the first of each must be below the second."""
-
     @model_validator(mode="after")
     def _can_be_aimed_at(self) -> OnPlane:
-        for low, high in self._rising():
+        for low, high in self._rising:
             if not getattr(self, low) < getattr(self, high):
                 raise ValueError(f"{high} = {getattr(self, high):g} is not above {low} = {getattr(self, low):g}")
         a, b, c, d = self.corners_m()
@@ -206,6 +206,7 @@ class OnPlane(Record):
 class GroundRegion(OnPlane):
     """A rectangle of level ground, in metres from below the scanner."""
 
+    _rising: ClassVar[Pairs] = (("from_m", "to_m"),)
     shape: Literal["ground"] = Field(description="level ground, in metres")
     from_m: Far = Field(description="where it begins; negative is behind")
     to_m: Far = Field(description="where it ends")
@@ -217,13 +218,11 @@ class GroundRegion(OnPlane):
     def _named(self) -> str:
         return f"ground {self.from_m:g} to {self.to_m:g} m"
 
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return (("from_m", "to_m"),)
-
 
 class CeilingRegion(OnPlane):
     """A rectangle of a level ceiling, in metres from above the scanner."""
 
+    _rising: ClassVar[Pairs] = ("height_m", "ceiling_m"), ("from_m", "to_m")
     shape: Literal["ceiling"] = Field(description="a level ceiling, in metres")
     ceiling_m: Length = Field(default=2.5, description="its height over the ground")
     from_m: Far = Field(default=-2.0, description="where it begins; negative is behind")
@@ -236,13 +235,11 @@ class CeilingRegion(OnPlane):
     def _named(self) -> str:
         return f"ceiling at {self.ceiling_m:g} m, {self.from_m:g} to {self.to_m:g} m"
 
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return ("height_m", "ceiling_m"), ("from_m", "to_m")
-
 
 class WallRegion(OnPlane):
     """A rectangle of an upright wall across the heading."""
 
+    _rising: ClassVar[Pairs] = (("bottom_m", "top_m"),)
     shape: Literal["wall"] = Field(description="an upright wall, in metres")
     distance_m: Length = Field(description="to it, level")
     width_m: Length = Field(description="across, half of it to each side")
@@ -256,9 +253,6 @@ class WallRegion(OnPlane):
 
     def _named(self) -> str:
         return f"wall {self.distance_m:g} m away, {self.bottom_m:g} to {self.top_m:g} m high"
-
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return (("bottom_m", "top_m"),)
 
 
 def beyond_words(share: float) -> str:

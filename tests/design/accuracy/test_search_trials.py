@@ -19,9 +19,9 @@ def test_what_is_spent_on_a_search_and_what_it_gains(tmp_path, monkeypatch):
     monkeypatch.setattr(families, "FAMILIES", 1)  # nobody looks at the ones behind
     monkeypatch.setattr(search_trials, "TASKS", 1)
     monkeypatch.setattr(search_trials, "STEPS_DEG", (30.0, 15.0))
-    monkeypatch.setattr(search_trials, "FINENESS", (1.0,))
-    monkeypatch.setattr(search_trials, "ROUNDS", (0, 2))
-    monkeypatch.setattr(search_trials, "MARGINS", (0.0,))
+    values = {"fineness": (1.0,), "margin": (0.0,), "rounds": (0, 2)}
+    efforts = [(choice, field, label, values[field]) for choice, field, label, _ in search_trials.EFFORTS]
+    monkeypatch.setattr(search_trials, "EFFORTS", efforts)
     loaded = load_task(Path("ground_ahead"))
     coarse = loaded.task.angles.model_copy(update={"step_deg": 15.0})
     told = report_search(replace(loaded, task=loaded.task.model_copy(update={"angles": coarse})), tmp_path, no_progress)
