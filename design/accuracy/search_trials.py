@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,8 @@ def _variants(ranges: AngleRanges, steps_deg: tuple[float, ...]) -> list[_Varian
         variants.append(_Variant("grid of the search", f"{step:g} deg", its, USUAL, step == ranges.step_deg))
     for choice, field, label, values in EFFORTS:
         for value in values:
-            effort = replace(USUAL, **{field: value})
+            changed: dict[str, Any] = {field: value}
+            effort = replace(USUAL, **changed)
             variants.append(_Variant(choice, label.format(value), ranges, effort, effort == USUAL))
     return variants
 
