@@ -140,7 +140,7 @@ def test_roundings_do_not_line_up_where_a_question_comes_with_every_step(monkeyp
     assert len(heard) > 90
     time_ns = np.array([state.time_ns for state in heard])
     log = JointLog(time_ns, np.array([state.position_rad for state in heard]))
-    error_rad = axis_curve(log, held=False)[0].angle_at(time_ns) - servo.true_rad(time_ns)
+    error_rad = axis_curve(log, at_rest=False)[0].angle_at(time_ns) - servo.true_rad(time_ns)
     assert np.sqrt(np.mean(error_rad**2)) < 0.17 * servo.step_rad  # rounding alone is 0.29
     assert abs(np.diff(time_ns).mean() - 10e6) < 1e6
 
