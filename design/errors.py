@@ -7,15 +7,16 @@
      +-- RecordingError        a recording is unreadable, or lacks what the command needs
      +-- SceneError            a mesh is unreadable, or holds nothing that a beam can hit
      +-- InstallError          an extra of the package, or a library of the system, is not installed
-     +-- DeviceError           a device is absent, or did not do what it was asked
+     +-- DeviceError           a device is absent, or did not do what it was asked; exit 3
           +-- DeviceTimeoutError  ... because nothing came in time
           +-- ProtocolError    ... because what came is no valid packet
           +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
           +-- ServoSetupError  ... because its settings must change first (`firmware_io.servo.fitness`, with the list)
           +-- UnsafeError      ... and may still turn or shine: it did not confirm that it stopped
 
-A command prints the message and exits with 2; anything else is a bug and gets its traceback. The message is one line,
-or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as far as they apply.
+A command prints the message and exits with the code of its kind; anything else is a bug and gets its traceback. The
+message is one line, or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as
+far as they apply.
 """
 
 from __future__ import annotations

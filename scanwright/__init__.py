@@ -55,10 +55,13 @@ if TYPE_CHECKING:
     from scanwright.design.errors import UnsafeError as UnsafeError
     from scanwright.design.evaluation.comparison import ComparisonRow as ComparisonRow
     from scanwright.design.evaluation.evaluation import Evaluation as Evaluation
+    from scanwright.design.evaluation.evaluation import Lever as Lever
+    from scanwright.design.evaluation.poles import Pole as Pole
     from scanwright.design.search.optimum import Optimum as Optimum
     from scanwright.design.task.task import LoadedTask as LoadedTask
     from scanwright.design.task.task import Task as Task
     from scanwright.firmware_io.assembly.assemble import AssembleSummary as AssembleSummary
+    from scanwright.firmware_io.assembly.options import AssembleOptions as AssembleOptions
     from scanwright.firmware_io.calibration.calibrate import Calibration as Calibration
     from scanwright.firmware_io.clouds.cloud import Cloud as Cloud
     from scanwright.firmware_io.lidar.lidar import LidarDriver as LidarDriver
@@ -90,10 +93,13 @@ _TYPES = {
     "UnsafeError": "scanwright.design.errors",
     "ComparisonRow": "scanwright.design.evaluation.comparison",
     "Evaluation": "scanwright.design.evaluation.evaluation",
+    "Lever": "scanwright.design.evaluation.evaluation",
+    "Pole": "scanwright.design.evaluation.poles",
     "Optimum": "scanwright.design.search.optimum",
     "LoadedTask": "scanwright.design.task.task",
     "Task": "scanwright.design.task.task",
     "AssembleSummary": "scanwright.firmware_io.assembly.assemble",
+    "AssembleOptions": "scanwright.firmware_io.assembly.options",
     "Calibration": "scanwright.firmware_io.calibration.calibrate",
     "Cloud": "scanwright.firmware_io.clouds.cloud",
     "LidarDriver": "scanwright.firmware_io.lidar.lidar",
@@ -110,6 +116,7 @@ _TYPES = {
 
 __all__ = [
     "AngleSet",
+    "AssembleOptions",
     "AssembleSummary",
     "Assembly",
     "Build",
@@ -124,11 +131,13 @@ __all__ = [
     "Evaluation",
     "ImportSummary",
     "InstallError",
+    "Lever",
     "LidarDriver",
     "LoadedTask",
     "MapSummary",
     "NumericalError",
     "Optimum",
+    "Pole",
     "ProtocolError",
     "Recording",
     "RecordingArrays",

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.api.arguments import AnglesLike, as_angle_set, with_say
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.registration.register_files import RegisteredFiles
 
 
+@with_say
 def register(
     clouds: Sequence[str | Path],
     out: str | Path,
@@ -28,7 +30,7 @@ def register(
     angles: AnglesLike | None = None,
     spacing_m: float = 0.1,
     map_spacing_m: float = 0.02,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> RegisteredFiles:
     """Find where clouds stand to each other, from no start if need be, and merge them into one map.
 
@@ -41,7 +43,7 @@ def register(
             part of their covariance. Without it the calibration is taken to be right.
         spacing_m: distance of the points that are registered.
         map_spacing_m: distance of the points of the map.
-        say: is told what is being done.
+        progress: progress callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
@@ -55,9 +57,10 @@ def register(
     given = None if start is None else Path(start)
     scanner = None if angles is None else as_angle_set(angles)
     paths = [Path(cloud) for cloud in clouds]
-    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, say)
+    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, progress)
 
 
+@with_say
 def make_map(
     clouds: Sequence[str | Path],
     out: str | Path,
@@ -69,7 +72,7 @@ def make_map(
     from_m: float = 0.1,
     to_m: float = 1.8,
     seen_through_m: float | None = None,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> MapSummary:
     """Turn clouds into an occupancy grid, as ROS's map_server reads it: YAML and PGM.
 
@@ -88,7 +91,7 @@ def make_map(
         to_m: what is higher above the floor is driven under.
         seen_through_m: leave out what came or went: points that another cloud was seen through, by more than this; 0.1
             is usual.
-        say: is told what is being done.
+        progress: progress callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map. Nothing is
@@ -99,7 +102,7 @@ def make_map(
     scanner = None if angles is None else as_angle_set(angles)
     tum = None if poses is None else Path(poses)
     paths = [Path(cloud) for cloud in clouds]
-    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, seen_through_m, say)
+    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, seen_through_m, progress)
 
 
 def read_cloud(path: str | Path) -> Cloud:

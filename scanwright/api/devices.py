@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.api.arguments import AnglesLike, as_angle_set, with_say
 from scanwright.api.recordings import assemble
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.posix import require_posix
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def open_servo(
     return open_servo(port, model, servo_id, spins=spins, undo_folder=folder)
 
 
+@with_say
 def set_up_servo(
     port: str,
     undo_folder: str | Path,
@@ -55,7 +57,7 @@ def set_up_servo(
     spins: bool | None = None,
     model: str | None = None,
     servo_id: int | None = None,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> Path | None:
     """Write the settings that a scan needs to a servo, where they outlast the power.
 
@@ -65,7 +67,7 @@ def set_up_servo(
         spins: whether the servo is going to spin (True) or to sweep (False); None leaves its mode as it is.
         model: what it must be; None for any that is known.
         servo_id: its number on the bus; None if it is alone there.
-        say: progress callback; called with one line for each setting.
+        progress: progress callback.
 
     Returns:
         The undo file, for `scanwright servo-setup PORT --undo FILE`; None if every setting was right.
@@ -81,7 +83,7 @@ def set_up_servo(
         if isinstance(step, Path):
             undo = step
         else:
-            say(step)
+            progress(step)
     return undo
 
 
@@ -109,6 +111,7 @@ class Scanned:
     assembled: AssembleSummary
 
 
+@with_say
 def scan(
     folder: str | Path,
     *,
@@ -121,7 +124,7 @@ def scan(
     cluster: int = 1,
     every: int = 1,
     stamp_at: Literal["step_0", "rear"] = "step_0",
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> Scanned:
     """Turn the scanner of a build folder, record, and assemble the cloud beside the recording.
 
@@ -136,7 +139,7 @@ def scan(
         cluster: steps that share one range, the least of theirs.
         every: one scan of so many is taken.
         stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
-        say: is told what is being done.
+        progress: progress callback.
 
     Raises:
         ServoSetupError: settings of the servo that outlast the power must change first (`set_up_servo` writes them);
@@ -161,7 +164,7 @@ def scan(
         every=every,
         stamp_at=stamp_at,
     )
-    recorded = acquire(plan, say)
+    recorded = acquire(plan, progress)
     return Scanned(recorded, assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
+from scanwright.api.arguments import AnglesLike, TaskLike, as_angle_set, as_task, with_say
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.angles import load_angles
+from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.build import Build, build_task
 from scanwright.pipeline.manifest import require_as_built
@@ -16,8 +18,11 @@ if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.cad.checks.check import Check
 
+_LOG = logging.getLogger(__name__)
 
-def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
+
+@with_say
+def build(task: TaskLike, out: str | Path = "out", *, progress: Progress = no_progress) -> Build:
     """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
 
     Nothing is done if the folder already holds the build of this very task.
@@ -33,16 +38,17 @@ def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build
     """
     require_kernel("build")
     loaded = as_task(task)
-    return build_task(loaded, Path(out) / loaded.task.name, say)
+    return build_task(loaded, Path(out) / loaded.task.name, progress)
 
 
-def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assembly:
+@with_say
+def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_progress) -> Assembly:
     """Make the parts of a scanner in memory, in the rotation frame [mm], without labels.
 
     Args:
         task: whose printer and deck the parts are for.
         angles: angle set of the scanner, such as `optimise(task).angle_set()`.
-        say: is told what is being done.
+        progress: progress callback.
 
     Returns:
         Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
@@ -56,12 +62,13 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
 
     loaded = as_task(task)
     for line in loaded.misfits():
-        say(line)
-    say("making the parts")
+        _LOG.warning("%s", line)
+    progress("making the parts")
     return make_parts(loaded.scanner(as_angle_set(angles)))
 
 
-def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
+@with_say
+def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Check]:
     """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
 
     The parts are made again from `task.toml` and `angles.json`; a folder may hold these two alone.
@@ -77,4 +84,4 @@ def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
     scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
     from scanwright.cad.checks.run import check_scanner
 
-    return check_scanner(scanner, say)
+    return check_scanner(scanner, progress)

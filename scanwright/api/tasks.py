@@ -7,22 +7,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanwright.api.arguments import Say, TaskLike, as_built_scanner, as_task, quiet
+from scanwright.api.arguments import TaskLike, as_built_scanner, as_task, deprecated, lever_in, pole_in, with_say
+from scanwright.design.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from scanwright.design.evaluation.comparison import ComparisonRow
-    from scanwright.design.evaluation.evaluation import Evaluation
+    from scanwright.design.evaluation.evaluation import Evaluation, Lever
+    from scanwright.design.evaluation.poles import Pole
     from scanwright.design.search.optimum import Optimum
 
 
-def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
+@with_say
+def optimise(task: TaskLike, *, progress: Progress = no_progress) -> Optimum:
     """Search all mounting angles of a task.
 
     Args:
         task: what the scanner shall see.
-        say: is told what is being done.
+        progress: progress callback.
 
     Returns:
         The best families of settings, `optimum.search.best`, the best one first; `optimum.angle_set()` is what parts
@@ -40,25 +43,26 @@ def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
     """
     from scanwright.design.search.optimum import find_optimum
 
-    return find_optimum(as_task(task), say)
+    return find_optimum(as_task(task), progress)
 
 
+@with_say
 def evaluate(
     task: TaskLike,
     angles_deg: Sequence[float] | None = None,
     *,
-    pole: str | None = None,
-    lever: str | None = None,
-    say: Say = quiet,
+    pole: Pole | str | None = None,
+    lever: Lever | str | None = None,
+    progress: Progress = no_progress,
 ) -> Evaluation:
     """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
 
     Args:
         task: what the scanner shall see, or a build folder: then `Evaluation.as_built` is with its parts.
         angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; those of the build folder if none are given.
-        pole: "WIDTH_MM,HEIGHT_MM,RANGE_M" of a thin upright pole, to tell the chance that it is hit.
-        lever: "X_MM,Y_MM,RANGE_M": the optical centre off the axis, as seen at a range.
-        say: is told what is being done.
+        pole: computes the chance to hit this upright pole; a text as in version 0.1 still works.
+        lever: offset of the optical centre from the axis, as seen at a range; a text as in version 0.1 still works.
+        progress: progress callback.
 
     Raises:
         TaskError: the task is malformed, these are not four angles, or no direction has a weight.
@@ -72,14 +76,19 @@ def evaluate(
     """
     from scanwright.design.evaluation import evaluation
 
+    if isinstance(pole, str):
+        pole = pole_in(deprecated(pole, "pole"))
+    if isinstance(lever, str):
+        lever = lever_in(deprecated(lever, "lever"))
     built = as_built_scanner(task)
     loaded = as_task(task) if built is None else built.loaded
     if built is not None and (angles_deg is None or np.allclose(np.radians(angles_deg), built.setting_rad, atol=1e-9)):
-        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, say, built.shadow)
-    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, say)
+        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, progress, built.shadow)
+    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, progress)
 
 
-def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:
+@with_say
+def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimum, list[ComparisonRow]]:
     """Put the optimum of a task beside the reference mounts, the scanner for little money, and ready-made ones.
 
     Every row is without parts, but that of a build folder, which is the first one if the task is given as its folder.
@@ -92,9 +101,9 @@ def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[Comparis
     from scanwright.design.search.optimum import find_optimum
 
     built = as_built_scanner(task)
-    optimum = find_optimum(as_task(task) if built is None else built.loaded, say)
+    optimum = find_optimum(as_task(task) if built is None else built.loaded, progress)
     setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
-    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, say, setting)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, progress, setting)
 
 
 def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:

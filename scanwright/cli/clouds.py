@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from scanwright.cli.console import AsJson, Progress, show, show_json
+from scanwright.cli.console import Angles, AsJson, ConsoleProgress, show, show_json
 from scanwright.cli.help import Commands
+from scanwright.cli.record_options import record_options
+from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
 
 app = Commands("Clouds")
 
@@ -79,84 +80,30 @@ def repair(
 
 
 @app.command()
+@record_options(AssembleOptions, "smooth", "columns", "camera", poses="FILE|TOPIC", imu="FILE|TOPIC", outliers="SIGMAS")
 def assemble(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
-    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `scan` or `import`.")],
+    angles: Angles,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
-    organised: Organised = False,
-    lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
-    per: Annotated[
-        Per,
-        typer.Option(
-            help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ... A turn ends "
-            "where the axis turns back, too: of a sweep each way is one, and a full scan is two."
-        ),
-    ] = Per.recording,
-    poses: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|TOPIC",
-            help="Where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).",
-        ),
-    ] = None,
-    imu: Annotated[
-        str | None,
-        typer.Option(metavar="FILE.csv|TOPIC", help="How it turned between poses: the gyro of a sensor_msgs/Imu."),
-    ] = None,
-    imu_rpy_deg: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="R P Y", help="How the IMU stands on the platform; from /tf_static if not given."),
-    ] = None,
+    options: AssembleOptions,
     straight: Annotated[
-        bool, typer.Option("--straight", help="Take the angle straight between its samples, steps not smoothed.")
+        bool, typer.Option("--straight", help="Interpolate joint angles linearly instead of smoothing them.")
     ] = False,
-    columns: Annotated[
-        str, typer.Option(help="What to write of each point beside x,y,z.")
-    ] = "intensity,time_s,joint_rad,ring",
+    columns: Annotated[str, typer.Option(metavar="LIST", help="Columns besides x,y,z.")] = ",".join(COLUMNS),
     camera: Annotated[
-        Path | None, typer.Option(metavar="TASK", help="Colour the points from the images of a task's [camera].")
+        Path | None, typer.Option(metavar="TASK", help="Colour points with the images of the task's [camera].")
     ] = None,
-    min_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out shorter beams.")] = 0.0,
-    max_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out longer beams.")] = math.inf,
-    edges_deg: Annotated[
-        float | None,
-        typer.Option(
-            metavar="DEG", help="Leave out beams that hang between two surfaces seen that grazing, such as 8."
-        ),
-    ] = None,
-    outliers: Annotated[
-        float | None,
-        typer.Option(metavar="SIGMAS", help="Leave out points that stand alone, beyond so many sigmas, such as 2."),
-    ] = None,
-    voxel_m: Annotated[float | None, typer.Option(metavar="M", help="One point to a voxel of this edge.")] = None,
-    normals: Annotated[bool, typer.Option("--normals", help="Add nx ny nz, towards the scanner.")] = False,
 ) -> None:
-    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
+    """Assemble a point cloud from a recording.
 
-    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
+    If own_body.npz is next to the angle set, beams that end on the scanner itself are dropped.
+
+    Example: scanwright assemble rec.mcap --angles out/ground_ahead/angles.json -o cloud.ply
     """
     from scanwright import api
 
-    summary = api.assemble(
-        recording,
-        angles,
-        out,
-        organised=organised,
-        lag_s=lag_s,
-        per=per.value,
-        poses=poses,
-        imu=imu,
-        imu_rpy_deg=imu_rpy_deg,
-        smooth=not straight,
-        columns=[name.strip() for name in columns.split(",") if name.strip()],
-        camera=camera,
-        min_range_m=min_range_m,
-        max_range_m=max_range_m,
-        edges_deg=edges_deg,
-        outliers=outliers,
-        voxel_m=voxel_m,
-        normals=normals,
-    )
+    names = tuple(name.strip() for name in columns.split(",") if name.strip())
+    summary = api.assemble(recording, angles, out, options, smooth=not straight, columns=names, camera=camera)
     show(summary.lines())
 
 
@@ -179,7 +126,7 @@ def calibrate(
     """
     from scanwright import api
 
-    found = api.calibrate(recordings, angles, out, one_place=one_place, say=Progress())
+    found = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
     if as_json:
         show_json(found.record)
     else:
@@ -213,7 +160,7 @@ def register(
         angles=angles,
         spacing_m=spacing_m,
         map_spacing_m=map_spacing_m,
-        say=Progress(),
+        progress=ConsoleProgress(),
     )
     show(found.lines())
     raise typer.Exit(0 if found.complete else 1)
@@ -259,7 +206,7 @@ def map_(
         from_m=from_m,
         to_m=to_m,
         seen_through_m=seen_through_m,
-        say=Progress(),
+        progress=ConsoleProgress(),
     )
     show(summary.lines())
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from scanwright.cad.kernel import require_kernel
-from scanwright.cli.console import AsJson, Progress, TaskFile, TaskOrBuild, hint, show, show_json
+from scanwright.cli.console import AsJson, ConsoleProgress, TaskFile, TaskOrBuild, hint, show, show_json
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
@@ -27,7 +27,7 @@ def optimise(
     """Search all mounting angles of a task and print the best ten families of settings."""
     from scanwright import api
 
-    optimum = api.optimise(task, say=Progress())
+    optimum = api.optimise(task, progress=ConsoleProgress())
     if picture is not None:
         from scanwright.design.evaluation.landscape_picture import landscape_picture
 
@@ -72,27 +72,33 @@ def evaluate(
     import numpy as np
 
     from scanwright import api
-    from scanwright.api.arguments import as_built_scanner
-    from scanwright.design.evaluation.evaluation import angles_in
+    from scanwright.api.arguments import as_built_scanner, lever_in, numbers_in, pole_in
 
     built = as_built_scanner(task)
     if built is None and angles is None:
         raise typer.BadParameter("missing: only a build folder has angles of its own", param_hint="--angles")
     loaded = api.load_task(task) if built is None else built.loaded
-    found = api.evaluate(task, None if angles is None else angles_in(angles), pole=pole, lever=lever, say=Progress())
-    angles_deg = np.degrees(found.angles_rad).round(9).tolist()
+    form = "A_ROT,B_ROT,A_LASER,B_LASER in degrees, such as 0,90,0,-90"
+    result = api.evaluate(
+        task,
+        None if angles is None else numbers_in(angles, "angles", form),
+        pole=None if pole is None else pole_in(pole),
+        lever=None if lever is None else lever_in(lever),
+        progress=ConsoleProgress(),
+    )
+    angles_deg = np.degrees(result.angles_rad).round(9).tolist()
     if cloud is not None:
         from scanwright.firmware_io.clouds.ply import write_points
 
-        beams = found.beam_directions()
+        beams = result.beam_directions()
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
     if as_json:
-        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **found.facts()})
+        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **result.facts()})
     else:
-        show(found.lines())
+        show(result.lines())
         if cloud is not None:
             print(f"wrote {len(beams):,} points to {cloud}")
-    if not found.agree:
+    if not result.agree:
         raise typer.Exit(1)
 
 
@@ -118,7 +124,7 @@ def accuracy(
     if choices:
         from scanwright.trials.report import report_choices
 
-        show(report_choices(loaded, folder, Progress()))
+        show(report_choices(loaded, folder, ConsoleProgress()))
         return
     from scanwright.design.accuracy.report import report_precision, report_search, report_stress
 
@@ -127,10 +133,10 @@ def accuracy(
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
-        told = report_stress(loaded, folder, Progress(), more)
+        told = report_stress(loaded, folder, ConsoleProgress(), more)
         show(told.lines)
         raise typer.Exit(0 if told.passed else 1)
-    show((report_search if search else report_precision)(loaded, folder, Progress()))
+    show((report_search if search else report_precision)(loaded, folder, ConsoleProgress()))
 
 
 @app.command()
@@ -148,7 +154,7 @@ def compare(
 
     built = as_built_scanner(task)
     loaded = api.load_task(task) if built is None else built.loaded
-    found = write_comparison(loaded, out / loaded.task.name, Progress(), built)
+    found = write_comparison(loaded, out / loaded.task.name, ConsoleProgress(), built)
     if as_json:
         gains = [gain.facts() for gain in found.optimum.gains]
         show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows], "gains": gains})

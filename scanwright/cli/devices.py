@@ -11,10 +11,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
+from scanwright.cli.console import (
+    AllowOrigin,
+    BuildFolder,
+    ConsoleProgress,
+    exit_code,
+    high_priority,
+    print_error,
+    require_pages,
+    show,
+)
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
-from scanwright.design.errors import DeviceError, ScanwrightError, notes_of, require
+from scanwright.design.errors import ScanwrightError, notes_of, require
 from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
@@ -93,7 +102,7 @@ def emulate(
     place = room(scene, unit_m, at)
     with (
         suppress(KeyboardInterrupt),
-        on_duty(),
+        high_priority(),
         emulated_scanner(
             angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed, factory_servo=factory_servo
         ) as twins,
@@ -132,7 +141,7 @@ def scan(
     if live:
         require_pages("scan --live")
     if live and foxglove:
-        raise DeviceError("--live and --foxglove: one of them")
+        raise ScanwrightError("--live, --foxglove: choose one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
     from scanwright.firmware_io.scan.plan import plan_scan
@@ -149,31 +158,31 @@ def scan(
         every=every,
         stamp_at=stamp_at.value,
     )
-    say = Progress()
+    progress = ConsoleProgress()
     show(plan.lines())
     if dry_run:
         return
     with viewer as watch, closing(watch):
         try:
-            recorded = _acquired(plan, say, watch, out, servo_id)
+            recorded = _acquired(plan, progress, watch, out, servo_id)
             watch.ended(finished(recorded))  # the devices stand, whatever becomes of the cloud
-            say(f"recorded {recorded.duration_s:.1f} s, assembling")
+            progress(f"recorded {recorded.duration_s:.1f} s, assembling")
             show(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
             show(cloud.lines())
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
-            raise typer.Exit(2) from None
+            raise typer.Exit(exit_code(error)) from None
 
 
-def _acquired(plan: ScanPlan, say: Progress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
+def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
     """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
     from scanwright.firmware_io.scan.acquire import acquire
 
     try:
-        with on_duty():
-            return asking_first(lambda: acquire(plan, say, watch), out, servo_id)
+        with high_priority():
+            return asking_first(lambda: acquire(plan, progress, watch), out, servo_id)
     except KeyboardInterrupt as stop:
         _end(watch, stopped(stop), plan.recording)
         raise typer.Exit(130) from None
@@ -184,7 +193,7 @@ def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
     kept = (f"what was recorded is in {recording}",) if recording.exists() else ()
     end = replace(end, lines=(*end.lines, *kept))
     for line in end.lines:
-        complain(line)
+        print_error(line)
     watch.ended(end)
 
 
@@ -224,7 +233,9 @@ def ros2(
         "sensor_msgs",
     )
     if foxglove and recording is not None:
-        raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
+        raise ScanwrightError(
+            "--foxglove, --recording: choose one of them (`scanwright view` serves a recording to Foxglove)"
+        )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
@@ -233,15 +244,15 @@ def ros2(
     points = Publishing(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
     try:
         if recording is not None:
-            serve_recording(out, recording, given, Progress(), points, rate=rate)
+            serve_recording(out, recording, given, ConsoleProgress(), points, rate=rate)
             return
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
         show(plan.lines())
-        with on_duty(), viewer as watch:
-            asking_first(lambda: serve_devices(out, plan, given, Progress(), points, watch), out, servo_id)
+        with high_priority(), viewer as watch:
+            asking_first(lambda: serve_devices(out, plan, given, ConsoleProgress(), points, watch), out, servo_id)
     except KeyboardInterrupt as stop:
         for line in ("stopped", *notes_of(stop)):
-            complain(line)
+            print_error(line)
         raise typer.Exit(130) from None
 
 
@@ -310,7 +321,7 @@ def servo_setup(
 
     numbers = new_id is not None or new_baud is not None
     if sum([numbers, undo is not None, scanner is not None or dry_run]) > 1:
-        raise DeviceError("--id and --baud, --undo, --scanner and --dry-run: one at a time")
+        raise ScanwrightError("--id and --baud, --undo, --scanner and --dry-run: choose one of these")
     folder = scanner or Path()
     if undo is not None:
         print_steps(port, settings.restore(undo, port))

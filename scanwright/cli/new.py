@@ -60,7 +60,7 @@ def new(
     elif lidar is None or servo is None or height_m is None or not see:
         flags = {"--lidar": lidar, "--servo": servo, "--height-m": height_m, "--see": see}
         needed = ", ".join(flag for flag, given in flags.items() if not given)
-        raise TaskError(f"nobody is there to be asked: give {needed}")
+        raise TaskError(f"missing options {needed} (not running in a terminal)")
     answers = Answers(
         name=name or (out.stem if out else "my_scanner"),
         lidar=str(lidar),
@@ -132,14 +132,13 @@ def _asked(
 
 
 def _until(question: str, usual: str | None, read: Callable[[str], T], fits: Callable[[T], object]) -> T:
-    """Ask until an answer can be read and fits those before it; what was wrong is said without the name of its flag."""
+    """Ask until an answer can be read and fits those before it."""
     while True:
         try:
             answer = read(str(typer.prompt(question, default=usual, prompt_suffix=" > ")).strip())
             fits(answer)
         except ScanwrightError as error:
-            said = str(error)
-            print(f"   {said.partition(' ')[2] if said.startswith('--') else said}")
+            print(f"   {error}")
         else:
             return answer
 

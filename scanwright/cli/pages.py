@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from scanwright.cad.kernel import require_kernel
-from scanwright.cli.console import AllowOrigin, Progress, require_pages
+from scanwright.cli.console import AllowOrigin, ConsoleProgress, require_pages
 from scanwright.cli.help import Commands
 from scanwright.design.errors import require
 
@@ -32,7 +32,7 @@ def studio(
     from scanwright.design.task.task import load_task
     from scanwright.studio.session import run_studio
 
-    run_studio(load_task(task), port=port, out=out, say=Progress())
+    run_studio(load_task(task), port=port, out=out, progress=ConsoleProgress())
 
 
 @app.command()
@@ -56,6 +56,8 @@ def view(
         print(f"wrote {write_for_foxglove(recording, angles, out):,} scans with their points to {out}")
         return
     try:
-        view_recording(recording, angles, Progress(), port=port, rate=rate, allow_origins=as_origins(allow_origin))
+        view_recording(
+            recording, angles, ConsoleProgress(), port=port, rate=rate, allow_origins=as_origins(allow_origin)
+        )
     except KeyboardInterrupt:
         raise typer.Exit(0) from None

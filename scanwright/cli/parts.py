@@ -13,14 +13,15 @@ import typer
 from scanwright.cli.console import (
     AsJson,
     BuildFolder,
-    Progress,
+    ConsoleProgress,
     TaskFile,
-    Voice,
-    complain,
+    Verbosity,
     hint,
+    print_error,
+    print_note,
     show,
     show_json,
-    voice,
+    verbosity,
     warn,
 )
 from scanwright.cli.help import Commands
@@ -47,18 +48,18 @@ def build(
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
 
-        difference = difference_when_rebuilt(task, Progress())
+        difference = difference_when_rebuilt(task, ConsoleProgress())
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
 
     try:
-        built = api.build(task, out, say=Progress())
+        built = api.build(task, out, progress=ConsoleProgress())
     except KeyboardInterrupt as stop:
-        complain("; ".join(("stopped", *notes_of(stop))))
+        print_note("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
-    _complain_of(built.checks)
-    show(built.lines(in_full=voice() is Voice.VERBOSE))
+    _print_failed_checks(built.checks)
+    show(built.lines(in_full=verbosity() is Verbosity.VERBOSE))
     warn(built.misfits)
     report = built.folder / "report.html"
     if built.failed:
@@ -82,8 +83,8 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build folder: room, beams, loads, print. Exit 1 if one fails."""
     from scanwright import api
 
-    checks = api.check(out, say=Progress())
-    _complain_of(checks)
+    checks = api.check(out, progress=ConsoleProgress())
+    _print_failed_checks(checks)
     warn(api.load_task(out / "task.toml").misfits())
     if as_json:
         show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
@@ -112,23 +113,23 @@ def study(
     if plan:
         from scanwright.study.plan import plan_study
 
-        show(plan_study(study, out, results, Progress()))
+        show(plan_study(study, out, results, ConsoleProgress()))
         return
     from scanwright.study.run import run_study
 
     try:
-        show(run_study(study, out, results, scheduler, processes, Progress()))
+        show(run_study(study, out, results, scheduler, processes, ConsoleProgress()))
     except KeyboardInterrupt:
-        complain("stopped; the same command goes on where it was")
+        print_note("stopped; run the same command to continue")
         raise typer.Exit(130) from None
 
 
-def _complain_of(checks: Sequence[Check]) -> None:
+def _print_failed_checks(checks: Sequence[Check]) -> None:
     """Print the failed checks on standard error, before any result."""
     from scanwright.cad.checks.check import failure_lines
 
     for line in failure_lines(checks):
-        complain(line)
+        print_error(line)
 
 
 def _tally(found: Counter[Severity]) -> str:

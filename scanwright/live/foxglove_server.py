@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from operator import index
@@ -27,7 +28,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
+from scanwright.design.progress import Progress
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
+
+_LOG = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol("foxglove.sdk.v1")
 APP = "https://app.foxglove.dev"
@@ -72,7 +76,6 @@ class FoxgloveServer:
         name: str,
         channels: Mapping[str, tuple[str, str]],
         port: int,
-        say: Callable[[str], None],
         origins: Collection[str],
     ) -> None:
         """Bind the port; arguments as for `foxglove_server`."""
@@ -82,7 +85,7 @@ class FoxgloveServer:
         self._loop = asyncio.new_event_loop()
         self._clients: set[_Client] = set()
         self._ended = asyncio.Event()
-        self._say, self._refused = say, set[str]()
+        self._refused = set[str]()
         about = {"name": name, "capabilities": [], "metadata": {}, "sessionId": str(time.time_ns() // 10**6)}
         described = [
             {
@@ -134,11 +137,11 @@ class FoxgloveServer:
         if not why:
             return None
         origin = request.headers.get_all("Origin")[:1]
-        line = f"warning: refused a viewer: {why}" + (f" {origin[0][:100]!r}" if why == "foreign origin" else "")
+        line = f"refused a viewer: {why}" + (f" {origin[0][:100]!r}" if why == "foreign origin" else "")
         if line not in self._refused and len(self._refused) < _MOST_REFUSALS:  # a page may try for ever
             self._refused.add(line)
-            self._say(line)
-        return refusal(why, "to allow a page, name its origin: --allow-origin")
+            _LOG.warning(line)
+        return refusal(why, "to allow a page, start scanwright with --allow-origin ORIGIN")
 
     async def _serve_client(self, connection: ServerConnection) -> None:
         client = _Client()
@@ -196,7 +199,7 @@ def foxglove_server(
     name: str,
     channels: Mapping[str, tuple[str, str]],
     port: int,
-    say: Callable[[str], None],
+    progress: Progress,
     allow_origins: Collection[str] = (),
 ) -> Iterator[FoxgloveServer]:
     """Serve channels to Foxglove while the body runs.
@@ -205,13 +208,13 @@ def foxglove_server(
         name: what Foxglove shows.
         channels: topic -> name and definition of its ROS 2 message.
         port: on this computer; 0 for any that is free.
-        say: is called with the address, and with each viewer that is refused.
+        progress: progress callback; gets the address.
         allow_origins: pages that may look, beside Foxglove's own and programs that are no browser.
 
     Raises:
         TaskError: the port is taken.
     """
-    server = FoxgloveServer(name, channels, port, say, {*FOXGLOVE, *allow_origins})
+    server = FoxgloveServer(name, channels, port, {*FOXGLOVE, *allow_origins})
     with server.running():
-        say(f"open {server.address} in Foxglove, or {server.app_url}")
+        progress(f"open {server.address} in Foxglove, or {server.app_url}")
         yield server

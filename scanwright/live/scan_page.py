@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Thread
 
 from scanwright.design.angles import angles_in_use
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import ScanwrightError
 from scanwright.firmware_io.assembly.own_body import own_body_beside
 from scanwright.firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
@@ -41,7 +41,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         browse: opens an address; None for the person's browser where this runs on a terminal.
 
     Raises:
-        DeviceError: the page cannot be served.
+        ScanwrightError: the page cannot be served.
     """
     if not wanted:
         yield NOBODY
@@ -59,7 +59,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         address = hearing.recv()
     except EOFError:
         page.terminate()
-        raise DeviceError("--live: the page could not be served; scan without it") from None
+        raise ScanwrightError("live: the page could not be served; scan without it") from None
     print(f"open {address}", flush=True)
     if browse is None and sys.stdout.isatty():
         browse = webbrowser.open

@@ -80,7 +80,7 @@ def report_folder(target: Path) -> Iterator[Path]:
         BuildError: it is a build folder, or cannot be written.
     """
     if read_manifest(target):
-        raise BuildError(f"{target}: --out: this is a build folder, and holds nothing but the build: take another one")
+        raise BuildError(f"{target}: is a build folder, which must not contain other files; choose another folder")
     try:
         target.mkdir(parents=True, exist_ok=True)
         try:

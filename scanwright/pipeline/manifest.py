@@ -31,21 +31,21 @@ class Changes:
     """What became of the files of a build folder since its manifest was written.
 
     Attributes:
-        gone: files that are no more.
+        missing: files that are not there.
         edited: files with other bytes.
     """
 
-    gone: tuple[str, ...]
+    missing: tuple[str, ...]
     edited: tuple[str, ...]
 
     def __bool__(self) -> bool:
         """Whether any file is not as it was built."""
-        return bool(self.gone or self.edited)
+        return bool(self.missing or self.edited)
 
     def words(self) -> str:
-        """The same in words, such as "a.stl is gone, b.csv was edited"."""
-        told = (self.gone, "is gone", "are gone"), (self.edited, "was edited", "were edited")
-        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in told if names)
+        """Return a text such as "a.stl is missing, b.csv was edited"."""
+        kinds = (self.missing, "is missing", "are missing"), (self.edited, "was edited", "were edited")
+        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in kinds if names)
 
 
 @cache
@@ -102,8 +102,8 @@ def changes(folder: Path, but: str | None = None) -> Changes:
         return Changes((), (MANIFEST,))
     files = {name: facts for name, facts in manifest.get("files", {}).items() if name != but}
     here = {name: facts for name, facts in files.items() if inside(name) and (folder / name).is_file()}
-    gone = tuple(name for name in files if name not in here)
-    return Changes(gone, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
+    missing = tuple(name for name in files if name not in here)
+    return Changes(missing, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
 
 
 def require_as_built(folder: Path, but: str | None = None) -> None:
@@ -112,11 +112,10 @@ def require_as_built(folder: Path, but: str | None = None) -> None:
     Raises:
         BuildError: a file is gone or was edited.
     """
-    found = changes(folder, but)
-    if found:
+    if edits := changes(folder, but):
         raise BuildError(
-            f"{folder}: {found.words()} since it was built: build the folder again, or copy angles.json and task.toml, "
-            "with the files that it names, to a folder of their own"
+            f"{folder}: {edits.words()} since it was built: build the folder again, or copy angles.json, task.toml and "
+            "the files that it names to another folder"
         )
 
 

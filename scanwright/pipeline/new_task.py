@@ -82,10 +82,10 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
     _require_strength(lidar, servo)
     if not LEAST_M <= answers.height_m <= MOST_M:
-        raise TaskError(f"--height-m {answers.height_m:g}: from {LEAST_M:g} to {MOST_M:g} m over the ground")
+        raise TaskError(f"height_m = {answers.height_m:g}: must be between {LEAST_M:g} and {MOST_M:g} m")
     wishes = [parse_wish(each) for each in answers.see]
     if not wishes:
-        raise TaskError(f"--see: nothing is to be seen: {known_wishes()}")
+        raise TaskError(f"see: no region; {known_wishes()}")
     things = [numbers for word, numbers in wishes if word == "thing"]
     regions = [(word, numbers) for word, numbers in wishes if word != "thing"] or [("all", ())]
     blocks = [
@@ -189,12 +189,14 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
     try:
         length, width, height = (float(each) for each in answers.robot.split(":")[1:])
     except ValueError as error:
-        raise TaskError(f"--robot {answers.robot}: box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh") from error
+        raise TaskError(
+            f"robot = '{answers.robot}': must be box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh"
+        ) from error
     over = answers.height_m - height
     if not (over > 0 and abs(ahead) <= length / 2):
         raise TaskError(
-            f"--robot {answers.robot}: the scanner, {answers.height_m:g} m over the ground, {ahead:g} m ahead of its "
-            f"middle, is not over it: --height-m above {height:g}, --ahead-m from {-length / 2:g} to {length / 2:g}"
+            f"robot = '{answers.robot}': the scanner ({answers.height_m:g} m high, {ahead:g} m ahead of the "
+            f"middle) is not above it: needs height_m above {height:g}, ahead_m from {-length / 2:g} to {length / 2:g}"
         )
     return [
         f"[[mask]]  # the robot's own top, {over:g} m below the scanner: what it hides never counts",
@@ -226,7 +228,7 @@ def write_task_file(path: Path, text: str) -> list[str]:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise TaskError(f"{path}: exists already: take another name, or another file with -o") from error
+        raise TaskError(f"{path}: exists; choose another name") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
     return warnings

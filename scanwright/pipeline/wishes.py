@@ -35,14 +35,14 @@ def parse_wish(text: str) -> tuple[str, Numbers]:
     """
     word, *given = text.split(":")
     if word not in SEEN:
-        raise TaskError(f"--see {text}: not a thing to see{suggest(word, SEEN)}; {known_wishes()}")
+        raise TaskError(f"see = '{text}': unknown region{suggest(word, SEEN)}; {known_wishes()}")
     how, usual = SEEN[word]
     try:
         numbers = [float(each) for each in given]
     except ValueError as error:
-        raise TaskError(f"--see {text}: numbers after the colons: {how}") from error
+        raise TaskError(f"see = '{text}': needs numbers after the colons: {how}") from error
     if len(numbers) > len(usual) or not all(math.isfinite(each) for each in numbers):
-        raise TaskError(f"--see {text}: {len(usual)} numbers at most, and finite: {how}")
+        raise TaskError(f"see = '{text}': needs at most {len(usual)} finite numbers: {how}")
     return word, (*numbers, *usual[len(numbers) :])
 
 
@@ -61,11 +61,11 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
         return []
     size_m, distance_m = min(things, key=lambda each: each[0] / each[1] if each[1] > 0 else 0.0)
     if not (size_m > 0 and distance_m > 0):
-        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: a size and a distance above 0")
+        raise TaskError(f"see = 'thing:{size_m:g}:{distance_m:g}': size and distance must be above 0")
     radius_deg = math.degrees(math.atan2(size_m / 2, distance_m))
     if radius_deg < SMALLEST_BALL_DEG:
-        looks = f"looks {2 * radius_deg:.2g} deg wide, at least {2 * SMALLEST_BALL_DEG:g}"
-        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: {looks}")
+        seen = f"appears {2 * radius_deg:.2g} deg wide, minimum {2 * SMALLEST_BALL_DEG:g}"
+        raise TaskError(f"see = 'thing:{size_m:g}:{distance_m:g}': {seen}")
     return [
         f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
         f"ball_radius_deg = {radius_deg:.2g}",
@@ -87,7 +87,7 @@ def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
         _REGION.validate_python(tomllib.loads("\n".join(lines)))
     except ValidationError as error:
         wish = ":".join([word, *(f"{each:g}" for each in numbers)])
-        raise TaskError(f"--see {wish}: {'; '.join(map(str, faults_of(error, Task)))}") from error
+        raise TaskError(f"see = '{wish}': {'; '.join(map(str, faults_of(error, Task)))}") from error
     return ["[[weight]]", *lines, ""]
 
 

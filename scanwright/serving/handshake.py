@@ -14,7 +14,7 @@ from http import HTTPStatus
 from websockets.datastructures import Headers
 from websockets.http11 import Response
 
-from scanwright.design.errors import DeviceError, TaskError
+from scanwright.design.errors import TaskError
 
 MOST_VISITORS = 8
 
@@ -57,7 +57,7 @@ def bound(port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         listening.close()
         why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "no such port"
-        raise TaskError(f"--port {port}: {why}; leave it out for any that is free") from error
+        raise TaskError(f"port = {port}: {why}; 0 chooses any free port") from error
     return listening
 
 
@@ -65,10 +65,10 @@ def as_origins(texts: Iterable[str] | None) -> tuple[str, ...]:
     """Return the origins that a person allows, as browsers send them.
 
     Raises:
-        DeviceError: one is no origin of a single page; `null` is what any page can send.
+        TaskError: one is no origin of a single page; `null` is what any page can send.
     """
     origins = tuple(text.lower().removesuffix("/") for text in texts or ())
     for origin in origins:
         if not _ORIGIN.fullmatch(origin):
-            raise DeviceError(f"--allow-origin {origin}: not an origin (allowed SCHEME://HOST[:PORT])")
+            raise TaskError(f"allow_origin = {origin}: not an origin (allowed SCHEME://HOST[:PORT])")
     return origins

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
 from pathlib import Path
 
+from scanwright.design.progress import Progress
 from scanwright.design.task.task import LoadedTask
 from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.studio.page import Studio
 
+_LOG = logging.getLogger(__name__)
 ALONE_S = 300.0
 
 
-def run_studio(loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str], None]) -> None:
+def run_studio(loaded: LoadedTask, *, port: int, out: Path, progress: Progress) -> None:
     """Serve the studio of a task, and print its address.
 
     Task files are saved to the folder that this was started in.
@@ -21,13 +23,13 @@ def run_studio(loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str],
         loaded: the task that is opened first.
         port: of 127.0.0.1; 0 is any that is free.
         out: folder that holds the builds.
-        say: is told of progress, and at the end what was refused.
+        progress: progress callback.
 
     Raises:
         TaskError: the port is taken, or the task has no region.
     """
     with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
-        say("reading the task (the first run compiles the numerics: some 5 s)")
+        progress("reading the task (the first run compiles the numerics: some 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
             print(f"open {gate.address}", flush=True)
@@ -37,4 +39,4 @@ def run_studio(loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str],
         finally:
             studio.close()
         for why, count in gate.refused.items():
-            say(f"refused {count:,}: {why}")
+            _LOG.warning("refused %d requests: %s", count, why)

@@ -21,6 +21,7 @@ from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.self_check import require_counted
+from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Scanner
 from scanwright.design.search.families import Family
 from scanwright.design.search.optimum import angle_set
@@ -95,7 +96,7 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     try:
         problem = problem_of(loaded)
         bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
-        chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
+        chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, no_progress)
     except (TaskError, BuildError) as error:
         return {"status": "refused", "reason": why(error, loaded)}
     setting, score = chosen.family.angles_rad, chosen.family.score
@@ -153,7 +154,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
     try:
         assembly = make_parts(scanner)
-        checks, shadow = run_checks(scanner, assembly, lambda _: None)
+        checks, shadow = run_checks(scanner, assembly, no_progress)
     except BuildError as error:
         return Refused(str(error))
     failed = [check.message for check in checks if check.severity == "error"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
+from scanwright.design.progress import Progress
 from scanwright.study.candidate import addresses
 from scanwright.study.crossing import Crossing
 from scanwright.study.results import Results
@@ -15,14 +15,14 @@ from scanwright.study.study import load_study
 COSTS = Path(__file__).parent / "costs.csv"
 
 
-def plan_study(study: Path, out: Path | None, results: Path | None, say: Callable[[str], None]) -> list[str]:
+def plan_study(study: Path, out: Path | None, results: Path | None, progress: Progress) -> list[str]:
     """Count a study and what is left to do of it, in lines; nothing is computed, and nothing written.
 
     Args:
         study: file, or name of a shipped study.
         out: folder of tables and winners; out/STUDY if not told.
         results: folder of results; OUT/results if not told. It may not even exist.
-        say: takes progress.
+        progress: progress callback.
 
     Raises:
         TaskError: the study is malformed.
@@ -34,7 +34,7 @@ def plan_study(study: Path, out: Path | None, results: Path | None, say: Callabl
     judged = 0
     for combination in crossing:
         if combination.number % 10_000 == 9_999:
-            say(f"counting: {combination.number + 1:,} of {len(crossing):,} ({combination.number / len(crossing):.0%})")
+            progress(f"counting {len(crossing):,} candidates", combination.number / len(crossing))
         if combination.loaded is None:
             refused[combination.refused] += 1
             continue

@@ -7,6 +7,7 @@ final front beats its bound, also if it happened to be made before that was know
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import place_in
+from scanwright.design.progress import Progress
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task
@@ -32,7 +34,7 @@ from scanwright.study.table import Row, write_answer
 from scanwright.study.units import Crew, Finished, Unit, finished
 from scanwright.study.workers import crew_of
 
-Say = Callable[[str], None]
+_REPORTED_S = 1.0  # a person reads no faster
 
 
 def run_study(
@@ -41,7 +43,7 @@ def run_study(
     results: Path | None,
     scheduler: str | None,
     processes: int | None,
-    say: Say,
+    progress: Progress,
 ) -> Iterator[str]:
     """Do what is not yet done of a study, write its tables, and build its winners; yields what it came to, in lines.
 
@@ -51,7 +53,7 @@ def run_study(
         results: folder of results, shared with the workers or not; OUT/results if not told.
         scheduler: address of a running Dask scheduler; None for processes of this computer.
         processes: of this computer; one for each core if not told.
-        say: takes progress.
+        progress: progress callback.
 
     Raises:
         InstallError: the CAD kernel, or Dask for a scheduler, is not there.
@@ -63,12 +65,12 @@ def run_study(
     folder = out or Path("out") / crossing.loaded.study.name
     run = StudyRun(crossing, open_results(results or place_in(folder, "results", BuildError)))
     with crew_of(scheduler, processes) as crew:
-        run.work(crew, say)
+        run.work(crew, progress)
     yield from write_answer(crossing.loaded.study, run.rows(), folder)
     yield run.tally.line()
     for combination, loaded in run.winners():
         target = place_in(folder, combination.name, BuildError)
-        built = build_task(loaded, target, say)
+        built = build_task(loaded, target, progress)
         yield f"built {target}" if built.made else f"{target}: nothing has changed, no work to do"
         yield from (f"{target}: {line}" for line in failure_lines(built.checks))
     if (folder / "study.parquet").exists():
@@ -125,15 +127,15 @@ class StudyRun:
         self.fronts = [Front(columns) for _ in self.crossing.loaded.tasks]
         self._bounds = np.full((len(self.crossing), columns), np.nan)
 
-    def work(self, crew: Crew, say: Say) -> None:
+    def work(self, crew: Crew, progress: Progress) -> None:
         """Do what is not yet done."""
         limit_s = self.crossing.loaded.study.time_limit_s
-        watch = _Watch("searches", len(self.crossing), say)
-        for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.tell):
+        watch = _Watch("searches", len(self.crossing), progress)
+        for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.report):
             self.tally.searches += self._end(ended, watch)
         self._bound()
-        watch = _Watch("candidates", int((~np.isnan(self._bounds[:, 0])).sum()), say)
-        for ended in finished(crew, self._candidates(watch), self.results, limit_s, watch.tell):
+        watch = _Watch("candidates", int((~np.isnan(self._bounds[:, 0])).sum()), progress)
+        for ended in finished(crew, self._candidates(watch), self.results, limit_s, watch.report):
             numbers = self._at_work[ended.unit.address]
             worked = self._end(ended, watch)
             self.tally.judged += worked
@@ -141,7 +143,7 @@ class StudyRun:
                 self.tally.looked_up += len(numbers) - worked
                 for number in numbers:
                     self._enter(number, ended.done.result)
-        watch.tell()
+        watch.report()
 
     def rows(self) -> Iterator[Row]:
         """The fate of every candidate, in the order of the study."""
@@ -218,7 +220,7 @@ class StudyRun:
             seconds = ended.done.seconds
             self.tally.seconds += seconds or 0.0
             self.tally.memory_mb = max(self.tally.memory_mb, ended.done.memory_mb)
-        watch.count(timed=seconds is not None)
+        watch.count()
         return seconds is not None
 
     def _row(self, combination: Combination) -> Row:
@@ -262,34 +264,22 @@ def _mean_rank(bounds: Array) -> Array:
 
 @dataclass(slots=True)
 class _Watch:
-    """Progress of one stage, told at most once a second, with an estimate of what is left."""
+    """Progress of one stage, reported at most once a second."""
 
     what: str
     total: int
-    say: Say
+    progress: Progress
     over: int = 0
-    timed: int = 0
-    start: float = field(default_factory=time.monotonic)
-    told: float = 0.0
+    reported_s: float = -math.inf
 
-    def count(self, timed: bool = False) -> None:
+    def count(self) -> None:
         self.over += 1
-        self.timed += timed
-        if time.monotonic() - self.told > 1.0:
-            self.tell()
+        if time.monotonic() - self.reported_s > _REPORTED_S:
+            self.report()
 
-    def tell(self, width: int | None = None) -> None:
-        """Say where the study stands; where it is told how many can be at work and that is none, that too."""
-        self.told = time.monotonic()
+    def report(self, width: int | None = None) -> None:
+        """Report how many are over; also that no worker is there, if the width of the crew is known to be 0."""
+        self.reported_s = time.monotonic()
+        waiting = "; waiting for a worker: none is there" if width == 0 else ""
         share = self.over / self.total if self.total else 1.0
-        line = f"{self.what}: {self.over:,} of {self.total:,} over ({share:.0%})"
-        if self.over < self.total:
-            left_s = (self.total - self.over) * (self.told - self.start) / self.timed if self.timed else None
-            line += "; the first ones are at work" if left_s is None else f"; {_about(left_s)} left"
-        self.say(line + ("; no worker is there, waiting for one" if width == 0 else ""))
-
-
-def _about(seconds: float) -> str:
-    if seconds < 90:
-        return f"about {seconds:.0f} s"
-    return f"about {seconds / 60:.0f} min" if seconds < 5400 else f"about {seconds / 3600:.1f} h"
+        self.progress(f"{self.what}: {self.over:,} of {self.total:,} done{waiting}", share)

@@ -80,11 +80,11 @@ def _here(processes: int) -> Iterator[Crew]:
 
 @contextmanager
 def _at_scheduler(address: str) -> Iterator[Crew]:
-    require("cluster", "--scheduler needs Dask", "dask", "distributed")
+    require("cluster", "a scheduler needs Dask", "dask", "distributed")
     from distributed import Client
 
     if not ADDRESS.fullmatch(address):
-        raise TaskError(f"--scheduler = '{address}': an address is tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
+        raise TaskError(f"scheduler = '{address}': must be tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
     for name in ("distributed", "distributed.client"):  # deaths are told in the table, or in one line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
@@ -92,7 +92,7 @@ def _at_scheduler(address: str) -> Iterator[Crew]:
     except (OSError, ValueError, TypeError) as error:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise TaskError(
-            f"--scheduler = '{address}': no scheduler answers there ({said}): start one with `dask scheduler`, "
+            f"scheduler = '{address}': no scheduler answers there ({said}): start one with `dask scheduler`, "
             "and give the tcp:// address that it prints"
         ) from error
     with client:

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from scanwright.design.accuracy.trials import Trial
 from scanwright.design.arrays import Floats
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
@@ -21,7 +22,7 @@ TURN_RAD_S = math.radians(20)
 STEP_RAD = 2 * math.pi / 4096
 
 
-def axis_trials(progress: Callable[[str], None]) -> Iterator[Trial]:
+def axis_trials(progress: Progress) -> Iterator[Trial]:
     """Each order on a turn with 1 % ripple; the error is the root mean square over all beams, at the end of 10 m."""
     progress("interpolation of the servo's angle")
     seconds = np.arange(0, SECONDS, 1 / RATE_HZ)

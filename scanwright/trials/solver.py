@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from scanwright.design.accuracy.trials import Trial, timed
 from scanwright.design.arrays import Floats
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.emulators.dynamics import HornMotion, Solver
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant
 
@@ -22,7 +23,7 @@ RATE_RAD_S = math.pi
 HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
 
 
-def solver_trials(plant: Plant, progress: Callable[[str], None]) -> Iterator[Trial]:
+def solver_trials(plant: Plant, progress: Progress) -> Iterator[Trial]:
     """Each method at each tolerance; the error is the farthest that the horn is from where the reference has it."""
     asked_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
 

@@ -178,7 +178,7 @@ def test_who_declines_is_told_how_and_nothing_is_written(spoilt, person, tmp_pat
     twin = spoilt("XM430-W350", "2.0")
     with pytest.raises(typer.Exit) as stop:
         asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, 1)
-    assert stop.value.exit_code == 2 and person.questions == ["Write these 3 registers to the servo?"]
+    assert stop.value.exit_code == 3 and person.questions == ["Write these 3 registers to the servo?"]
     hint = f"nothing was moved; `scanwright servo-setup {twin.port} --scanner {tmp_path} --from-id 1` writes that"
     assert hint in capsys.readouterr().err
     assert kept_writes(twin) == set() and not list(tmp_path.glob("servo-*"))

@@ -101,8 +101,11 @@ def test_a_wrong_task_is_one_line_exit_2_and_no_file(command, tmp_path, change, 
     [
         (["optimise", "no_such_task"], "ground_ahead"),
         (["optimise", "missing.toml"], "missing.toml"),
-        (["evaluate", "uniform", "--angles=0,90,0"], "four numbers"),
-        (["evaluate", "uniform", "--angles=0,90,0,x"], "four numbers"),
+        (
+            ["evaluate", "uniform", "--angles=0,90,0"],
+            "--angles = '0,90,0': must be A_ROT,B_ROT,A_LASER",
+        ),
+        (["evaluate", "uniform", "--angles=0,90,0,x"], "must be A_ROT,B_ROT"),
         (["evaluate", "uniform", "--angles=0,90,0,nan"], "beta_laser = nan deg: from -360 to 360"),
         (["evaluate", "uniform", "--angles=720,0,0,95"], "alpha_rot = 720 deg: from -360 to 360"),
         (
@@ -219,7 +222,7 @@ def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuf
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )
-    assert (done.returncode, done.stderr) == (2, "scanwright: standard output: No space left on device\n")
+    assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
 
 
 def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(command, tmp_path, monkeypatch):

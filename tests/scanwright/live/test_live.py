@@ -215,7 +215,7 @@ class Seen:
 @pytest.mark.parametrize(
     ("error", "case", "code"),
     [
-        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 2),
+        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 3),
         (noted(KeyboardInterrupt(), TURNS), "stopped, servo turns", 130),
     ],
     ids=["error", "Ctrl-C"],
@@ -231,7 +231,7 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
     with pytest.raises(typer.Exit) as ended:
         devices.scan(Path("out"))
-    said = [line.removeprefix("scanwright: ") for line in capsys.readouterr().err.splitlines()]
+    said = [line.removeprefix("error: ") for line in capsys.readouterr().err.splitlines()]
     assert ended.value.exit_code == code
     assert said == [*ENDS[case][0].lines, f"what was recorded is in {__file__}"]
     (end, closed) = seen.ends

@@ -12,6 +12,7 @@ import pytest
 import viser.transforms
 from matplotlib.image import imread
 
+from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
@@ -160,7 +161,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.get_by_text(J, exact=True).wait_for()
 
     # a painted region changes the optimum, and the button finds a better one for it
-    before = find_optimum(load_task(folder / "small.toml"), lambda _: None).search.best[0].angles_deg
+    before = find_optimum(load_task(folder / "small.toml"), no_progress).search.best[0].angles_deg
     tab(page, "Paint")
     page.get_by_label("brush").check()
     until(lambda: studio.controls.painting.value)
