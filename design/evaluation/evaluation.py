@@ -25,7 +25,7 @@ from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.objective.tolerance import rise_words, sensitivity
 from scanwright.design.search.with_parts import checked_score
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
@@ -192,7 +192,7 @@ def evaluate(
     pole: Pole | None,
     lever: Lever | None,
     progress: Callable[[str], None],
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
 from scanwright.firmware_io.calibration.estimate import Estimate, estimate
@@ -94,7 +94,7 @@ def calibrate_recordings(
         **calibration_report(found, start, mount, beams, seen),
     }
     calibration = Calibration(calibrated(angles, found), record, out)
-    with whole_file(out, RecordingError) as part, whole_file(report_path(out), RecordingError) as beside:
+    with atomic_write(out, RecordingError) as part, atomic_write(report_path(out), RecordingError) as beside:
         part.write_text(calibration.angles.to_json(), encoding="utf-8")
         beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return calibration

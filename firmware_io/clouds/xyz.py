@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
 from scanwright.firmware_io.foreign import foreign
@@ -56,6 +56,6 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     names = rows.dtype.names or ()
     kinds = [rows.dtype[name].str for name in names]
     header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
     return []

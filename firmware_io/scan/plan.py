@@ -125,7 +125,7 @@ def plan_scan(
     return ScanPlan(
         angles=angles,
         angles_path=in_use.path,
-        frames=in_use.said,
+        frames=in_use.description,
         motion=angles.motion,
         turns=turns,
         intensity=intensity,

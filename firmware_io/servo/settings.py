@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from scanwright.design.errors import DeviceError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
@@ -151,7 +151,7 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
     except OSError as error:
         raise DeviceError(f"{file}: cannot read: {error.strerror}") from error
     except ValidationError as error:
-        raise DeviceError(explain(error, file, ServoSettings)) from error
+        raise DeviceError(format_validation_error(error, file, ServoSettings)) from error
     expected = [table for table in all_tables() if (table.model, table.protocol) == (kept.model, kept.protocol)]
     known = settable(expected[0]) if expected else {}
     for setting in kept.settings:
