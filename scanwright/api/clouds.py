@@ -1,4 +1,4 @@
-"""Clouds: read, written, joined, and made a map of."""
+"""Read, write, register and map clouds."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def register(
     map_spacing_m: float = 0.02,
     progress: Progress = no_progress,
 ) -> RegisteredFiles:
-    """Find where clouds stand to each other, from no start if need be, and merge them into one map.
+    """Align point clouds and merge them; works without initial poses.
 
     Args:
         clouds: of one place, two or more.
         out: map to write.
         poses: TUM file to write; None for one beside the map.
-        start: TUM file of start poses, a line for each cloud; found if not given.
+        start: TUM file of initial poses, one line per cloud; None needs none.
         angles: calibrated angle set that all clouds were assembled with: what its covariance means for the poses is
             part of their covariance. Without it the calibration is taken to be right.
         spacing_m: distance of the points that are registered.
@@ -54,10 +54,10 @@ def register(
     target = Path(out)
     check_place(target, RecordingError)
     tum = target.with_suffix(".tum") if poses is None else Path(poses)
-    given = None if start is None else Path(start)
+    start_poses = None if start is None else Path(start)
     scanner = None if angles is None else as_angle_set(angles)
     paths = [Path(cloud) for cloud in clouds]
-    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, progress)
+    return register_files(paths, target, tum, start_poses, spacing_m, map_spacing_m, scanner, progress)
 
 
 @with_say
@@ -74,23 +74,22 @@ def make_map(
     seen_through_m: float | None = None,
     progress: Progress = no_progress,
 ) -> MapSummary:
-    """Turn clouds into an occupancy grid, as ROS's map_server reads it: YAML and PGM.
+    """Create an occupancy grid for ROS's map_server from point clouds: YAML and PGM.
 
-    A cell is occupied where a point lies in it between two heights above the floor; free where it is not and a
-    beam passed below the lower one; else unknown.
+    A cell is occupied if a point in it lies between two heights above the floor; free if it is not occupied and a
+    beam passed below the lower height; otherwise unknown.
 
     Args:
         clouds: of one place, z up, in one frame or with `poses`.
         out: YAML file to write; the PGM goes beside it.
-        angles: angle set that all clouds were assembled with: its optical centre is where they were seen from. Without
-            it the origins of clouds that have poses are; of others nobody knows it, and they free nothing.
-        poses: TUM file, a line for each cloud, as `register` writes it; the poses in the files if not given.
+        angles: angle set that all clouds were assembled with; its optical centre is the position of the scanner. None
+            uses the origins of clouds that have poses; clouds without poses make no cell free.
+        poses: TUM file, a line for each cloud, as `register` writes it; None reads the poses in the files.
         resolution_m: edge of a cell.
-        floor_m: height of the floor in the map; found if not given.
-        from_m: what is lower above the floor is driven over.
-        to_m: what is higher above the floor is driven under.
-        seen_through_m: leave out what came or went: points that another cloud was seen through, by more than this; 0.1
-            is usual.
+        floor_m: height of the floor in the map; None detects it.
+        from_m: lowest height of obstacles above the floor.
+        to_m: highest height of obstacles above the floor.
+        seen_through_m: drop moving objects: points that beams of another cloud passed by more than this; 0.1 is usual.
         progress: progress callback.
 
     Raises:

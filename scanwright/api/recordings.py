@@ -1,4 +1,4 @@
-"""From a recording to a cloud, and to the mounting errors of the scanner that made it."""
+"""From a recording to a cloud, and to the mounting errors of its scanner."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ def import_bag(
     hold: bool = False,
     also: Collection[str] = (),
 ) -> ImportSummary:
-    """Bring somebody's ROS 1 or ROS 2 bag into the project's own form: MCAP, /scan and /joint_states.
+    """Convert a ROS 1 or ROS 2 bag to a recording: MCAP with /scan and /joint_states.
 
     Args:
         bag: the bag.
         out: recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of the LaserScan.
-        angle: where the servo's angle is: TOPIC[:FIELD], TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of
+        angle: joint angle: TOPIC[:FIELD], TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of
             transforms, or FILE.csv[:COLUMN].
         angle_unit: of that angle; transforms have none.
-        hold: the motor stood still during each scan.
-        also: topics that come along as they are, such as /odom, /imu and /tf_static for `assemble`.
+        hold: the axis was at rest during each scan.
+        also: topics to copy, such as /odom, /imu and /tf_static for `assemble`.
 
     Raises:
         RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
@@ -58,10 +58,10 @@ def import_bag(
 
 
 def open_recording(path: str | Path) -> Recording:
-    """Open a recording: `joint_log` has the servo's angles, `scans()` gives the scans, `arrays()` all of it as arrays.
+    """Open a recording: `joint_log` has the joint angles, `scans()` yields the scans, `arrays()` returns all as arrays.
 
     Raises:
-        RecordingError: the file is missing, cut off, not of our topics and types, or empty.
+        RecordingError: the file is missing, truncated, without the topics and types of a recording, or empty.
     """
     from scanwright.firmware_io.recording.recording import open_recording
 
@@ -148,20 +148,20 @@ def calibrate(
     one_place: bool = False,
     progress: Progress = no_progress,
 ) -> Calibration:
-    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
+    """Estimate a scanner's mounting errors from recordings of static scenes with walls; no targets needed.
 
-    Where an own_body.npz stands beside the file of the angle set, beams that end on the scanner itself are left out.
-    Where its scanner.urdf stands there, it is written again with the true frames beside `out`.
+    If own_body.npz is next to the file of the angle set, beams that end on the scanner itself are dropped. If
+    scanner.urdf is there, scanner.calibrated.urdf is written next to `out`.
 
     Args:
-        recordings: of scenes that stand still.
+        recordings: of static scenes.
         angles: angle set of the scanner, as designed.
         out: calibrated angle set to write, `.json`.
-        one_place: the scanner stood still from the first recording to the last.
+        one_place: the scanner did not move between the recordings.
         progress: progress callback.
 
     Raises:
-        RecordingError: a recording is unreadable, they do not show the mounting errors, or `out` is the file of
+        RecordingError: a recording is unreadable, they do not determine the mounting errors, or `out` is the file of
             `angles`. Nothing is written then.
     """
     from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
@@ -171,17 +171,17 @@ def calibrate(
     if not isinstance(angles, AngleSet) and target.resolve() == Path(angles).resolve():
         raise RecordingError(f"{target}: contains the angles to calibrate; write to another file")
     own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
-    beside = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
+    source = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
     urdf = robot_frames.calibrated_urdf_place(target)
-    designed = beside if beside and beside.is_file() and beside.resolve() != urdf.resolve() else None
+    designed = source if source and source.is_file() and source.resolve() != urdf.resolve() else None
     if designed:
         robot_frames.with_frames(robot_frames.read_urdf(designed), before, str(designed))  # refused before the work
     paths = [Path(recording) for recording in recordings]
-    found = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, say=progress)
+    result = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, say=progress)
     if designed:
-        robot_frames.write_calibrated_urdf(designed, urdf, found.angles)
-    fixed = robot_frames.fixed_frames(found.angles)
-    said = [*robot_frames.what_changed(before, found.angles), *([f"wrote {urdf}"] if designed else [])]
-    said += [f"  {frame.command()}" for frame in fixed]
-    said += ["as parameters of a launch file:", *(f"  {frame.launch_parameters()}" for frame in fixed)]
-    return replace(found, frames=tuple(said))
+        robot_frames.write_calibrated_urdf(designed, urdf, result.angles)
+    fixed = robot_frames.fixed_frames(result.angles)
+    remarks = [*robot_frames.what_changed(before, result.angles), *([f"wrote {urdf}"] if designed else [])]
+    remarks += [f"  {frame.command()}" for frame in fixed]
+    remarks += ["as parameters of a launch file:", *(f"  {frame.launch_parameters()}" for frame in fixed)]
+    return replace(result, frames=tuple(remarks))

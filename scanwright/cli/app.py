@@ -43,13 +43,14 @@ for group in (new, design, parts, devices, clouds, pages):
     cls=GroupedHelp,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Begin with `scanwright new`. `scanwright COMMAND --help` says what a command takes.",
+    epilog="Start with `scanwright new`, or try `scanwright build ground_ahead`. `scanwright COMMAND --help` lists the "
+    "options of a command.",
 )
 def scanwright(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar."""
+    """Design and run a 3D laser scanner made of a 2D lidar and a servo."""
     if version:
         print(f"scanwright {__version__}")
     elif context.invoked_subcommand is None:

@@ -14,9 +14,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from types import FrameType
-from typing import IO, TYPE_CHECKING, Annotated, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import typer
 
@@ -24,18 +23,6 @@ from scanwright.design.errors import DeviceError, NumericalError, ScanwrightErro
 
 if TYPE_CHECKING:
     from rich.progress import Progress
-
-TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
-TaskOrBuild = Annotated[
-    Path, typer.Argument(metavar="TASK", help="Task file, name of a shipped task, or build folder (with its parts).")
-]
-BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
-Angles = Annotated[Path, typer.Option(metavar="FILE", help="Angle set: angles.json, or a calibrated one.")]
-AllowOrigin = Annotated[
-    list[str] | None,
-    typer.Option(metavar="ORIGIN", help="Web page that may look beside Foxglove's own; can be given several times."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
 
 
 class Verbosity(Enum):

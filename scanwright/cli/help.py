@@ -9,15 +9,15 @@ from functools import wraps
 from typing import Annotated, Any, ClassVar, TypeVar
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.models import OptionInfo
 
 from scanwright.cli.console import Verbosity, name_options, set_verbosity, styled
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Results only: no progress, no hints.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Every step on its own line, every warning in full.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print every step and full warnings.")]
 
 
 class Commands(typer.Typer):
@@ -27,15 +27,33 @@ class Commands(typer.Typer):
         super().__init__(rich_markup_mode=None, pretty_exceptions_enable=False)
         self.title, self.first = title, first
 
-    def command(self, name: str | None = None, **options: Any) -> Callable[[F], F]:
-        """As typer's own."""
-        register = super().command(name, rich_help_panel=self.title, **options)
+    def command(self, name: str | None = None, *, example: str = "", no: str = "", **options: Any) -> Callable[[F], F]:
+        """As typer's own, with an epilog.
+
+        Args:
+            name: of the command; by default that of the function.
+            example: of its use, without the program.
+            no: what exit code 1 means; empty if the command does not use it.
+            options: as typer's own.
+        """
+        codes = ["0 done", *([f"1 {no}"] if no else []), "2 wrong input"]
+        codes += ["3 device fault", "130 interrupted"] if self.title == "Devices" else ["130 interrupted"]
+        epilog = f"Example: scanwright {example}\n\nExit codes: {'; '.join(codes)}"
+        register = super().command(name, cls=_Command, epilog=epilog, rich_help_panel=self.title, **options)
 
         def registered(function: F) -> F:
             register(_with_verbosity(function, self.first))
             return function
 
         return registered
+
+
+class _Command(TyperCommand):
+    """A command whose usage line has no braces around arguments."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """As typer's own, `RECORDING` in place of `{RECORDING}`."""
+        return [re.sub(r"[{}]", "", piece) for piece in super().collect_usage_pieces(ctx)]
 
 
 class GroupedHelp(TyperGroup):

@@ -100,10 +100,10 @@ class CloudView:
         """All that is shown."""
         chunks = list(self.chunks)
         points = np.concatenate([np.empty((0, 3), np.float32), *(chunk.points_m for chunk in chunks)])
-        kept: tuple[tuple[ColourBy, str, str], ...] = (("intensity", "intensity", "<f4"), ("time", "time_s", "<f8"))
+        saved: tuple[tuple[ColourBy, str, str], ...] = (("intensity", "intensity", "<f4"), ("time", "time_s", "<f8"))
         columns = {
             name: np.concatenate([np.empty(0, np.float32), *(chunk.values[by] for chunk in chunks)]).astype(kind)
-            for by, name, kind in kept
+            for by, name, kind in saved
         }
         return Cloud(points, columns)
 

@@ -54,7 +54,7 @@ class _Client:
     waiting: deque[bytes] = field(default_factory=lambda: deque(maxlen=BACKLOG))
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def hear(self, text: str | bytes, topics: tuple[str, ...]) -> None:
+    def receive(self, text: str | bytes, topics: tuple[str, ...]) -> None:
         """Take a message of the client; what is malformed or unknown is dropped."""
         with suppress(ValueError, TypeError, KeyError, IndexError, RecursionError):
             message: Any = json.loads(text) if isinstance(text, str) else {}
@@ -114,7 +114,7 @@ class FoxgloveServer:
         return f"{APP}?ds=foxglove-websocket&ds.url={quote(self.address, safe='')}"
 
     @property
-    def heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether somebody has subscribed to anything."""
         return any(client.topics for client in tuple(self._clients))
 
@@ -151,8 +151,8 @@ class FoxgloveServer:
             with suppress(ConnectionClosed):
                 for text in self._greeting:
                     await connection.send(text)
-                async for said in connection:
-                    client.hear(said, self._topics)
+                async for message in connection:
+                    client.receive(message, self._topics)
         finally:
             self._clients.discard(client)
             sending.cancel()

@@ -64,13 +64,13 @@ def view_recording(
     with foxglove_server(recording.name, channels(), port, progress, allow_origins) as server:
         shown = _shown(recording, angles, server.log)
         while True:
-            _until(lambda: server.heard)
+            _until(lambda: server.has_subscribers)
             time.sleep(_SETTLED_S)
             shown.begin()
             scans, _ = replay(recording, shown, rate=rate)
             shown.close()
             progress(f"showed {scans:,} scans; Ctrl-C to end")
-            _until(lambda: not server.heard)
+            _until(lambda: not server.has_subscribers)
             progress("no viewer is connected; the next one gets the recording from its start")
 
 
@@ -113,10 +113,10 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
-    found = load_angles(angles)
+    angle_set = load_angles(angles)
     smooth = not held_by(read_note(recording, NOTE))
-    urdf = description(angles.parent, found)
-    return FoxgloveChannels(found, own_body_beside(angles), urdf, log, smooth=smooth)
+    urdf = description(angles.parent, angle_set)
+    return FoxgloveChannels(angle_set, own_body_beside(angles), urdf, log, smooth=smooth)
 
 
 @contextmanager

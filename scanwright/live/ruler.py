@@ -30,10 +30,10 @@ def nearest_to_ray(
     for points in clouds:
         to = np.asarray(points, float) - origin_m
         ahead_m = to @ along
-        beside_m = np.sqrt(np.maximum((to**2).sum(axis=1) - ahead_m**2, 0.0))
-        hit = (ahead_m > 0) & (beside_m < np.tan(REACH_RAD) * ahead_m)
+        off_ray_m = np.sqrt(np.maximum((to**2).sum(axis=1) - ahead_m**2, 0.0))
+        hit = (ahead_m > 0) & (off_ray_m < np.tan(REACH_RAD) * ahead_m)
         # of a wall seen at a low angle the middle of the click, not its near edge
-        cost_m = np.where(hit, ahead_m + beside_m / np.tan(REACH_RAD), np.inf)
+        cost_m = np.where(hit, ahead_m + off_ray_m / np.tan(REACH_RAD), np.inf)
         first = int(np.argmin(cost_m)) if len(cost_m) else 0
         if len(cost_m) and cost_m[first] < best_m:
             best, best_m = np.asarray(points[first], float), float(cost_m[first])
@@ -50,7 +50,7 @@ class Ruler:
         self.on.on_update(lambda _: self._arm())
 
     @property
-    def said(self) -> str:
+    def text(self) -> str:
         """The distance in words; nothing before the second end."""
         return f"{np.linalg.norm(self.ends[1] - self.ends[0]):.3f} m" if len(self.ends) == 2 else ""
 
@@ -86,4 +86,4 @@ class Ruler:
             self._scene.add_line_segments(
                 "/ruler/line", ends[None], colors=COLOUR, thickness=3.0, thickness_units="screen"
             )
-            self._scene.add_label("/ruler/length", self.said, position=tuple(((first + last) / 2).tolist()))
+            self._scene.add_label("/ruler/length", self.text, position=tuple(((first + last) / 2).tolist()))

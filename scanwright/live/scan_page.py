@@ -25,7 +25,7 @@ from scanwright.firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
-_GONE_S = 1.0  # for the page to end if nobody looks at it
+_CLOSED_S = 1.0  # for the page to end if nobody looks at it
 OPENED_S = 15.0  # at most until the browser has it
 
 
@@ -71,7 +71,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
     finally:
         if feed.end is not None:
             with suppress(KeyboardInterrupt):
-                page.join(_GONE_S)
+                page.join(_CLOSED_S)
                 if page.is_alive():
                     print("the page shows how the scan ended: close it, or press Ctrl-C", file=sys.stderr, flush=True)
                 page.join()

@@ -92,7 +92,7 @@ class Build:
         return failed_of(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
-        """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
+        """Return the result as lines; warnings with the same remedy are one, unless `in_full`."""
         if self.made is None:
             return [f"{self.folder}: nothing has changed, no work to do ({len(self.files)} files)"]
         return [
@@ -262,7 +262,7 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
     return _make(loaded, target, progress)
 
 
-def _make(asked: LoadedTask, target: Path, progress: Progress) -> Made:
+def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """All of it, in the order in which one thing follows from another."""
     from scanwright.cad.files.part_files import write_files
     from scanwright.design.evaluation.as_built import as_built
@@ -270,15 +270,15 @@ def _make(asked: LoadedTask, target: Path, progress: Progress) -> Made:
     from scanwright.design.search.optimum import find_optimum
 
     with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
-        optimum = find_optimum(asked, _at(progress, "search"))
+        optimum = find_optimum(requested, _at(progress, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
 
-        made = begin(_chosen_and_made, optimum, asked.sha256(), progress)
+        made = begin(_chosen_and_made, optimum, requested.sha256(), progress)
         begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
-        records.write_task(work, asked)
+        records.write_task(work, requested)
         records.write_search(work, result)
         chosen, scanner, assembly = made()
         best, angles = chosen.family, scanner.angles
@@ -302,7 +302,7 @@ def _make(asked: LoadedTask, target: Path, progress: Progress) -> Made:
         write_files(work, drawn())
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *left_out])
         write_package(work)
-        write_manifest(work, asked, [asdict(part) for part in parts.parts])
+        write_manifest(work, requested, [asdict(part) for part in parts.parts])
         _at(progress, "report")("writing report.html")
         records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)

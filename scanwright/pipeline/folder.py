@@ -3,7 +3,7 @@
 A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
 stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
 and none of those before it, stay behind unlisted. Names of files come from manifests that anybody may have written, and
-the folder may hold links: `_refuse_what_is_in_the_way` checks each name before anything moves.
+the folder may hold links: `_require_free_names` checks each name before anything moves.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     created = [folder for folder in (target.parent, *target.parent.parents) if not folder.exists()]
     work, moving = (target.with_name(f".{target.name}.{what}") for what in ("building", "moving"))
     try:
-        with _told_of(target):
+        with _disk_errors(target):
             target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(target):
             try:
-                with _told_of(target):
+                with _disk_errors(target):
                     shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
                     work.mkdir()
                 yield work
-                with _told_of(target), sigint_deferred():  # a folder is as it was, or finished
+                with _disk_errors(target), sigint_deferred():  # a folder is as it was, or finished
                     made = _files_in(work)
-                    known = {*listed_files(target), *_told(moving), *made}
-                    _refuse_what_is_in_the_way(target, made, known)
+                    known = {*listed_files(target), *_names_in_transit(moving), *made}
+                    _require_free_names(target, made, known)
                     _move(work, target, moving, made, known)
             finally:
                 shutil.rmtree(work, ignore_errors=True)
@@ -64,8 +64,8 @@ def fresh_folder(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _told_of(target: Path) -> Iterator[None]:
-    """Our own dealings with the disk: what the system refuses is told of the folder."""
+def _disk_errors(target: Path) -> Iterator[None]:
+    """Name the folder in what the system refuses."""
     try:
         yield
     except ScanwrightError:
@@ -122,7 +122,7 @@ def _locked(path: Path, target: Path) -> TextIO:
         BuildError: another process holds it.
     """
     busy = f"{target}: another build of this folder is at work: wait for it"
-    with _told_of(target):
+    with _disk_errors(target):
         try:
             lock = path.open("x" if fcntl is None else "a+", encoding="utf-8")
         except FileExistsError:
@@ -136,7 +136,7 @@ def _locked(path: Path, target: Path) -> TextIO:
     return lock
 
 
-def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
+def _require_free_names(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
     """Stop the build before anything moves if a name of `target` cannot be written or removed.
 
     Args:
@@ -178,13 +178,13 @@ def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[st
     moving.unlink(missing_ok=True)
 
 
-def _told(moving: Path) -> set[str]:
+def _names_in_transit(moving: Path) -> set[str]:
     """What a build that was killed may have left in the folder."""
     try:
-        told = json.loads(moving.read_text(encoding="utf-8"))
+        names = json.loads(moving.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return set()
-    return {name for name in told if isinstance(name, str) and inside(name)} if isinstance(told, list) else set()
+    return {name for name in names if isinstance(name, str) and inside(name)} if isinstance(names, list) else set()
 
 
 def _drop_empty_folders(target: Path, names: Iterable[str]) -> None:

@@ -19,7 +19,7 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
 from scanwright.design.task.shapes import LEAST_M, MOST_M
 from scanwright.design.task.task import load_task
-from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
+from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines
 
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
 
@@ -51,7 +51,7 @@ class Answers:
         lidar: by its name in the catalogue.
         servo: the same.
         height_m: of the scanner's optical centre over the ground.
-        see: what it must see, each as `scanwright.pipeline.wishes.SEEN` says.
+        see: what it must see, each as `scanwright.pipeline.seen_regions.SEEN` says.
         scan_s: time of one full scan.
         robot: what of it the scanner must look past: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
         ahead_m: where on the robot it stands, ahead of the middle of the box or of the origin of the mesh.
@@ -83,11 +83,11 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     _require_strength(lidar, servo)
     if not LEAST_M <= answers.height_m <= MOST_M:
         raise TaskError(f"height_m = {answers.height_m:g}: must be between {LEAST_M:g} and {MOST_M:g} m")
-    wishes = [parse_wish(each) for each in answers.see]
-    if not wishes:
-        raise TaskError(f"see: no region; {known_wishes()}")
-    things = [numbers for word, numbers in wishes if word == "thing"]
-    regions = [(word, numbers) for word, numbers in wishes if word != "thing"] or [("all", ())]
+    seen = [parse_region(each) for each in answers.see]
+    if not seen:
+        raise TaskError(f"see: no region; {known_regions()}")
+    things = [numbers for word, numbers in seen if word == "thing"]
+    regions = [(word, numbers) for word, numbers in seen if word != "thing"] or [("all", ())]
     blocks = [
         f"# {answers.name}: {lidar.name} turned by {servo.name}, {answers.height_m:g} m over the ground.",
         "# World: x ahead, y to the left, z up. Every key: `scanwright schema`, or the pages of documentation.",

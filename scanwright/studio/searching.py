@@ -24,11 +24,11 @@ class Searching:
         controls: Controls,
         show: Callable[..., None],
         now: Callable[[], tuple[Canvas, Setting]],
-        found: Callable[[Optimum], None],
+        use: Callable[[Optimum], None],
         move: Callable[[Setting, Hashable], None],
     ) -> None:
-        """`show` shows a line, `now` is the state of the page, `found` and `move` get the optimum."""
-        self._controls, self._show, self._now, self._found, self._move = controls, show, now, found, move
+        """`show` shows a line, `now` is the state of the page, `use` and `move` get the optimum."""
+        self._controls, self._show, self._now, self._use, self._move = controls, show, now, use, move
 
     def begin(self) -> None:
         """Search all angles of the task, and move the sliders to what is found; one search at a time."""
@@ -52,14 +52,14 @@ class Searching:
             optimum = find_optimum(canvas.painted(), progress)
             if canvas != self._now()[0]:
                 return
-            self._found(optimum)
+            self._use(optimum)
             step = object()  # both moves are one
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
             self._move(bare, step)
-            found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
+            title = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
             blind = optimum.hole_lines(tabled=False)
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
-            self._show(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
+            self._show(f"{title}: {holes}; which of the equal ones its parts hide least is still looked for")
             with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
@@ -68,7 +68,7 @@ class Searching:
             seen = as_built(
                 optimum.problem, optimum.loaded.task, setting, chosen.shadow, chosen.family.score, optimum.mounts
             )
-            self._show("; ".join([found, *chosen.lines(), *seen.lines(), holes]))
+            self._show("; ".join([title, *chosen.lines(), *seen.lines(), holes]))
         except ScanwrightError as error:
             self._show(str(error), bad=True)
         finally:

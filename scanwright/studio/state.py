@@ -45,11 +45,12 @@ class Setting:
         Raises:
             ValueError: they are not four finite numbers.
         """
-        given = np.array([float(angle) for angle in angles_deg])
-        if given.shape != (4,) or not np.isfinite(given).all():
-            raise ValueError(f"{given.tolist()}: not four finite angles")
+        angles = np.array([float(angle) for angle in angles_deg])
+        if angles.shape != (4,) or not np.isfinite(angles).all():
+            raise ValueError(f"{angles.tolist()}: not four finite angles")
         alpha_rot, beta_rot, alpha_laser, beta_laser = (
-            round(float(np.clip(angle, -bound, bound)), 2) + 0.0 for angle, bound in zip(given, BOUNDS_DEG, strict=True)
+            round(float(np.clip(angle, -bound, bound)), 2) + 0.0
+            for angle, bound in zip(angles, BOUNDS_DEG, strict=True)
         )
         return cls((alpha_rot, beta_rot, alpha_laser, beta_laser))
 

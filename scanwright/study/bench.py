@@ -80,19 +80,19 @@ class PartsBench:
         return self._made[key]
 
 
-def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
+def judge_candidate(loaded: LoadedTask, searched: Result) -> Result:
     """The best setting of a candidate that can be built, and everything that decides.
 
     Args:
         loaded: the candidate's task.
-        found: `search_candidate` of its search record.
+        searched: `search_candidate` of its search record.
 
     Raises:
         InstallError: the CAD kernel is not there.
     """
     require_kernel("study")
-    families = tuple(_family(entry) for entry in found["families"])
-    loaded = with_motion(loaded, found)
+    families = tuple(_family(entry) for entry in searched["families"])
+    loaded = with_motion(loaded, searched)
     try:
         problem = problem_of(loaded)
         bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
@@ -106,7 +106,7 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     seen = seen_of(problem, setting, score, made.shadow)
     values = {
         "J": score.J,
-        "density_gain": density_gain(problem, found["reference_J"], score.J),
+        "density_gain": density_gain(problem, searched["reference_J"], score.J),
         **of_lidar(loaded.lidar),
         **per_ball(beams_per_ball(problem.objective, score.J), made.values["cost_usd"]),
         "blind_fraction": seen.blind_fraction,

@@ -36,9 +36,9 @@ def search_record(loaded: LoadedTask) -> LoadedTask:
     """The part of a candidate's record that its search depends on."""
     task = loaded.task
     limits = task.limits.model_copy(update={"max_blocked": None})
-    nobody = {"name": ANYBODY, "servo": "", "slip_ring": None, "printer": "", "limits": limits}
+    anonymous = {"name": ANYBODY, "servo": "", "slip_ring": None, "printer": "", "limits": limits}
     products = Catalogue({task.sensor: loaded.products.products[task.sensor]})
-    return replace(loaded, task=task.model_copy(update=nobody), products=products)
+    return replace(loaded, task=task.model_copy(update=anonymous), products=products)
 
 
 def record_digest(loaded: LoadedTask) -> str:
@@ -85,7 +85,7 @@ def _bounds(optimum: Optimum, reference_J: float) -> dict[str, float | None]:
     }
 
 
-def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
+def bounds_of(loaded: LoadedTask, searched: Result) -> dict[str, float | None]:
     """What no setting of a candidate can be better than, before anything is made; `found` by its search."""
     bought: list[Lidar | Servo | SlipRing] = [loaded.lidar, loaded.servo]
     if loaded.task.slip_ring is not None:
@@ -95,9 +95,9 @@ def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
         "mass_g": sum(product.mass_g for product in bought),
         "cost_usd": price,
         **of_lidar(loaded.lidar),
-        **per_ball(found["bounds"]["beams_per_ball"], price),
+        **per_ball(searched["bounds"]["beams_per_ball"], price),
     }
-    return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **found["bounds"], **known}.items()}
+    return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **searched["bounds"], **known}.items()}
 
 
 def of_lidar(lidar: Lidar) -> dict[str, float | None]:
@@ -123,15 +123,15 @@ def price_usd(products: Iterable[Bought]) -> float | None:
     return sum(known) if len(known) == len(prices) else None
 
 
-def with_motion(loaded: LoadedTask, found: Result) -> LoadedTask:
-    """The candidate with the motion that its search has found."""
-    table = loaded.task.model_dump(exclude_none=True) | {"motion": found["motion"]}
+def with_motion(loaded: LoadedTask, searched: Result) -> LoadedTask:
+    """The candidate with the motion that its search chose."""
+    table = loaded.task.model_dump(exclude_none=True) | {"motion": searched["motion"]}
     return replace(loaded, task=Task.model_validate(table))
 
 
-def winner_task(loaded: LoadedTask, found: Result, built: Result) -> LoadedTask:
+def winner_task(loaded: LoadedTask, searched: Result, built: Result) -> LoadedTask:
     """The task that builds just the setting that a candidate won with."""
-    moving = with_motion(loaded, found)
+    moving = with_motion(loaded, searched)
     names = ("alpha_rot_deg", "beta_rot_deg", "alpha_laser_deg", "beta_laser_deg")
     fixed = dict(zip(names, built["angles_deg"], strict=True))
     angles = moving.task.angles.model_copy(update=fixed)

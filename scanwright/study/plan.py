@@ -28,7 +28,7 @@ def plan_study(study: Path, out: Path | None, results: Path | None, progress: Pr
         TaskError: the study is malformed.
     """
     crossing = Crossing(load_study(study))
-    kept = Results(results or (out or Path("out") / crossing.loaded.study.name) / "results", "")
+    stored = Results(results or (out or Path("out") / crossing.loaded.study.name) / "results", "")
     refused: Counter[str] = Counter()
     searches: set[str] = set()
     judged = 0
@@ -40,8 +40,8 @@ def plan_study(study: Path, out: Path | None, results: Path | None, progress: Pr
             continue
         search, at = addresses(combination.loaded)
         searches.add(search)
-        judged += kept.has(at)
-    searched = sum(map(kept.has, searches))
+        judged += stored.has(at)
+    searched = sum(map(stored.has, searches))
     left = {"search": len(searches) - searched, "candidate": len(crossing) - refused.total() - judged}
     cost = _unit_costs()
     mean_h, most_h = (sum(left[unit] * cost[unit][field] for unit in left) / 3600 for field in ("mean_s", "most_s"))

@@ -34,10 +34,10 @@ class Results:
     def get(self, address: str) -> Result | None:
         """A result; None where there is none."""
         try:
-            found: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
+            result: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
         except (FileNotFoundError, json.JSONDecodeError):  # a file system may have lost its end
             return None
-        return found
+        return result
 
     def has(self, address: str) -> bool:
         """Whether there is a result."""

@@ -158,9 +158,9 @@ class StudyRun:
             for number in map(int, front.numbers[order][: self.crossing.loaded.study.winners]):
                 combination = self.crossing[number]
                 assert combination.loaded is not None
-                found, built = (self.results.get(at) for at in addresses(combination.loaded))
-                assert found is not None and built is not None
-                winners.append((combination, winner_task(combination.loaded, found, built)))
+                searched, built = (self.results.get(at) for at in addresses(combination.loaded))
+                assert searched is not None and built is not None
+                winners.append((combination, winner_task(combination.loaded, searched, built)))
         return winners
 
     def _searches(self, watch: _Watch) -> Iterator[Unit]:
@@ -197,9 +197,9 @@ class StudyRun:
             if combination.loaded is None:
                 continue
             search, at = addresses(combination.loaded)
-            found = self.results.get(search)
-            if found is not None and found["status"] == "found":
-                self._bounds[combination.number] = costs(bounds_of(combination.loaded, found), names)
+            searched = self.results.get(search)
+            if searched is not None and searched["status"] == "found":
+                self._bounds[combination.number] = costs(bounds_of(combination.loaded, searched), names)
                 self._enter(combination.number, self.results.get(at))
 
     def _enter(self, number: int, result: Result | None) -> None:
@@ -231,11 +231,11 @@ class StudyRun:
         row |= {"sensor": loaded.task.sensor, "servo": loaded.task.servo, "printer": loaded.task.printer}
         row |= {"slip_ring": loaded.task.slip_ring or ""}
         search, at = addresses(loaded)
-        found = self.results.get(search)
-        if found is None:
+        searched = self.results.get(search)
+        if searched is None:
             return row | {"status": "failed", "reason": self._failures.get(search, "not searched")}
-        if found["status"] != "found":
-            return row | {"status": "refused", "reason": found["reason"]}
+        if searched["status"] != "found":
+            return row | {"status": "refused", "reason": searched["reason"]}
         front = self.fronts[combination.group]
         beater = front.beater(self._bounds[combination.number])
         if beater is not None:

@@ -41,7 +41,7 @@ class Study(Record):
     """One study file with every default written out."""
 
     name: str = Field(pattern=NAME)
-    tasks: tuple[str, ...] = Field(min_length=1, description="task files beside the study, or shipped tasks")
+    tasks: tuple[str, ...] = Field(min_length=1, description="task files next to the study, or shipped tasks")
     sensors: tuple[str, ...] = ()
     servos: tuple[str, ...] = ()
     slip_rings: tuple[str, ...] = Field(default=(), description="'none' for a scanner that needs none")
@@ -126,8 +126,8 @@ def load_study(path: Path) -> LoadedStudy:
 
 
 def _task(source: Path, name: str) -> LoadedTask:
-    beside = source.parent / name
+    in_folder = source.parent / name
     try:
-        return load_task(beside if beside.is_file() or beside.suffix == ".toml" else Path(name))
+        return load_task(in_folder if in_folder.is_file() or in_folder.suffix == ".toml" else Path(name))
     except TaskError as error:
         raise TaskError(f"{source}: tasks: {error}") from error

@@ -60,13 +60,13 @@ def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
     title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
     left = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
     shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
-    told = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
-    told += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
+    lines = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
+    lines += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
-        told.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
+        lines.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
     if left:
-        told.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
-    return told
+        lines.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
+    return lines
 
 
 def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:

@@ -90,9 +90,9 @@ def _at_scheduler(address: str) -> Iterator[Crew]:
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise TaskError(
-            f"scheduler = '{address}': no scheduler answers there ({said}): start one with `dask scheduler`, "
+            f"scheduler = '{address}': no scheduler answers there ({reason}): start one with `dask scheduler`, "
             "and give the tcp:// address that it prints"
         ) from error
     with client:

@@ -28,27 +28,27 @@ def axis_trials(progress: Progress) -> Iterator[Trial]:
     seconds = np.arange(0, SECONDS, 1 / RATE_HZ)
     steps = np.rint(_truth_rad(seconds) / STEP_RAD)
     log = JointLog(np.rint(seconds * 1e9).astype(np.int64), steps * STEP_RAD)
-    asked_ns = np.linspace(0, log.time_ns[-1], BEAMS).astype(np.int64)
-    true = _truth_rad(asked_ns / 1e9)
-    for way, prepare in ways_between(log).items():
+    at_ns = np.linspace(0, log.time_ns[-1], BEAMS).astype(np.int64)
+    true = _truth_rad(at_ns / 1e9)
+    for name, prepare in interpolations(log).items():
         start = time.perf_counter()
-        angle = prepare().angle_at(asked_ns)
-        taken_s = time.perf_counter() - start
+        angle = prepare().angle_at(at_ns)
+        run_s = time.perf_counter() - start
         yield Trial(
             choice=f"servo angle of {BEAMS:,} beams",
             method="between encoder samples",
-            setting=way,
+            setting=name,
             error=float(np.sqrt(np.mean((angle - true) ** 2))) * 10_000,
             unit="mm at 10 m",
-            seconds=(taken_s,),
-            chosen=way == "smoothed",
+            seconds=(run_s,),
+            chosen=name == "smoothed",
         )
 
 
-def ways_between(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
+def interpolations(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
     """Interpolation orders and the smoothing spline: what makes the curve of a log, by name."""
 
-    def held() -> AxisCurve:
+    def last_sample() -> AxisCurve:
         rows = np.zeros((log.time_ns.size - 1, 4))
         rows[:, 0] = log.position_rad[:-1]
         return AxisCurve(log.time_ns, rows)
@@ -58,7 +58,7 @@ def ways_between(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
         return AxisCurve(log.time_ns, np.ascontiguousarray(CubicSpline(seconds, log.position_rad).c[::-1].T))
 
     return {
-        "order 0, last sample": held,
+        "order 0, last sample": last_sample,
         "order 1, straight": lambda: straight(log),
         "order 3, through samples": cubic,
         "smoothed": lambda: axis_curve(log, held=False)[0],

@@ -25,12 +25,12 @@ HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
 
 def solver_trials(plant: Plant, progress: Progress) -> Iterator[Trial]:
     """Each method at each tolerance; the error is the farthest that the horn is from where the reference has it."""
-    asked_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
+    at_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
 
     def run(solver: Solver) -> Floats:
         axis = HornMotion(plant, HEAD, 0, solver=solver)
         axis.drive(0, Actuation("velocity", RATE_RAD_S))
-        return axis.angle_rad(asked_ns)
+        return axis.angle_rad(at_ns)
 
     progress("motion of the servo, reference")
     true = run(REFERENCE)

@@ -39,9 +39,9 @@ def servo_rows(plant: Plant) -> Iterator[StressRow]:
     for factor in (1e-2, 1e2):
         teeth = replace(plant, stiffness_nm_rad=factor * plant.stiffness_nm_rad)
         yield _speed(f"servo at full duty, teeth {factor:g} times as stiff", teeth, Load(), full)
-    for play_deg in (0.0, 5.0):
-        loose = replace(plant, backlash_rad=math.radians(play_deg))
-        yield _speed(f"servo at full duty, {play_deg:g} deg of play", loose, Load(), full)
+    for backlash_deg in (0.0, 5.0):
+        loose = replace(plant, backlash_rad=math.radians(backlash_deg))
+        yield _speed(f"servo at full duty, {backlash_deg:g} deg of play", loose, Load(), full)
     for factor in (0.1, 1.0):
         loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
         end = _end(loop, Load(), Actuation("velocity", GOAL_RAD_S))

@@ -107,8 +107,8 @@ def write_package(build: Path) -> None:
     for launch in _LAUNCH:
         _write_script(root / "launch" / launch, name)
     _write_script(root / name / "node.py", name)
-    for beside in ("angles.json", "own_body.npz"):
-        shutil.copyfile(build / beside, root / beside)
+    for name_of_file in ("angles.json", "own_body.npz"):
+        shutil.copyfile(build / name_of_file, root / name_of_file)
 
 
 def _depends() -> str:

@@ -83,13 +83,13 @@ def edges(field: Field) -> tuple[Array, Array]:
 def _segments(table: Array, theta: Array, phi: Array) -> Array:
     levels = np.unique(table)
     generator = contourpy.contour_generator(phi, theta, table, line_type=contourpy.LineType.Separate)
-    found = [np.empty((0, 2, 3))]
+    hit = [np.empty((0, 2, 3))]
     for level in (levels[:-1] + levels[1:])[:8] / 2:  # a map has many: a few tell its shape
         for line in generator.lines(float(level)):
             p, t = np.asarray(line).T
             points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=1)
-            found.append(np.stack([points[:-1], points[1:]], axis=1))
-    return np.concatenate(found)
+            hit.append(np.stack([points[:-1], points[1:]], axis=1))
+    return np.concatenate(hit)
 
 
 def direction_hit(origin_m: Array, direction: Array, *, inside: bool) -> Array | None:

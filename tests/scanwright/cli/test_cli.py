@@ -126,6 +126,17 @@ def test_wrong_words_are_one_line_and_exit_2(command, tmp_path, monkeypatch, wor
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("nothing.toml", "nothing.toml: no such task file"), ("s_cne.toml", "did you mean 's_cone.toml'?")],
+)
+def test_a_task_file_is_suggested_by_its_name_without_the_ending(command, tmp_path, monkeypatch, name, told):
+    monkeypatch.chdir(tmp_path)
+    Path("s_cone.toml").write_text(GROUND, encoding="utf-8")
+    code, _, (complaint,) = command("optimise", name)
+    assert code == 2 and told in complaint and ("did you mean" in complaint) == ("did you mean" in told)
+
+
 def test_evaluate_prints_every_figure(command, tmp_path):
     cloud = tmp_path / "sim.ply"
     code, out, _ = command("evaluate", "rolling", "--angles=0,90,0,-90", "--cloud", cloud, "--json")

@@ -15,7 +15,7 @@ from scanwright.design.errors import TaskError
 from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
-from scanwright.pipeline.wishes import SEEN
+from scanwright.pipeline.seen_regions import SEEN
 
 PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
 PRODUCTS = load_catalogue()
@@ -65,7 +65,7 @@ def test_what_was_asked_for_stands_in_the_file(command, here):
     assert [line.split(":")[1] for line in misfits] == [" UST-10LX", " XM430-W350"]
     assert all("will not fit the real device" in line for line in misfits)
     assert complaints[len(misfits) :] == [
-        "next: `scanwright build FILE.toml` makes it; `scanwright optimise FILE.toml` only finds its angles"
+        "next: `scanwright build FILE.toml` (or `scanwright optimise FILE.toml` for the angles only)"
     ]
     text = (here / "FILE.toml").read_text()
     assert ANGLES in text

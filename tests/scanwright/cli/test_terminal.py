@@ -191,9 +191,11 @@ def test_every_command_stands_in_a_group_of_the_help_and_takes_q_and_v(command):
     assert "  build " in named["Parts"] and "  catalogue " in named["Design"] and "  scan " in named["Devices"]
     assert "..." not in out.replace("[ARGS]...", ""), "no description is cut off"
     assert command()[1] == out, "no command at all is a question too"
-    for name in re.findall(r"^  (\w+)  ", "".join(named[title] for title in GroupedHelp.titles), re.MULTILINE):
+    for name in re.findall(r"^  ([\w-]+)  ", "".join(named[title] for title in GroupedHelp.titles), re.MULTILINE):
         _, said, _ = command(name, "--help")
         assert "-q, --quiet" in said and "-v, --verbose" in said
+        assert f"Example: scanwright {name} " in said and "Exit codes: 0 done; " in said
+        assert not re.search(r"[{}]|\[\[", said.splitlines()[0]), "a usage line without doubled brackets"
 
 
 def test_the_first_sentence_of_a_docstring():

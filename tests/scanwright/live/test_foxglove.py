@@ -338,7 +338,7 @@ def test_a_client_hears_from_the_server_what_it_hears_from_the_one_of_foxglove()
     with serving() as (server, said):
         assert dialogue(server.port, server.log) == expected
         assert url.replace(port, str(server.port)) in said[0]
-        until(lambda: not server.heard)  # the client has gone
+        until(lambda: not server.has_subscribers)  # the client has gone
 
 
 def test_malformed_messages_of_a_client_do_no_harm():
@@ -365,9 +365,9 @@ def test_malformed_messages_of_a_client_do_no_harm():
         for message in evil:
             client.send(message)
         client.ping().wait(BOUND_S)
-        assert not server.heard
+        assert not server.has_subscribers
         client.send(json.dumps({"op": "subscribe", "subscriptions": many}))
-        until(lambda: server.heard)
+        until(lambda: server.has_subscribers)
         client.ping().wait(BOUND_S)
         (known,) = server._clients
         assert len(known.topics) == 64
@@ -379,7 +379,7 @@ def test_a_client_that_does_not_read_loses_the_oldest_and_holds_up_nobody():
         connect(server.address, subprotocols=[SUBPROTOCOL], compression=None, max_queue=1, max_size=None) as client,
     ):
         client.send('{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1}]}')
-        until(lambda: server.heard)
+        until(lambda: server.has_subscribers)
         for number in range(2 * BACKLOG):
             server.log("/a", struct.pack("<I", number) + bytes(10_000), number)
         (known,) = server._clients

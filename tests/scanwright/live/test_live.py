@@ -340,12 +340,12 @@ def test_two_clicks_are_a_length_and_a_third_begins_anew():
     with guarded_server("a page") as (server, _):
         ruler = Ruler(server, lambda: [points])
         ruler.click(np.zeros(3), np.array([1.0, 0, 0]))
-        assert ruler.said == ""
+        assert ruler.text == ""
         ruler.click(np.zeros(3), np.array([0.0, 0, -1]))  # at nothing
         ruler.click(np.zeros(3), np.array([4.0, 3, 0]))
-        assert ruler.said == "3.000 m"
+        assert ruler.text == "3.000 m"
         ruler.click(np.zeros(3), np.array([4.0, 0, 1]))
-        assert ruler.said == ""
+        assert ruler.text == ""
 
 
 def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_path):
@@ -370,7 +370,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
                 page.mouse.up()
                 with suppress(AssertionError):
                     until(lambda number=number: len(view.ruler.ends) == number, 3)
-        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.said)
+        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.text)
         with page.expect_download() as download:
             page.get_by_role("button", name="Save what is seen").click()
         assert download.value.suggested_filename == "hall.ply"

@@ -263,7 +263,7 @@ def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     studio, gate = studio
     page = shown(browser, gate.address, *size, color_scheme=scheme)
     page.get_by_text("exact").wait_for()
-    studio.say("what is refused", bad=True)
+    studio.show("what is refused", bad=True)
     studio.controls.painting.value = True  # the line of its mode stands on the view
     page.get_by_role("status").get_by_text("Painting").wait_for()
     for tab in ("Angles", "Paint", "Compare", "View", "Save"):
@@ -275,7 +275,7 @@ def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     assert contrast(word, page.evaluate(GROUND, open_tab)) >= 4.5  # which axe-core does not see
     assert page.evaluate(GROUND, "canvas[data-engine]") == {"light": [255, 255, 255], "dark": [20, 20, 20]}[scheme]
     studio.controls.painting.value = False
-    studio.say("")
+    studio.show("")
     page.get_by_role("tab", name="Angles").click()
     page.get_by_role("slider", name="beta_rot").wait_for()  # by the name that a screen reader says
     harmless(browser)

@@ -203,10 +203,10 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
             raise RuntimeError("a fault of one wish")
 
     newest = LatestOnly("test", work, rested.append, rest_s=0.01)
-    newest.wish(0)
+    newest.request(0)
     assert begun.wait(10)
     for wish in range(1, 50):
-        newest.wish(wish)
+        newest.request(wish)
     gate.set()
     assert newest.settled(10)
     assert (done, rested, newest.replaced) == ([0, 49], [49], 48)

@@ -138,11 +138,11 @@ def test_a_worker_keeps_results_only_in_the_folder_of_its_client(tmp_path):
     results = open_results(tmp_path / "results")
     asked = unit("one", dict, {"status": "built"})
     done = do(asked, results, program(), 10.0)
-    assert done.kept and done.seconds is not None
+    assert done.stored and done.seconds is not None
     assert results.get(asked.address) == {"status": "built"}
     assert do(asked, results, program(), 10.0).seconds is None  # looked up
     for elsewhere in (Results(results.folder, "another mark"), Results(tmp_path / "elsewhere", results.mark)):
-        assert not do(asked, elsewhere, program(), 10.0).kept
+        assert not do(asked, elsewhere, program(), 10.0).stored
     cut_off = results.folder / "cd" / f"{'cd' * 32}.json"
     cut_off.parent.mkdir()
     cut_off.write_text('{"status": "bu')  # by a file system that lost its end
