@@ -63,7 +63,7 @@ class OwnBody:
         return nearest, np.abs(self.bearing_rad[nearest] - folded) <= step
 
 
-def own_body_beside(angles: Path) -> OwnBody | None:
+def own_body_of(angles: Path) -> OwnBody | None:
     """The mask in the folder of an angle set; None where there is none.
 
     Raises:

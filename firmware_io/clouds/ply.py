@@ -138,8 +138,8 @@ class PlyHeader:
     @property
     def width(self) -> int:
         """Rows of a scan of an organised cloud, 0 of a flat one."""
-        told = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
-        width, height = int(told.get("width", 0)), int(told.get("height", 0))
+        sizes = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
+        width, height = int(sizes.get("width", 0)), int(sizes.get("height", 0))
         return width if height > 1 and width * height == self.rows else 0
 
 

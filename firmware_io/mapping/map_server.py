@@ -16,7 +16,7 @@ _SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
 _THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
 
 
-def image_beside(path: Path) -> Path:
+def image_path(path: Path) -> Path:
     """Where the PGM of a map stands."""
     return path.with_suffix(".pgm")
 
@@ -30,7 +30,7 @@ def check_map_place(path: Path) -> None:
     check_place(path, RecordingError)
     if path.suffix not in (".yaml", ".yml"):
         raise RecordingError(f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm beside it")
-    check_place(image_beside(path), RecordingError)
+    check_place(image_path(path), RecordingError)
 
 
 def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
@@ -43,7 +43,7 @@ def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
         RecordingError: it cannot be written there.
     """
     check_map_place(path)
-    image = image_beside(path)
+    image = image_path(path)
     rows, columns = grid.cells.shape
     shades = np.zeros(256, np.uint8)
     for value, shade in _SHADES.items():

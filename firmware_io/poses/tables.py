@@ -81,9 +81,9 @@ def lines_of(path: Path) -> list[str]:
 
 
 def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
-    found = [column for column, heading in enumerate(names) if heading in known]
-    if len(found) != 1:
+    columns = [column for column, heading in enumerate(names) if heading in known]
+    if len(columns) != 1:
         raise RecordingError(
-            f"{path}: {len(found)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
+            f"{path}: {len(columns)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
         )
-    return found[0]
+    return columns[0]

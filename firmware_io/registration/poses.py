@@ -59,24 +59,24 @@ def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
         RecordingError: the file does not hold that, or its comments name other clouds.
     """
     text = foreign(f"{path}: cannot read", read_text, path)
-    lines, said = [], []
+    lines, notes = [], []
     above = ""
     for line in map(str.strip, text.splitlines()):
         if line and not line.startswith("#"):
             lines.append(line)
-            said.append(above)
+            notes.append(above)
         above = line[1:].strip() if line.startswith("#") and "qw" not in line.split() else ""
     if len(lines) != len(names):
         raise RecordingError(f"{path}: {len(lines)} poses for {len(names)} clouds; one line for each, in their order")
     rows = foreign(f"{path}: a line is time x y z qx qy qz qw", np.loadtxt, lines, ndmin=2)
     if rows.shape != (len(names), 8) or not np.isfinite(rows).all():
         raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers")
-    if all(said):
-        if sorted(said) != sorted(names):
+    if all(notes):
+        if sorted(notes) != sorted(names):
             raise RecordingError(
-                f"{path}: its comments name {', '.join(said)}, the clouds are {', '.join(names)}: "
+                f"{path}: its comments name {', '.join(notes)}, the clouds are {', '.join(names)}: "
                 "leave the comments out where the order is the same"
             )
-        rows = rows[[said.index(name) for name in names]]
+        rows = rows[[notes.index(name) for name in names]]
     with of_file(path):
         return [pose_matrix(row[1:]) for row in rows]

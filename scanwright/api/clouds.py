@@ -138,4 +138,4 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organi
         RecordingError: the format is not known or cannot hold this, or the file cannot be written.
     """
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
-    return list(write_clouds(Path(path), [record], organised=organised).said)
+    return list(write_clouds(Path(path), [record], organised=organised).notes)

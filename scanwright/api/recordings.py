@@ -15,7 +15,7 @@ from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.options import DEFAULT, AssembleOptions
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.clouds.formats import check_target
 from scanwright.firmware_io.ros import robot_frames
 
@@ -108,7 +108,7 @@ def assemble(
 
         paint = painter(as_task(options.camera), recording, scanner, platform, options.lag_s, organised=organised)
         options = replace(options, organised=True)  # neighbours show how surfaces are turned to the camera
-    own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
+    own_body = None if isinstance(angles, AngleSet) else own_body_of(Path(angles))
     with ExitStack() as stack:
         finished = target.suffix.lower() != ".ply" or finish != Finish()
         folder = Path(stack.enter_context(TemporaryDirectory(dir=target.parent))) if finished else target.parent
@@ -117,7 +117,7 @@ def assemble(
         if paint is not None:
             remarks += [paint(cloud).line(cloud) for cloud in summary.clouds]
             summary = summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
-        summary = replace(summary, said=(*summary.said, *remarks))
+        summary = replace(summary, notes=(*summary.notes, *remarks))
         if finished:
             summary = finish_clouds(summary, target, finish, seen_from(scanner, platform), organised=organised)
     return summary
@@ -170,14 +170,14 @@ def calibrate(
     check_place(target, RecordingError)
     if not isinstance(angles, AngleSet) and target.resolve() == Path(angles).resolve():
         raise RecordingError(f"{target}: contains the angles to calibrate; write to another file")
-    own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
+    own_body = None if isinstance(angles, AngleSet) else own_body_of(Path(angles))
     source = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
     urdf = robot_frames.calibrated_urdf_place(target)
     designed = source if source and source.is_file() and source.resolve() != urdf.resolve() else None
     if designed:
         robot_frames.with_frames(robot_frames.read_urdf(designed), before, str(designed))  # refused before the work
     paths = [Path(recording) for recording in recordings]
-    result = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, say=progress)
+    result = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, progress=progress)
     if designed:
         robot_frames.write_calibrated_urdf(designed, urdf, result.angles)
     fixed = robot_frames.fixed_frames(result.angles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, show, show_json
+from scanwright.cli.console import ConsoleProgress, show, show_result
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
@@ -32,6 +33,7 @@ def import_(
     ] = None,
     hold: Annotated[bool, Option("--hold", help="The axis was at rest during each scan.")] = False,
     also: Annotated[list[str] | None, Option(metavar="TOPIC", help="Topic to copy, such as /odom; repeatable.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Convert a ROS bag to a Scanwright recording.
 
@@ -40,7 +42,7 @@ def import_(
     from scanwright import api
 
     summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or ())
-    show(summary.lines())
+    show_result(summary.lines, asdict(summary), as_json)
 
 
 @app.command(example="repair rec.mcap")
@@ -49,6 +51,7 @@ def repair(
     out: Annotated[
         Path | None, Option("--out", "-o", metavar="FILE.mcap", help="Output [default: NAME.repaired.mcap].")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Recover a damaged or truncated recording.
 
@@ -57,7 +60,8 @@ def repair(
     from scanwright.firmware_io.recording.repair.repair import repair, repaired_place
 
     target = out or repaired_place(recording)
-    show(repair(recording, target).lines(recording, target))
+    summary = repair(recording, target)
+    show_result(lambda: summary.lines(recording, target), asdict(summary) | {"out": target}, as_json)
 
 
 @app.command(example="assemble rec.mcap --angles out/ground_ahead/angles.json -o cloud.ply")
@@ -70,6 +74,7 @@ def assemble(
     straight: Annotated[bool, Option("--straight", help="Interpolate joint angles linearly.")] = False,
     columns: Annotated[str, Option(metavar="LIST", help="Columns besides x,y,z.")] = ",".join(COLUMNS),
     camera: Annotated[Path | None, Option(metavar="TASK", help="Colour points with images of its [camera].")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Assemble a point cloud from a recording.
 
@@ -79,7 +84,7 @@ def assemble(
 
     names = tuple(name.strip() for name in columns.split(",") if name.strip())
     summary = api.assemble(recording, angles, out, options, smooth=not straight, columns=names, camera=camera)
-    show(summary.lines())
+    show_result(summary.lines, asdict(summary), as_json)
 
 
 @app.command(example="calibrate rec.mcap --angles out/t/angles.json -o out/t/angles.calibrated.json")
@@ -99,10 +104,7 @@ def calibrate(
     from scanwright import api
 
     result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
-    if as_json:
-        show_json(result.record)
-    else:
-        show(result.lines())
+    show_result(result.lines, result.record, as_json)
 
 
 @app.command(example="register a.ply b.ply -o merged.ply", no="a cloud could not be aligned")
@@ -118,6 +120,7 @@ def register(
     ] = None,
     spacing_m: Annotated[float, Option(metavar="M", help="Point spacing for alignment.")] = 0.1,
     map_spacing_m: Annotated[float, Option(metavar="M", help="Point spacing of the merged cloud.")] = 0.02,
+    as_json: AsJson = False,
 ) -> None:
     """Align point clouds and merge them.
 
@@ -135,7 +138,8 @@ def register(
         map_spacing_m=map_spacing_m,
         progress=ConsoleProgress(),
     )
-    show(result.lines())
+    record = {"complete": result.complete, "points": result.points, "files": result.wrote, "notes": result.notes}
+    show_result(result.lines, record, as_json)
     raise typer.Exit(0 if result.complete else 1)
 
 
@@ -155,6 +159,7 @@ def map_(
         float | None,
         Option(metavar="M", help="Drop moving objects: beams passed by more than this; 0.1 is usual."),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Create a Nav2 occupancy grid from point clouds.
 
@@ -175,7 +180,8 @@ def map_(
         seen_through_m=seen_through_m,
         progress=ConsoleProgress(),
     )
-    show(summary.lines())
+    record = {"points": summary.points, "moved": summary.moved, "files": summary.wrote, "notes": summary.notes}
+    show_result(summary.lines, record, as_json)
 
 
 @app.command(example="convert cloud.ply cloud.laz")

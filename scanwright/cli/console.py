@@ -100,8 +100,10 @@ def styled(text: str, style: str, stream: IO[str] | None = None) -> str:
 def show(lines: Iterable[str]) -> None:
     """Print results on standard output, and the warnings among them on standard error."""
     _end_bar()
-    for line in lines:
-        if line.startswith("warning: "):  # until no result of a lower package is a list of lines
+    warning = False
+    for line in lines:  # goes when no result of a lower package is a list of lines
+        warning = line.startswith("warning: ") or (warning and line.startswith(" "))
+        if warning:
             warn([line.removeprefix("warning: ")])
         else:
             print(line)
@@ -144,8 +146,16 @@ def name_options(options: dict[str, str]) -> None:
 
 
 def show_json(value: Any) -> None:
-    """One JSON object, on standard output."""
-    print(json.dumps(value, indent=2))
+    """Print one JSON object on standard output; paths become texts."""
+    print(json.dumps(value, indent=2, default=str))
+
+
+def show_result(lines: Callable[[], Iterable[str]], record: Any, as_json: bool) -> None:
+    """Print a result as lines, or its record as one JSON object."""
+    if as_json:
+        show_json(record)
+    else:
+        show(lines())
 
 
 def hint(line: str) -> None:

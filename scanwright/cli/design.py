@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
-from scanwright.cli.console import ConsoleProgress, hint, show, show_json
+from scanwright.cli.console import ConsoleProgress, hint, show, show_json, show_result
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
@@ -150,11 +150,9 @@ def compare(
     built = as_built_scanner(task)
     loaded = api.load_task(task) if built is None else built.loaded
     result = write_comparison(loaded, out / loaded.task.name, ConsoleProgress(), built)
-    if as_json:
-        gains = [gain.facts() for gain in result.optimum.gains]
-        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in result.rows], "gains": gains})
-    else:
-        show(result.lines())
+    gains = [gain.facts() for gain in result.optimum.gains]
+    record = {"task": loaded.task.name, "rows": [asdict(row) for row in result.rows], "gains": gains}
+    show_result(result.lines, record, as_json)
 
 
 Kind = Literal["lidar", "servo", "slip_ring", "bearing", "belt", "printer", "multibeam"]
@@ -185,10 +183,8 @@ def catalogue(
             max_price_usd=max_price_usd,
         )
     )
-    if as_json:
-        show_json({"products": [product.facts() for product in listed]})
-    else:
-        show(listed[0].lines() if name else table_lines(listed))
+    record = {"products": [product.facts() for product in listed]}
+    show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
 
 
 @app.command(example="schema > task.schema.json")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, closing, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -11,11 +11,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from scanwright.cli.arguments import AllowOrigin, BuildFolder, Intensity, Lidar, Rate, ServoId, ServoPort
-from scanwright.cli.console import ConsoleProgress, exit_code, high_priority, print_error, require_pages, show
+from scanwright.cli.arguments import AllowOrigin, AsJson, BuildFolder, Intensity, Lidar, Rate, ServoId, ServoPort
+from scanwright.cli.console import (
+    ConsoleProgress,
+    exit_code,
+    high_priority,
+    print_error,
+    require_pages,
+    show,
+    show_json,
+)
 from scanwright.cli.help import Commands
-from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
+from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
 from scanwright.design.errors import ScanwrightError, notes_of, require
+from scanwright.design.findings import errors_in
 from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
@@ -72,11 +81,12 @@ def emulate(
         high_priority(),
         emulated_scanner(
             angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed, factory_servo=factory_servo
-        ) as twins,
-        announced(out, twins.ports),
+        ) as emulators,
+        announced(out, emulators.ports),
     ):
-        print(f"lidar {angles.sensor} at {' and '.join(filter(None, [twins.ports.lidar, twins.lidar.address]))}")
-        print(f"servo {angles.servo} at {twins.ports.servo}")
+        places = filter(None, [emulators.ports.lidar, emulators.lidar.address])
+        print(f"lidar {angles.sensor} at {' and '.join(places)}")
+        print(f"servo {angles.servo} at {emulators.ports.servo}")
         print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
         Event().wait()
 
@@ -232,30 +242,31 @@ def doctor(
     servo_id: ServoId = None,
     fix: Annotated[bool, Option("--fix", help="Correct servo settings; saves the old ones.")] = False,
     restore: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Diagnose the connected lidar and servo.
 
-    Reads only, unless --fix or --restore is node_arguments.
+    Reads only, unless --fix or --restore is given.
     """
-    from itertools import chain
-
-    from scanwright.firmware_io.scan import doctor as examination
+    from scanwright.firmware_io.scan import doctor as diagnosis
+    from scanwright.firmware_io.servo import settings
 
     if restore is not None:
-        findings = examination.restore(restore, servo)
-    else:
-        fixed = examination.fix(out, servo, servo_id) if fix else iter(())
-        findings = chain(fixed, examination.examine(out, lidar, servo, servo_id))
-    wrong = False
-    for finding in findings:
-        remedy = ""
-        if finding.set_up is not None and finding.undo is not None:
-            remedy = f": `{undo_command(finding.set_up, finding.undo)}` restores them"
-        elif finding.set_up is not None:
-            remedy = f": `{set_up_command(finding.set_up, out, servo_id)}` sets it"
-        print(f"{finding.verdict:8} {finding.says}{remedy}", flush=True)
-        wrong |= finding.verdict == "wrong"
-    raise typer.Exit(1 if wrong else 0)
+        print_steps("", settings.restore(restore, servo))
+        return
+    if fix:
+        print_steps(*diagnosis.fix(out, servo, servo_id))
+    findings = []
+    for finding in diagnosis.examine(out, lidar, servo, servo_id):
+        hint = finding.hint
+        if finding.code == diagnosis.SERVO_SETTING:
+            hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
+        findings.append(replace(finding, hint=hint))
+        if not as_json:
+            print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
+    if as_json:
+        show_json({"findings": [asdict(finding) for finding in findings]})
+    raise typer.Exit(1 if errors_in(findings) else 0)
 
 
 @app.command("servo-setup", example="servo-setup /dev/ttyUSB0 --id 1 --baud 1000000")

@@ -20,6 +20,7 @@ from scanwright.cli.console import (
     print_note,
     show,
     show_json,
+    show_result,
     verbosity,
     warn,
 )
@@ -37,6 +38,7 @@ def build(
     task: TaskFile,
     out: Out = Path("out"),
     check: Annotated[bool, Option("--check", help="Rebuild the folder TASK elsewhere and compare.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Generate parts, drawings, parts list and report.
 
@@ -57,7 +59,9 @@ def build(
         print_note("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
     _print_failed_checks(built.checks)
-    show(built.lines(in_full=verbosity() is Verbosity.VERBOSE))
+    record = {"folder": built.folder, "files": built.files, "warnings": built.warnings, "misfits": built.misfits}
+    record |= {"checks": [asdict(each) for each in built.checks]}
+    show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     warn(built.misfits)
     report = built.folder / "report.html"
     if built.failed:

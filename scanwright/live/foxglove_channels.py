@@ -26,7 +26,7 @@ from scanwright.firmware_io.ros.point_rows import point_rows
 from scanwright.firmware_io.ros.robot_frames import fixed_frames
 from scanwright.firmware_io.samples import JointSample, Scan
 
-_DESCRIBED_NS = 1_000_000_000
+_DESCRIBED_NS = 1_000_000_000  # a viewer that connects later waits at most a second for the description
 _ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew
 Log = Callable[[str, bytes, int], None]
 """Takes a topic, a message, and its time in ns."""
@@ -99,7 +99,7 @@ class FoxgloveChannels:
         self._log(SCAN_TOPIC, ros_messages.encode_scan(replace(scan, stamp_ns=at_ns)), at_ns)
         self._push(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """Nothing: no channel is of words."""
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Float32s, Vector
 
 REACH_RAD = np.radians(1.0)  # of a click about its ray
-COLOUR = (224, 49, 49)
+COLOUR = (224, 49, 49)  # red: no colour scale of the points contains it
 
 
 def nearest_to_ray(

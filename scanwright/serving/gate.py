@@ -36,7 +36,7 @@ from websockets.http11 import Request, Response
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
 
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
-MOST_TEXT = 200
+MOST_TEXT = 200  # characters of a text, entries of a list: more than our pages send
 PAGE_MESSAGES = (
     "ViewerCameraMessage",
     "GuiUpdateMessage",

@@ -16,7 +16,7 @@ from websockets.http11 import Response
 
 from scanwright.design.errors import TaskError
 
-MOST_VISITORS = 8
+MOST_VISITORS = 8  # more than the windows of one person
 
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9.:\[\]-]+")
 

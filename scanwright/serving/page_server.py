@@ -19,7 +19,7 @@ from websockets.asyncio.server import ServerConnection
 
 from scanwright.serving.gate import MOST_BYTES, Answer, Gate
 
-BRAND = (35, 77, 140)
+BRAND = (35, 77, 140)  # dark blue, readable under white text
 
 
 @contextmanager

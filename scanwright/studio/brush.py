@@ -15,7 +15,7 @@ from scanwright.studio.view.coloured_sphere import RADIUS_M, direction_hit
 from scanwright.studio.view.view_3d import View3D
 
 STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
-LEAST_DEG, MOST_DEG = 1.0, 60.0
+LEAST_DEG, MOST_DEG = 1.0, 60.0  # radius of a dab; as the slider
 
 Paint = Callable[[tuple[Dab, ...], int], None]
 """Takes all dabs as they are now, and the number of the stroke that laid the last one."""

@@ -11,7 +11,7 @@ from scanwright.design.task.angle_ranges import NAMES
 from scanwright.studio.state import Canvas, Setting
 
 JOINED_S = 1.0  # changes of one thing that follow each other this closely are one step: a slider that is dragged
-MOST_STEPS = 500
+MOST_STEPS = 500  # more than a person takes back
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.studio.page import Studio
 
 _LOG = logging.getLogger(__name__)
-ALONE_S = 300.0
+ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 
 
 def run_studio(loaded: LoadedTask, *, port: int, out: Path, progress: Progress) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanwright.study.front import COLUMNS
 
-DPI = 110
+DPI = 110  # readable at its own size on a screen
 MOST = 20_000  # rows that a picture shows; more are a blot
 NAMED = 12  # members of a front that get their name
 

@@ -31,7 +31,7 @@ STATUSES = {
     "failed": "could not be finished",
 }
 GROUP = 10_000  # rows of a Parquet group, which is what is held in memory
-MOST_REASONS = 5
+MOST_REASONS = 5  # lines that a person reads; the table has all
 
 
 def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:

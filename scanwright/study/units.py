@@ -24,7 +24,7 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-TRIES = 3
+TRIES = 3  # one for a worker killed by chance, one more for a second one
 TICK_S = 5.0  # between two words on a long silence
 DEATHS = ("BrokenProcessPool", "KilledWorker")  # by name: Dask need not be there
 

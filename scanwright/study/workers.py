@@ -22,7 +22,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
-CONNECT_S = 10.0
+CONNECT_S = 10.0  # for a scheduler of the network to answer
 ALONE_S = 60.0  # without any worker: a nanny whose worker dies while it starts gives up
 LOOK_S = 5.0  # between two looks at who is there
 

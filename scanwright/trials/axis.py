@@ -17,9 +17,9 @@ from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
 SECONDS = 36.0  # two turns at 20 deg/s
 RATE_HZ = 100.0  # of the encoder
-BEAMS = 400_000
-TURN_RAD_S = math.radians(20)
-STEP_RAD = 2 * math.pi / 4096
+BEAMS = 400_000  # about half of a full scan of 18 s
+TURN_RAD_S = math.radians(20)  # a turn in 18 s, as in the task ground_ahead
+STEP_RAD = 2 * math.pi / 4096  # encoder of 12 bits a turn, as Dynamixel X has
 
 
 def axis_trials(progress: Progress) -> Iterator[Trial]:
@@ -61,7 +61,7 @@ def interpolations(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
         "order 0, last sample": last_sample,
         "order 1, straight": lambda: straight(log),
         "order 3, through samples": cubic,
-        "smoothed": lambda: axis_curve(log, held=False)[0],
+        "smoothed": lambda: axis_curve(log, at_rest=False)[0],
     }
 
 

@@ -24,10 +24,10 @@ from scanwright.firmware_io.emulators.world import furnished_room
 from scanwright.firmware_io.samples import JointLog, Scan
 
 SETTLED = 25.0  # time constants of rotor and load
-GOAL_RAD_S = 1.0
-RINGS_S, RK_STEPS = 0.05, 25_000
+GOAL_RAD_S = 1.0  # a turn in 6.3 s
+RINGS_S, RK_STEPS = 0.05, 25_000  # time of the reference, in steps of 2 us
 BRAKE = 50.0  # stall torques a radian: the spring that holds a blocked horn
-SIZES = 1e-3, 1.0, 1e3, 1e4
+SIZES = 1e-3, 1.0, 1e3, 1e4  # metres of a beam, and scales of a room
 ROTORS_KG_M2 = {"next to nothing": 1e-8, "a screw": 1e-6, "a lidar": 5e-4, "a machine": 0.5, "a car": 50.0}
 
 

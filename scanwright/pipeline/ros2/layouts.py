@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-_LEAST_DECAY_S = 1.0
+_LEAST_DECAY_S = 1.0  # points of a sweep or a stop stay visible
 _RVIZ = """Panels:
   - Class: rviz_common/Displays
     Name: Displays

@@ -19,9 +19,9 @@ from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 
-DRAG_NODES = 2187
-DRAG_PERIOD_NODES = 243
-WALL_M = 10.0
+DRAG_NODES = 2187  # 3^7, fewer than `NODES`, to follow the hand; the panel shows the larger error
+DRAG_PERIOD_NODES = 243  # 3^5: the search for a period computes J many times
+WALL_M = 10.0  # range at which gaps are given in millimetres
 
 
 @dataclass(frozen=True, slots=True)

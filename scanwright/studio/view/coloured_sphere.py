@@ -16,11 +16,11 @@ from scanwright.design.sphere.regions import Field
 from scanwright.serving.style import Colours, ramp
 
 TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second
-RADIUS_M = 0.5
+RADIUS_M = 0.5  # of the sphere of densities about the scanner
 OVERLAP = 1.25  # of the hexagons, so that no seam shows
-BLIND = (236, 236, 240)
+BLIND = (236, 236, 240)  # directions that no beam enters: a grey that is not in the scale
 LEAST_OF_HIGHEST = 300  # the scale of `density.png`
-EDGE_STEP_DEG = 1.0
+EDGE_STEP_DEG = 1.0  # between the corners of a drawn outline
 
 
 @dataclass(frozen=True, slots=True)

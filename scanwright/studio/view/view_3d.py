@@ -27,11 +27,11 @@ SIDES: dict[Look, Literal["front", "back"]] = {
     "hidden": "back",
 }
 AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body has its own colour at pi
-SPHERE_EYE_M = (-0.75, 0.95, 0.65)
+SPHERE_EYE_M = (-0.75, 0.95, 0.65)  # behind, left and above: ahead points away from the viewer
 MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
 WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
-POINT_M = 0.012
+POINT_M = 0.012  # as in the page of a scan, `live.cloud_view`
 GHOST = 0.25  # opacity of parts that belong to an earlier setting
 
 

@@ -1,9 +1,12 @@
 """The terminal: what a person sees there, what a file gets instead, and how little either can be."""
 
 import io
+import json
 import logging
 import pickle
 import re
+from dataclasses import asdict
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +14,7 @@ from scanwright.cli import console
 from scanwright.cli.console import ConsoleProgress, Verbosity, command_console, hint, set_verbosity, show
 from scanwright.cli.help import GroupedHelp, first_sentence
 from scanwright.design.errors import DeviceFaultError, NumericalError, RecordingError, TaskError
+from scanwright.firmware_io.recording.importer import ImportSummary
 
 
 class Terminal(io.StringIO):
@@ -77,6 +81,19 @@ def test_a_bar_fits_on_its_line(screen, monkeypatch):
     screen = screen()
     ConsoleProgress(Clock())("counting what cannot be counted in any reasonable time at all", 0.5)
     assert len(screen.lines()) == 1 and len(screen.lines()[-1]) == 59
+
+
+def test_warnings_among_results_go_to_standard_error(capsys):
+    show(["result", "warning: measure these:", "  MX-64R: mass_g", "more"])
+    assert capsys.readouterr() == ("result\nmore\n", "warning: measure these:\n  MX-64R: mass_g\n")
+
+
+def test_a_result_as_json_is_its_record(command, monkeypatch):
+    summary = ImportSummary(Path("r.mcap"), 2, 40, 9, 0.1, (0.0, 1.5), {"no_angle": 1}, ("late",))
+    monkeypatch.setattr("scanwright.api.import_bag", lambda *_, **__: summary)
+    words = ("import", "a.bag", "--scan", "/scan", "--angle", "/joint_states:pan", "-o", "r.mcap")
+    code, out, _ = command(*words, "--json")
+    assert code == 0 and json.loads(out) == json.loads(json.dumps(asdict(summary) | {"out": "r.mcap"}))
 
 
 def test_logged_warnings_are_printed_in_every_verbosity(capsys):
