@@ -87,7 +87,7 @@ def with_say(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def as_built_scanner(task: TaskLike) -> BuiltScanner | None:
-    """Return what a build folder holds; None if the task is given in another form. Raises as `open_built`."""
+    """Return the scanner of a build folder; None if the task has another form. Raises as `open_built`."""
     if not isinstance(task, str | Path):
         return None
     from scanwright.pipeline.built_scanner import is_build_folder, open_built
@@ -96,10 +96,10 @@ def as_built_scanner(task: TaskLike) -> BuiltScanner | None:
 
 
 def as_task(task: TaskLike) -> LoadedTask:
-    """The task, loaded if it is not yet; raises as `load_task`."""
+    """Return the task, loaded if it is not yet; raises as `load_task`."""
     return task if isinstance(task, LoadedTask) else load_task(task)
 
 
 def as_angle_set(angles: AnglesLike) -> AngleSet:
-    """The angle set, read if it is a file; raises as `load_angles`."""
+    """Return the angle set, read if it is a file; raises as `load_angles`."""
     return angles if isinstance(angles, AngleSet) else load_angles(Path(angles))

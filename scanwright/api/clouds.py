@@ -109,12 +109,12 @@ def read_cloud(path: str | Path) -> Cloud:
 
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
-        RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
+        RecordingError: the format is unknown, the file does not match its suffix, or it contains several clouds.
     """
     clouds, _unread = read_clouds(Path(path))
     if len(clouds) != 1:
         raise RecordingError(
-            f"{path}: holds {len(clouds)} clouds, not one: firmware_io.clouds.formats.read_clouds reads all"
+            f"{path}: contains {len(clouds)} clouds, not one; firmware_io.clouds.formats.read_clouds reads all"
         )
     return clouds[0]
 
@@ -122,8 +122,8 @@ def read_cloud(path: str | Path) -> Cloud:
 def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organised: bool = False) -> list[str]:
     """Write a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
 
-    Rows without a point are left out, unless the cloud is organised and the format says what its rows and columns are
-    (PCD, E57, NPZ).
+    Rows without a point are dropped, unless the cloud is organised and the format stores rows and columns (PCD, E57,
+    NPZ).
 
     Args:
         path: the file.
@@ -131,11 +131,11 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organi
         organised: keep the rows and columns of an organised cloud in PLY and XYZ too, in comments.
 
     Returns:
-        What the format cannot hold, one sentence each.
+        Data that the format cannot store, one sentence each.
 
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
-        RecordingError: the format is not known or cannot hold this, or the file cannot be written.
+        RecordingError: the format is unknown or cannot store this, or the file cannot be written.
     """
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
     return list(write_clouds(Path(path), [record], organised=organised).notes)

@@ -1,4 +1,4 @@
-"""From angles to parts, and whether they hold."""
+"""Build folders, parts and their checks."""
 
 from __future__ import annotations
 
@@ -23,18 +23,17 @@ _LOG = logging.getLogger(__name__)
 
 @with_say
 def build(task: TaskLike, out: str | Path = "out", *, progress: Progress = no_progress) -> Build:
-    """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
+    """Generate angles, parts, drawings, parts list, frame chain and report of a task into `out/<task>/`.
 
-    Nothing is done if the folder already holds the build of this very task.
+    Does nothing if the folder is up to date.
 
     Returns:
-        The build. Every file is written even if checks of the parts fail: do not make the parts if `failed` is not
-        empty.
+        The build. Every file is written even if checks fail: do not make the parts unless `failed` is empty.
 
     Raises:
         InstallError: the CAD kernel is not installed.
         TaskError: as for `optimise`.
-        BuildError: no setting can be built, or the folder cannot be written.
+        BuildError: no mount can be built, or the folder cannot be written.
     """
     require_kernel("build")
     loaded = as_task(task)
@@ -43,15 +42,15 @@ def build(task: TaskLike, out: str | Path = "out", *, progress: Progress = no_pr
 
 @with_say
 def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_progress) -> Assembly:
-    """Make the parts of a scanner in memory, in the rotation frame [mm], without labels.
+    """Generate the parts of a scanner in memory, in the rotation frame [mm], without labels.
 
     Args:
-        task: whose printer and deck the parts are for.
+        task: a task; its printer and deck determine the parts.
         angles: angle set of the scanner, such as `optimise(task).angle_set()`.
         progress: progress callback.
 
     Returns:
-        Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
+        The assembly: cadquery solids by name, such as `made["alignment_linkage"]`; `bought` are the purchased products.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -69,14 +68,14 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
 
 @with_say
 def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Check]:
-    """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
+    """Check the parts of a build folder: clearance, beams, loads, printing. A failed check has severity "error".
 
-    The parts are made again from `task.toml` and `angles.json`; a folder may hold these two alone.
+    The parts are generated from `task.toml` and `angles.json`; no other file is required.
 
     Raises:
         InstallError: the CAD kernel is not installed.
         TaskError: the folder has no angle set or no task.
-        BuildError: a file of the build is gone or was edited, or a part cannot be made.
+        BuildError: a file of the build is missing or was edited, or a part cannot be made.
     """
     require_kernel("check")
     folder = Path(folder)

@@ -1,4 +1,4 @@
-"""From a task to the mounting angles, and what they are worth."""
+"""Optimise, evaluate and compare mounting angles."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 @with_say
 def optimise(task: TaskLike, *, progress: Progress = no_progress) -> Optimum:
-    """Search all mounting angles of a task.
+    """Find the best mounting angles of a task.
 
     Args:
-        task: what the scanner shall see.
+        task: lidar, servo, motion and region to see.
         progress: progress callback.
 
     Returns:
-        The best families of settings, `optimum.search.best`, the best one first; `optimum.angle_set()` is what parts
-        and frame chain are made from.
+        The optimum: `search.best` are the best groups of equivalent mounts, best first; `angle_set()` is the input of
+        parts and frame chain.
 
     Raises:
-        TaskError: the task is malformed, no direction has a weight, or no setting keeps its limits.
+        TaskError: the task is malformed, no direction has a weight, or no mount satisfies its limits.
 
     Example:
         >>> import scanwright as sw
@@ -55,11 +55,11 @@ def evaluate(
     lever: Lever | str | None = None,
     progress: Progress = no_progress,
 ) -> Evaluation:
-    """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
+    """Evaluate given mounting angles, by the closed form and by a brute-force count of beams.
 
     Args:
-        task: what the scanner shall see, or a build folder: then `Evaluation.as_built` is with its parts.
-        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; those of the build folder if none are given.
+        task: a task; of a build folder, `Evaluation.as_built` includes its parts.
+        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; None uses those of the build folder.
         pole: computes the chance to hit this upright pole; a text as in version 0.1 still works.
         lever: offset of the optical centre from the axis, as seen at a range; a text as in version 0.1 still works.
         progress: progress callback.
@@ -89,9 +89,9 @@ def evaluate(
 
 @with_say
 def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimum, list[ComparisonRow]]:
-    """Put the optimum of a task beside the reference mounts, the scanner for little money, and ready-made ones.
+    """Compare the optimum of a task with reference mounts, a cheap scanner and 3D lidars.
 
-    Every row is without parts, but that of a build folder, which is the first one if the task is given as its folder.
+    Rows do not include parts, except the first row of a build folder.
 
     Raises:
         TaskError: as for `optimise`.
@@ -107,14 +107,14 @@ def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimu
 
 
 def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:
-    """Draw how many beams of a full scan fall within the ball around each direction, a map for each setting.
+    """Draw maps of the beam density of a full scan, one for each mount.
 
     Args:
-        task: what the scanner shall see: its region and its masks are drawn in.
+        task: a task; its region and masks are outlined.
         settings_deg: title of a map -> its (alpha_rot, beta_rot, alpha_laser, beta_laser).
 
     Raises:
-        TaskError: the task is malformed, a setting is not four angles, or no direction has a weight.
+        TaskError: the task is malformed, a mount is not four angles, or no direction has a weight.
 
     Example:
         >>> import scanwright as sw

@@ -101,7 +101,7 @@ def _prompted(
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
         of_kind = chosen(products, kind=kind)
         show(table_lines(of_kind)[:-2])
-        print(f"{DOUBT}: a number that nobody has verified; -: unknown")
+        print(f"{DOUBT}: unverified number; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
     def checked(**answers: Any) -> None:
@@ -117,13 +117,11 @@ def _prompted(
         question = "3. How many metres over the ground is the scanner?"
         height_m = _until(question, None, _number, lambda height: checked(height_m=height))
     if robot is None:
-        print(
-            "   What of the robot is in its way, below it? box:0.6:0.3:0.3 is its length, width and height in metres;"
-        )
+        print("   Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
         print("   or a file with its mesh (STL, OBJ, PLY), or none")
         robot = _until("  ", "none", str, lambda what: checked(robot=what))
     if not see:
-        print("4. What must it see? One or more, with spaces between. Numbers may be changed or left out:")
+        print("4. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4         3 m ahead, 4 m wide                around:30:30  all around, 30 deg up and down")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")

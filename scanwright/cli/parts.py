@@ -68,7 +68,7 @@ def build(
         hint(f"next: read the failed checks in {report}, and change the task")
         raise typer.Exit(1)
     coupon = f"then print {built.folder / 'print/fit_coupon.3mf'} and try it"
-    hint(f"next: open {report}; {'print no part yet, for the reasons above' if built.misfits else coupon}")
+    hint(f"next: open {report}; {'do not print parts yet (see the warnings)' if built.misfits else coupon}")
 
 
 @app.command(example="report out/ground_ahead")

@@ -34,7 +34,7 @@ def print_steps(port: str, steps: Iterable[str | Path]) -> None:
     """Print each change as it is made, and first how to undo them all."""
     for step in steps:
         if isinstance(step, Path):
-            print(f"the old settings are kept; `{undo_command(port, step)}` restores them", flush=True)
+            print(f"the old settings are saved; `{undo_command(port, step)}` restores them", flush=True)
         else:
             print(step, flush=True)
 
@@ -61,7 +61,7 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
         except ServoSetupError as error:
             names = {change.register.name for change in error.changes}
             if names & written:
-                error.add_note("it was written and did not last: the servo has restarted; look at its supply")
+                error.add_note("it was written and lost: the servo has restarted; check its supply")
                 raise
             remedy = f"`{set_up_command(error.port, out, servo_id)}` writes that, and keeps a file to undo it"
             if not (sys.stdin.isatty() and sys.stderr.isatty()):

@@ -1,4 +1,4 @@
-"""A scan for Foxglove: the channels of the recording, and beside them points, frames and the scanner's description.
+"""A scan for Foxglove: the channels of the recording, points, frames and the scanner's description.
 
     /scan /joint_states    as recorded
     /points                sensor_msgs/PointCloud2, one message a scan, in `world`
@@ -75,7 +75,7 @@ class FoxgloveChannels:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: nothing of what came before is assembled with what comes."""
+        """Begin anew: earlier data are not assembled with later ones."""
         self._assembler, self._described_ns, self._joint_ns = self._place(), -(2**62), -(2**62)
 
     def joint(self, time_ns: int, position_rad: float) -> None:

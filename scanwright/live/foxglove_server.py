@@ -1,4 +1,4 @@
-"""A server of Foxglove's websocket protocol, `foxglove.sdk.v1`, for programs and pages of this computer that may look.
+"""A server of Foxglove's websocket protocol, `foxglove.sdk.v1`, for programs and allowed pages of this computer.
 
 The server of Foxglove's SDK checks no Origin, so any page of the browser could read a scan. A relay in front of it
 would leave that server's own port open, which a page can find. Here one server has one port, and checks each handshake.
@@ -48,14 +48,14 @@ _FLUSH_S = 2.0  # at the end, for what clients have not yet taken
 
 @dataclass(eq=False, slots=True)
 class _Client:
-    """A program that listens: number of each subscription -> topic, and messages on their way to it."""
+    """A viewer: number of each subscription -> topic, and the messages to send."""
 
     topics: dict[int, str] = field(default_factory=dict)
     waiting: deque[bytes] = field(default_factory=lambda: deque(maxlen=BACKLOG))
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
     def receive(self, text: str | bytes, topics: tuple[str, ...]) -> None:
-        """Take a message of the client; what is malformed or unknown is dropped."""
+        """Handle a message of the client; malformed and unknown ones are dropped."""
         with suppress(ValueError, TypeError, KeyError, IndexError, RecursionError):
             message: Any = json.loads(text) if isinstance(text, str) else {}
             if message["op"] == "subscribe":
@@ -69,7 +69,7 @@ class _Client:
 
 
 class FoxgloveServer:
-    """Messages out to all who subscribed; made by `foxglove_server`."""
+    """A server that sends messages to all subscribers; made by `foxglove_server`."""
 
     def __init__(
         self,
@@ -105,21 +105,21 @@ class FoxgloveServer:
 
     @property
     def address(self) -> str:
-        """What a viewer opens."""
+        """The address for a viewer."""
         return f"ws://127.0.0.1:{self.port}"
 
     @property
     def app_url(self) -> str:
-        """Foxglove's page, which opens the address by itself."""
+        """The address of Foxglove's page that opens this server."""
         return f"{APP}?ds=foxglove-websocket&ds.url={quote(self.address, safe='')}"
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether somebody has subscribed to anything."""
+        """Whether any viewer has subscribed to a topic."""
         return any(client.topics for client in tuple(self._clients))
 
     def log(self, topic: str, data: bytes, time_ns: int) -> None:
-        """Send a message to those who subscribed to its topic; never waits for one of them."""
+        """Send a message to the subscribers of its topic, without waiting for them."""
         self._loop.call_soon_threadsafe(self._publish, topic, data, time_ns)
 
     def _publish(self, topic: str, data: bytes, time_ns: int) -> None:
@@ -130,7 +130,7 @@ class FoxgloveServer:
                     client.ready.set()
 
     def check(self, _connection: ServerConnection, request: Request) -> Response | None:
-        """Refuse a handshake of a foreign page, and of one viewer too many; None if it may pass."""
+        """Refuse the handshake of a foreign page or of too many viewers; None accepts it."""
         why = foreign(request.headers, local_hosts(self.port), self._origins)
         if not why and len(self._clients) >= MOST_VISITORS:
             why = "too many visitors"

@@ -46,7 +46,7 @@ def view_recording(
     rate: float = 1.0,
     allow_origins: Collection[str] = (),
 ) -> None:
-    """Serve a recording at its own pace to each who begins to listen, until Ctrl-C.
+    """Serve a recording at its own pace to each viewer, until Ctrl-C.
 
     Args:
         recording: MCAP recording.
@@ -153,7 +153,7 @@ def _print(step: str, _fraction: float | None = None, /) -> None:
 
 
 def tell(batch: Batch, watch: Watch) -> None:
-    """Tell a batch in the order in which its things were measured."""
+    """Pass on the data of a batch in the order in which they were measured."""
     angles = [JointSample(*pair) for pair in zip(batch.time_ns.tolist(), batch.position_rad.tolist(), strict=True)]
     ended = [(one.time_ns, one) for one in angles] + [(int(scan.time_ns[-1]), scan) for scan in batch.scans]
     for _, thing in sorted(ended, key=lambda pair: pair[0]):

@@ -1,4 +1,4 @@
-"""A ruler on a cloud that grows: two points are clicked, the distance between them is told."""
+"""A ruler on a growing cloud: the distance between two clicked points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLOUR = (224, 49, 49)  # red: no colour scale of the points contains it
 def nearest_to_ray(
     clouds: Sequence[Float[ndarray, "n 3"]], origin_m: Vector, direction: Vector
 ) -> Float[ndarray, " 3"] | None:
-    """The point that a click means: of those within its reach of the ray the nearest one to the eye; None of none.
+    """Return the point that a click selects: the nearest one to the eye of those near its ray; None if there is none.
 
     Args:
         clouds: points [m].
@@ -41,7 +41,7 @@ def nearest_to_ray(
 
 
 class Ruler:
-    """Button, clicks, line and words. `points` gives what is shown; `ends` are the one or two that were clicked."""
+    """The ruler of a page. `points` returns the points shown; `ends` are the clicked ones."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], Sequence[Float32s]]) -> None:
         self._scene, self._points = server.scene, points
@@ -51,11 +51,11 @@ class Ruler:
 
     @property
     def text(self) -> str:
-        """The distance in words; nothing before the second end."""
+        """The distance as text; empty before the second click."""
         return f"{np.linalg.norm(self.ends[1] - self.ends[0]):.3f} m" if len(self.ends) == 2 else ""
 
     def click(self, origin_m: Vector, direction: Vector) -> None:
-        """Take the point that is meant as the next end; a third one begins anew."""
+        """Use the selected point as the next end; a third one begins anew."""
         end = nearest_to_ray(self._points(), np.asarray(origin_m, float), np.asarray(direction, float))
         if end is None:
             return

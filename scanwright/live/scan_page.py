@@ -1,4 +1,4 @@
-"""The page of a scan in a process of its own, and the way to feed it: the scan must never wait for a browser.
+"""The page of a scan, in a process of its own so that the scan never waits for a browser.
 
 The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
 seconds, so that the first scan is already seen.
@@ -78,7 +78,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
 
 
 def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
-    """What the page's process does: show the cloud, and once it is full, wait until nobody looks at it."""
+    """Show the growing cloud in the page's process, and wait until its last visitor leaves."""
     from scanwright.live.cloud_view import CloudView
     from scanwright.serving.page_server import guarded_server, wait_until_alone
 

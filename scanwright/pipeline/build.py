@@ -1,4 +1,4 @@
-"""The order of a build: task, search, angles, parts, checks, drawings, files, report, into `out/<task>/`."""
+"""The stages of a build: task, search, angles, parts, checks, drawings, files, report, into `out/<task>/`."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files"
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """What the work of one build came to.
+    """The results of one build.
 
     Attributes:
         optimum: the search.
@@ -94,7 +94,7 @@ class Build:
     def lines(self, in_full: bool = False) -> list[str]:
         """Return the result as lines; warnings with the same remedy are one, unless `in_full`."""
         if self.made is None:
-            return [f"{self.folder}: nothing has changed, no work to do ({len(self.files)} files)"]
+            return [f"{self.folder} is up to date ({len(self.files)} files)"]
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
@@ -108,7 +108,7 @@ class Build:
 
 @dataclass(frozen=True, slots=True)
 class PartsMade:
-    """What came of the parts: facts, findings, what was left out, and the parts for those who have the kernel."""
+    """The parts: reports, findings, omissions, and the solids for processes that have the kernel."""
 
     parts: tuple[PartReport, ...]
     findings: tuple[PartFinding, ...]
@@ -121,20 +121,20 @@ def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
 
 
 def _gathered(findings: Sequence[PartFinding]) -> list[str]:
-    """Each finding, but those about a value of a product as one list of what to measure."""
+    """Return each finding as a line; those about values of products as one list of values to measure."""
     to_measure: dict[str, list[str]] = {}
     for finding in findings:
         if finding.value:
             to_measure.setdefault(finding.subject, []).append(finding.value)
     lines = _one_by_one([finding for finding in findings if not finding.value])
     if to_measure:
-        lines.append("warning: measure these on your own before you print, nobody has verified them (-v says more):")
+        lines.append("warning: unverified dimensions; measure your own devices before printing (details: -v):")
         lines += [f"  {product}: {', '.join(values)}" for product, values in to_measure.items()]
     return lines
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
-    """Make the build folder of a task, unless it is current. Failed checks do not raise: see `Build.failed`.
+    """Build the folder of a task, unless it is up to date. Failed checks do not raise: see `Build.failed`.
 
     Args:
         loaded: the task.
@@ -158,7 +158,7 @@ def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
 
 
 def difference_when_rebuilt(folder: Path, progress: Progress) -> str | None:
-    """Build the task of a build folder again, elsewhere: the first difference in words, None where there is none.
+    """Rebuild the task of a build folder elsewhere, and describe the first difference; None if there is none.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -174,7 +174,7 @@ def difference_when_rebuilt(folder: Path, progress: Progress) -> str | None:
 
 
 def setting_built(optimum: Optimum) -> Chosen:
-    """The setting of an optimum that a build takes: the best with what its parts hide.
+    """Return the mount of an optimum that a build chooses: the best one with the beams that its parts block.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -199,7 +199,7 @@ def _chosen(optimum: Optimum, workshop: Workshop, progress: Progress) -> Chosen:
 def _chosen_and_made(
     optimum: Optimum, task_sha256: str, progress: Progress
 ) -> tuple[Chosen, Scanner, Packed[Assembly]]:
-    """The setting, the scanner with it, and its parts."""
+    """Choose the mount, and make the scanner and its parts."""
     from scanwright.cad.assembly.shadow import PartsWorkshop
     from scanwright.cad.layout.layout import mount_offset_mm
     from scanwright.design.search.optimum import angle_set
@@ -214,14 +214,14 @@ def _chosen_and_made(
 
 
 def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
-    """Checks and shadow as files."""
+    """Return the files of the checks and the self-occlusion."""
     from scanwright.cad.checks.run import check_files
 
     return check_files(scanner, assembly.open(), progress)
 
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:
-    """The parts in the folder, with their labels."""
+    """Write the parts with their labels into the folder."""
     from scanwright.cad.files.part_files import build_parts
 
     parts = build_parts(scanner, folder, _at(progress, "parts"), lambda _: assembly.open())
@@ -231,7 +231,7 @@ def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progres
 def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, progress: Progress
 ) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
-    """What goes to the workshop, in the folder, but the drawings; findings, and what was left out."""
+    """Write the files for the workshop except the drawings; returns findings and omissions."""
     from scanwright.cad.files.workshop_files import export_scanner
 
     exports = export_scanner(scanner, parts.open(), folder, _at(progress, "files"))
@@ -239,7 +239,7 @@ def _exported(
 
 
 def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
-    """Drawings as files."""
+    """Return the files of the drawings."""
     from scanwright.cad.drawings.files import drawing_files
     from scanwright.cad.layout.layout import config_hash
 
@@ -249,13 +249,13 @@ def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> 
 
 
 def _at(progress: Progress, stage: str) -> Progress:
-    """Progress of a stage as the share of the build that is done when it begins."""
+    """Return progress that reports the share of the build that is done when a stage begins."""
     share = BEHIND[stage]
     return lambda step, _fraction=None, /: progress(step, share)
 
 
 def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
-    """Make a folder that is not current, and log whose edits are lost by that."""
+    """Build a folder that is not up to date, and log the edits that are lost."""
     edits = changes(target)
     if edits:
         _LOG.warning("%s: %s: built again", target, edits.words())
@@ -263,7 +263,7 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
 
 
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
-    """All of it, in the order in which one thing follows from another."""
+    """Run all stages in order."""
     from scanwright.cad.files.part_files import write_files
     from scanwright.design.evaluation.as_built import as_built
     from scanwright.design.evaluation.metres import on_planes

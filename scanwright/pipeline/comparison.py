@@ -1,4 +1,4 @@
-"""`out/compare/<task>/`: the optimum of a task beside the reference mounts, a cheap scanner and ready-made ones."""
+"""`out/compare/<task>/`: the optimum of a task compared with reference mounts, a cheap scanner and 3D lidars."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Comparison:
     folder: Path
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Return the comparison as lines."""
         return [
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),
@@ -50,5 +50,5 @@ def write_comparison(
         setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
         rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, progress, setting)
         write_csv(folder / "compare.csv", rows)
-        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")
+        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, compared")
     return Comparison(optimum, rows, target)

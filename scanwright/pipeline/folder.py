@@ -1,4 +1,4 @@
-"""The build folder `out/<task>/`: written whole or not at all, one build at a time, and nothing outside of it touched.
+"""The build folder `out/<task>/`: written completely or not at all, by one build at a time.
 
 A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
 stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
@@ -29,7 +29,7 @@ except ImportError:  # Windows
 
 @contextmanager
 def fresh_folder(target: Path) -> Iterator[Path]:
-    """A folder beside `target` that takes the place of its build when the block ends, and vanishes if it fails.
+    """Make a folder next to `target` that replaces its build when the block ends; it is removed if the block fails.
 
     Files of the previous build that the new one does not have are removed; anything else in `target`, such as a
     recording, stays. `target` may be a link to a folder.
@@ -65,7 +65,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def _disk_errors(target: Path) -> Iterator[None]:
-    """Name the folder in what the system refuses."""
+    """Raise errors of the system as errors of the folder."""
     try:
         yield
     except ScanwrightError:
@@ -76,7 +76,7 @@ def _disk_errors(target: Path) -> Iterator[None]:
 
 @contextmanager
 def report_folder(target: Path) -> Iterator[Path]:
-    """A folder for the report, made if need be, and removed again if nothing came into it.
+    """Make a folder for reports if needed, and remove it if it stays empty.
 
     Raises:
         BuildError: it is a build folder, or cannot be written.
@@ -98,7 +98,7 @@ def report_folder(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def _alone(target: Path) -> Iterator[None]:
-    """Hold the lock of a build folder; it goes with the process, however that ends.
+    """Lock a build folder; the lock ends with the process.
 
     Raises:
         BuildError: another process holds it.
@@ -148,7 +148,7 @@ def _require_free_names(target: Path, made: Iterable[str], known: Iterable[str])
         BuildError: a file is where a folder must be, a folder where a file must be, or a link is on the way.
     """
     if target.exists() and not target.is_dir():
-        raise BuildError(f"{target}: cannot write the build folder: a file of that name is in the way")
+        raise BuildError(f"{target}: cannot write the build folder: a file has that name")
     for name in sorted({MANIFEST, *known}):
         place_in(target, name, BuildError)
     for name in made:
@@ -156,13 +156,13 @@ def _require_free_names(target: Path, made: Iterable[str], known: Iterable[str])
             if parent == target:
                 break
             if parent.exists() and not parent.is_dir():
-                raise BuildError(f"{parent}: a file is where the build needs a folder: move it away")
+                raise BuildError(f"{parent}: is a file, but the build needs a folder of that name: move it")
         if (target / name).is_dir():
-            raise BuildError(f"{target / name}: a folder is where the build needs a file: move it away")
+            raise BuildError(f"{target / name}: is a folder, but the build needs a file of that name: move it")
 
 
 def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[str]) -> None:
-    """Put every file of `work` into `target`, the manifest last, and remove what only earlier builds had."""
+    """Move every file of `work` into `target`, the manifest last, and remove files of earlier builds."""
     write_json(moving, sorted(known))
     target.mkdir(exist_ok=True)
     (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build
@@ -179,7 +179,7 @@ def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[st
 
 
 def _names_in_transit(moving: Path) -> set[str]:
-    """What a build that was killed may have left in the folder."""
+    """Return the files that a killed build may have left in the folder."""
     try:
         names = json.loads(moving.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -188,7 +188,7 @@ def _names_in_transit(moving: Path) -> set[str]:
 
 
 def _drop_empty_folders(target: Path, names: Iterable[str]) -> None:
-    """Folders that held nothing but files of builds, and hold none any more."""
+    """Remove folders of build files that are empty now."""
     for folder in sorted({parent for name in names for parent in Path(name).parents if parent.parts}, reverse=True):
         if (target / folder).is_dir() and not any((target / folder).iterdir()):
             (target / folder).rmdir()

@@ -70,7 +70,7 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
         f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
         f"ball_radius_deg = {radius_deg:.2g}",
         "",
-        "# [limits]  # take the # away to be refused an answer by which it may be hit less than twice",
+        "# [limits]  # remove the # to reject mounts with fewer than two beams on it",
         "# min_density = 2",
         "",
     ]

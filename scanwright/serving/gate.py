@@ -1,4 +1,4 @@
-"""Who may talk to a live page: the one who has its address, from this computer, in small and known messages.
+"""Access to a live page: by its address, from this computer, in small and known messages.
 
 Every request is checked before it is answered, and every message before viser reads it. Refused are
 
@@ -64,7 +64,7 @@ Answer = Callable[[ServerConnection, Request], Response | None]
 
 
 class Gate:
-    """One page's door.
+    """The access checks of one page.
 
     Attributes:
         title: of the page.
@@ -86,11 +86,11 @@ class Gate:
 
     @property
     def address(self) -> str:
-        """What a person opens."""
+        """The address with its token."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     def objection(self, request: Request) -> str:
-        """Why a request is refused; empty if it is not."""
+        """Return why a request is refused; empty if it is not."""
         headers, parts = request.headers, urlsplit(request.path)
         origins = headers.get_all("Origin")
         talks = "websocket" in headers.get("Upgrade", "").lower() if len(headers.get_all("Upgrade")) < 2 else True
@@ -112,7 +112,7 @@ class Gate:
         return ""
 
     def answering(self, answer: Answer) -> Answer:
-        """`process_request` of the library: viser's own, behind the check."""
+        """Return viser's `process_request` behind the checks."""
 
         def checked(connection: ServerConnection, request: Request) -> Response | None:
             if why := self.objection(request):
@@ -134,14 +134,14 @@ class Gate:
         return checked
 
     def _titled(self, page: bytes) -> bytes:
-        """The page with its own name and icon in place of the library's, and with what mends it for everybody."""
+        """Return the page with our title, icon, style and scripts."""
         head, end, rest = page.partition(b"</title>")
         head = re.sub(rb"<title>.*", lambda _: f"<title>{escape(self.title)}".encode(), head, flags=re.DOTALL)
         head = re.sub(rb'href="data:image/svg\+xml,[^"]*"', lambda _: f'href="{ICON}"'.encode(), head)
         return head + end + _added_to_page() + rest
 
     def admits(self, data: str | bytes) -> bool:
-        """Whether a message is one that the page sends, whole and of the right types."""
+        """Return whether a message is complete, known and of the right types."""
         try:
             message: Any = msgspec.msgpack.decode(data) if isinstance(data, bytes) else None
             kind = KNOWN[message.pop("type")]
@@ -170,7 +170,7 @@ class Gate:
 
 @cache
 def _added_to_page() -> bytes:
-    """Style and script that are put into the page."""
+    """Return the style and the scripts that are added to the page."""
     folder = files("scanwright.serving")
     style, *scripts = (folder.joinpath(name).read_bytes() for name in ADDED_TO_PAGE)
     return b"<style>" + style + b"</style>" + b"".join(b"<script>" + script + b"</script>" for script in scripts)
@@ -182,7 +182,7 @@ def _cookies(headers: Headers) -> list[tuple[str, str]]:
 
 
 def _tame(value: Any) -> bool:
-    """Whether all that a message holds are finite numbers and short texts."""
+    """Return whether a message contains only finite numbers and short texts."""
     if isinstance(value, dict):
         return all(_tame(key) and _tame(inner) for key, inner in value.items())
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""What every server for a browser checks of a request before it answers, and the socket that it listens on.
+"""Checks of a browser's request before a server answers, and the socket that it listens on.
 
 A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, tell who asks: Host,
 which is another name if a name was bent to 127.0.0.1 (DNS rebinding), and Origin, the page that the script comes from.

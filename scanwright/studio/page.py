@@ -127,7 +127,7 @@ class Studio:
         self.controls.show_steps(self.history.undoes, self.history.redoes)
 
     def _keep(self) -> None:
-        self.show(f"kept as {self.kept.keep(self.setting)}: see Compare")
+        self.show(f"saved as {self.kept.keep(self.setting)}: see Compare")
         self._note()
 
     def _remove(self) -> None:

@@ -59,7 +59,7 @@ class Searching:
             title = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
             blind = optimum.hole_lines(tabled=False)
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
-            self._show(f"{title}: {holes}; which of the equal ones its parts hide least is still looked for")
+            self._show(f"{title}: {holes}; searching the equivalent mount whose parts block the fewest beams")
             with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():

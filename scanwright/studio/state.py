@@ -120,7 +120,7 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         TaskError: there are more than `MOST_DABS`, or a dab is none that a task file could hold.
     """
     if len(dabs) > MOST_DABS:
-        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; take a wider brush, or draw a map")
+        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; use a wider brush, or a map")
     task = loaded.task
     try:
         weights: tuple[Region, ...] = tuple(dab.cone() for dab in dabs if dab.brush != "hidden")

@@ -1,4 +1,4 @@
-"""One candidate with its parts: its best setting that can be built, and all that decides about it.
+"""One candidate with its parts: its best mount that can be built, and its columns.
 
 From its solids: what they hide, weigh, bear, bend and cost.
 """
@@ -43,7 +43,7 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 @dataclass(frozen=True, slots=True)
 class BuiltSetting:
-    """What the parts of a setting come to.
+    """The parts of a mount in numbers.
 
     Attributes:
         shadow: what they hide.
@@ -58,7 +58,7 @@ class BuiltSetting:
 
 @dataclass(frozen=True, slots=True)
 class PartsBench:
-    """A `Workshop` of one set of products: makes the parts of a setting once, and refuses it where a check fails."""
+    """A `Workshop` of one set of products: makes the parts of a mount once, and rejects it if a check fails."""
 
     scanner: Scanner
     _made: dict[tuple[float, ...], BuiltSetting | Refused] = field(default_factory=dict)
@@ -68,12 +68,12 @@ class PartsBench:
         return PartsWorkshop(self.scanner).bound(setting_rad)
 
     def shadow(self, setting_rad: Array) -> SelfOcclusion | Refused:
-        """See `Workshop`; refused as well where clearance, loads, walls or beams fail."""
+        """See `Workshop`; also rejects a mount whose clearance, loads, walls or beams fail."""
         made = self.made(setting_rad)
         return made if isinstance(made, Refused) else made.shadow
 
     def made(self, setting_rad: Array) -> BuiltSetting | Refused:
-        """The parts of a setting, or why there can be none."""
+        """Return the parts of a mount, or why it cannot be built."""
         key = tuple(round(math.degrees(angle), 2) for angle in setting_rad)
         if key not in self._made:
             self._made[key] = _made(at_setting(self.scanner, setting_rad))
@@ -81,7 +81,7 @@ class PartsBench:
 
 
 def judge_candidate(loaded: LoadedTask, searched: Result) -> Result:
-    """The best setting of a candidate that can be built, and everything that decides.
+    """Return the best mount of a candidate that can be built, with its columns.
 
     Args:
         loaded: the candidate's task.
@@ -138,7 +138,7 @@ def _family(entry: dict[str, Any]) -> Family:
 
 
 def _shortest(problem: Problem, loaded: LoadedTask, family: Family) -> float | None:
-    """See `COLUMNS`; None where not even the row's own period brings so many."""
+    """Return the column of `COLUMNS`; None if even the row's own period is too short."""
     least = int(np.ceil(loaded.task.limits.min_density or 1))
     if loaded.task.motion.mode != "spin" or family.score.least < least:
         return None

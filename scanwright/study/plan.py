@@ -1,4 +1,4 @@
-"""What a study would cost, before it runs: from the unit costs that `benchmarks/scanwright/study` has measured."""
+"""The estimated cost of a study, from the unit costs that `benchmarks/scanwright/study` measures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COSTS = Path(__file__).parent / "costs.csv"
 
 
 def plan_study(study: Path, out: Path | None, results: Path | None, progress: Progress) -> list[str]:
-    """Count a study and what is left to do of it, in lines; nothing is computed, and nothing written.
+    """Return the size and the remaining cost of a study as lines; computes and writes nothing.
 
     Args:
         study: file, or name of a shipped study.
@@ -50,7 +50,7 @@ def plan_study(study: Path, out: Path | None, results: Path | None, progress: Pr
         *(f"refused {count:,}: {reason}" for reason, count in sorted(refused.items())),
         f"{len(searches):,} different searches, {searched:,} in the results folder",
         f"at most {left['candidate'] + judged:,} candidates to make, {judged:,} in the results folder",
-        f"at most {mean_h:.2f} core-hours, {most_h:.2f} if each takes as long as the longest ever measured",
+        f"at most {mean_h:.2f} core-hours, {most_h:.2f} if each needs the longest time measured",
         f"{max(of['memory_mb'] for of in cost.values()) / 1000:.1f} GB of memory per worker",
         *(
             f"measured: {unit} {of['mean_s']:.1f} core-seconds, {of['most_s']:.1f} the longest"
@@ -60,6 +60,6 @@ def plan_study(study: Path, out: Path | None, results: Path | None, progress: Pr
 
 
 def _unit_costs() -> dict[str, dict[str, float]]:
-    """The committed table: what a search and a candidate cost on the computer that it was measured on."""
+    """Return the committed costs of a search and of a candidate."""
     with COSTS.open(encoding="utf-8", newline="") as file:
         return {row.pop("unit"): {name: float(value) for name, value in row.items()} for row in csv.DictReader(file)}

@@ -1,4 +1,4 @@
-"""A study from first to last: search, bound, judge what no bound rules out, and tell every candidate's fate.
+"""A run of a study: search, bound, make the candidates that no bound excludes, and report each one's status.
 
 The answer does not depend on who finished first. A candidate is left out where its bound is beaten by a finished one;
 what beats it is itself on the final front, or beaten by one that is. So a candidate counts as `dominated` where the
@@ -45,7 +45,7 @@ def run_study(
     processes: int | None,
     progress: Progress,
 ) -> Iterator[str]:
-    """Do what is not yet done of a study, write its tables, and build its winners; yields what it came to, in lines.
+    """Run the rest of a study, write its tables, and build its winners; yields the results as lines.
 
     Args:
         study: file, or name of a shipped study.
@@ -71,7 +71,7 @@ def run_study(
     for combination, loaded in run.winners():
         target = place_in(folder, combination.name, BuildError)
         built = build_task(loaded, target, progress)
-        yield f"built {target}" if built.made else f"{target}: nothing has changed, no work to do"
+        yield f"built {target}" if built.made else f"{target} is up to date"
         yield from (f"{target}: {line}" for line in failure_lines(built.checks))
     if (folder / "study.parquet").exists():
         yield f"wrote study.csv, study.parquet and front.png to {folder}"
@@ -81,7 +81,7 @@ def run_study(
 
 @dataclass(slots=True)
 class Tally:
-    """What was done in one run, and what it was worth."""
+    """The work of one run, and its cost."""
 
     searches: int = 0
     judged: int = 0
@@ -91,7 +91,7 @@ class Tally:
     memory_mb: float = 0.0
 
     def line(self) -> str:
-        """For a person."""
+        """Return the tally as one line."""
         worked = f", {self.seconds:,.0f} s of work, {self.memory_mb:,.0f} MB the most of a worker"
         return (
             f"this run: {self.searches:,} searches, {self.judged:,} candidates made, {self.looked_up:,} looked up, "
@@ -101,7 +101,7 @@ class Tally:
 
 @dataclass(slots=True)
 class StudyRun:
-    """A study at work.
+    """A running study.
 
     Attributes:
         crossing: its candidates.
@@ -128,7 +128,7 @@ class StudyRun:
         self._bounds = np.full((len(self.crossing), columns), np.nan)
 
     def work(self, crew: Crew, progress: Progress) -> None:
-        """Do what is not yet done."""
+        """Do the remaining work."""
         limit_s = self.crossing.loaded.study.time_limit_s
         watch = _Watch("searches", len(self.crossing), progress)
         for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.report):
@@ -146,12 +146,12 @@ class StudyRun:
         watch.report()
 
     def rows(self) -> Iterator[Row]:
-        """The fate of every candidate, in the order of the study."""
+        """Yield the row of every candidate in the order of the study."""
         for combination in self.crossing:
             yield self._row(combination)
 
     def winners(self) -> list[tuple[Combination, LoadedTask]]:
-        """What is to be built: of each task the first of its front, by its columns, as tasks of one setting."""
+        """Return the winners of each task, by the columns of its front, as tasks with one mount."""
         winners = []
         for front in self.fronts:
             order = np.lexsort((front.numbers, *front.costs.T[::-1]))
@@ -174,7 +174,7 @@ class StudyRun:
             watch.count()
 
     def _candidates(self, watch: _Watch) -> Iterator[Unit]:
-        """Those first that are likely to beat others; those that what is finished beats are left out."""
+        """Yield candidates, the most promising first; skips those that a finished one beats."""
         todo = np.flatnonzero(~np.isnan(self._bounds[:, 0]))
         for number in map(int, todo[np.argsort(_mean_rank(self._bounds[todo]), kind="stable")]):
             combination = self.crossing[number]
@@ -191,7 +191,7 @@ class StudyRun:
             watch.count()
 
     def _bound(self) -> None:
-        """What no candidate can be better than, NaN where there is nothing to make; enters what was made before."""
+        """Compute the bounds of all candidates, NaN if there is nothing to make; enters earlier results."""
         names = self.crossing.loaded.study.front
         for combination in self.crossing:
             if combination.loaded is None:
@@ -207,11 +207,11 @@ class StudyRun:
             self.fronts[self.crossing[number].group].add(number, self._cost(number, result))
 
     def _cost(self, number: int, result: Result) -> Array:
-        """Of a finished candidate; never below its bound, not even within the error of its numbers."""
+        """Return the cost of a finished candidate, at least its bound."""
         return np.maximum(costs(result["values"], self.crossing.loaded.study.front), self._bounds[number])
 
     def _end(self, ended: Finished, watch: _Watch) -> bool:
-        """Count a unit that is over; whether a worker has done it in this run."""
+        """Count a finished unit, and return whether a worker computed it in this run."""
         del self._at_work[ended.unit.address]
         seconds = None
         if ended.done is None:
@@ -250,11 +250,11 @@ class StudyRun:
         beater = front.beater(self._cost(combination.number, result))
         if beater is None:
             return row | {"status": "front", "reason": ""}
-        return row | {"status": "built", "reason": f"{self.crossing[beater].name} is as good or better in every way"}
+        return row | {"status": "built", "reason": f"{self.crossing[beater].name} is as good or better in every column"}
 
 
 def _mean_rank(bounds: Array) -> Array:
-    """Mean over the columns of the share of candidates that are better there, shape (candidates,)."""
+    """Return the mean rank over the columns, 0 to 1, shape (candidates,)."""
     shares = np.zeros(len(bounds))
     for column in bounds.T:
         _, ranks = np.unique(column, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Units of work over an executor, a window of them at a time: the client stays small however many there are.
+"""Units of work over an executor, a window at a time, so that the client's memory stays small.
 
 A unit is looked up, else computed under a time limit, and stored at once by the worker that has it. One that fails or
 whose worker dies is tried again, `TRIES` times in all, and then reported as failed.
@@ -40,7 +40,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a worker hands back.
+    """The answer of a worker.
 
     Attributes:
         result: of the unit.
@@ -57,7 +57,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A unit that is over: what it came to, or why there is nothing."""
+    """A finished unit: its result, or the reason why there is none."""
 
     unit: Unit
     done: Done | None
@@ -66,7 +66,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Crew:
-    """Who does the work.
+    """An executor and its width.
 
     Attributes:
         executor: takes the units.
@@ -84,7 +84,7 @@ def finished(
     limit_s: float,
     tick: Callable[[int], None] = lambda _: None,
 ) -> Iterator[Finished]:
-    """Do units; they come back in the order they end.
+    """Do units, and yield them in the order in which they finish.
 
     The next unit is taken from `units` only when a worker is free, so it can depend on finished results.
 
@@ -123,7 +123,7 @@ def finished(
             except (ScanwrightError, CancelledError):  # not the unit's fault: what it refuses is a result
                 raise
             except ImportError as error:
-                raise BuildError(f"a worker cannot take part ({error}): install the same scanwright there") from error
+                raise BuildError(f"a worker lacks a package ({error}): install the same scanwright there") from error
             except Exception as error:
                 if tries < TRIES:
                     again.append((unit, tries + 1))
@@ -154,7 +154,7 @@ def do(unit: Unit, results: Results, client: dict[str, str], limit_s: float) -> 
         more = f" (and {len(differs) - 1} more)" if len(differs) > 1 else ""
         raise BuildError(
             f"a worker has {name} {own.get(name, 'missing')}, this computer {client.get(name, 'missing')}{more}: "
-            "results would differ; install the same versions, and run the study again: it goes on"
+            "results would differ; install the same versions and run the study again: it continues"
         )
     here = results.is_here()
     known = results.get(unit.address) if here else None
@@ -174,7 +174,7 @@ _lock = threading.Lock()
 
 @contextmanager
 def _limited(limit_s: float) -> Iterator[None]:
-    """End the process when the block takes longer: by an alarm of the system, which no held lock can stop.
+    """End the process if the block takes longer, by an alarm of the system.
 
     A process that no other one has made is the client itself, or a worker that nobody would start again: none there.
     """
@@ -204,7 +204,7 @@ def _memory_mb() -> float:
 
 
 def _reason(error: Exception, limit_s: float) -> str:
-    """Why a unit has no result, the same words whichever worker it was."""
+    """Return why a unit has no result, in words that do not depend on the worker."""
     if type(error).__name__ in DEATHS:
         return f"every worker that tried died: killed, out of memory, or longer than time_limit_s = {limit_s:g}"
     lines = str(error).splitlines()

@@ -1,4 +1,4 @@
-"""Error against run time of the ways to go between two samples of the servo's encoder."""
+"""Error against run time of interpolations between two samples of the servo's encoder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEP_RAD = 2 * math.pi / 4096  # encoder of 12 bits a turn, as Dynamixel X has
 
 
 def axis_trials(progress: Progress) -> Iterator[Trial]:
-    """Each order on a turn with 1 % ripple; the error is the root mean square over all beams, at the end of 10 m."""
+    """Measure each interpolation on turns with 1 % ripple; the error is the rms over all beams at 10 m."""
     progress("interpolation of the servo's angle")
     seconds = np.arange(0, SECONDS, 1 / RATE_HZ)
     steps = np.rint(_truth_rad(seconds) / STEP_RAD)
@@ -46,7 +46,7 @@ def axis_trials(progress: Progress) -> Iterator[Trial]:
 
 
 def interpolations(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
-    """Interpolation orders and the smoothing spline: what makes the curve of a log, by name."""
+    """Return the interpolations of a log by name: three orders and the smoothing spline."""
 
     def last_sample() -> AxisCurve:
         rows = np.zeros((log.time_ns.size - 1, 4))
@@ -66,6 +66,6 @@ def interpolations(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
 
 
 def _truth_rad(seconds: Floats) -> Floats:
-    """Constant speed and the ripple of a servo."""
+    """Return the true angle: constant speed with the ripple of a servo."""
     turned = TURN_RAD_S * seconds
     return turned + 0.01 * np.sin(turned) / 2 + 0.002 * np.sin(3 * turned)

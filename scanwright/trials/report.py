@@ -1,4 +1,4 @@
-"""Error against run time of every numerical choice that is not J: measured, written and told."""
+"""Error against run time of numerical choices other than J."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scanwright.trials.solver import solver_trials
 
 
 def report_choices(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:
-    """Measure them at the optimum of a task, write `choices.csv` and `choices.png`; in words.
+    """Measure all choices at the optimum of a task, write `choices.csv` and `choices.png`, and return lines.
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.

@@ -24,7 +24,7 @@ HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
 
 
 def solver_trials(plant: Plant, progress: Progress) -> Iterator[Trial]:
-    """Each method at each tolerance; the error is the farthest that the horn is from where the reference has it."""
+    """Measure each method at each tolerance; the error is the maximum deviation of the horn from the reference."""
     at_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
 
     def run(solver: Solver) -> Floats:

@@ -249,7 +249,7 @@ def test_a_setting_that_is_lost_at_once_is_asked_about_once(person, tmp_path, sp
 
     with pytest.raises(ServoSetupError) as caught:
         asking_first(work, tmp_path, None)
-    assert len(person.questions) == 1 and "did not last" in caught.value.__notes__[0]
+    assert len(person.questions) == 1 and "written and lost" in caught.value.__notes__[0]
 
 
 def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):

@@ -136,7 +136,7 @@ QUESTIONS = [
     ("did you mean 'UST-10LX'?", "ust-10"),
     ("How many metres", "sixty"),
     ("'sixty' is no number", "0.6"),
-    ("in its way", "box:1:1:0.9"),
+    ("blocks the view", "box:1:1:0.9"),
     ("is not above it", "none"),
     ("must it see", "ground from 0.5 to 5"),
     ("'from': unknown region", "wall:2 around"),

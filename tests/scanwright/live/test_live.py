@@ -131,7 +131,7 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])
         assert len(colours) == shown and len(np.unique(colours, axis=0)) > 10
-        assert "left out 7 scans" in view.facts.content
+        assert "dropped 7 scans" in view.facts.content
         kept = view.cloud()
         assert len(kept.points_m) == shown and set(kept.columns["time_s"]) == set(range(30 - shown // 100, 30))
         ranges = np.concatenate([chunk.values["range"] for chunk in view.chunks])

@@ -110,7 +110,7 @@ def test_the_report_of_a_build_has_a_picture_of_every_place_that_a_check_names(t
 def test_a_second_run_does_no_work_and_says_so(tilted, monkeypatch, capsys):
     before = {path: path.stat().st_mtime_ns for path in tilted.rglob("*")}
     build(monkeypatch, tilted / "task.toml", "--out", tilted.parent)
-    assert "nothing has changed" in capsys.readouterr().out
+    assert "is up to date" in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in tilted.rglob("*")} == before
 
 
@@ -128,7 +128,7 @@ def test_a_build_whose_checks_fail_says_so_first_and_exits_with_1(tilted, tmp_pa
     (folder / "checks.json").write_text(json.dumps(checks))
     enter(folder, "checks.json")
     code, out, complaints = command(*words)
-    assert code == 1 and out == f"{folder}: nothing has changed, no work to do ({len(FILES) - 1} files)\n"
+    assert code == 1 and out == f"{folder} is up to date ({len(FILES) - 1} files)\n"
     assert complaints[:2] == [
         "error: check failed: all is well",
         f"error: 1 of {len(built.checks)} checks failed: do not make these parts",
@@ -392,7 +392,7 @@ def test_what_is_in_the_way_is_told_before_anything_moves(tmp_path):
     target = tmp_path / "task"
     _build_of(target, ["a.txt"])
     (target / "parts").write_text("in the way")
-    with pytest.raises(BuildError, match="a file is where the build needs a folder"):
+    with pytest.raises(BuildError, match="is a file, but the build needs a folder"):
         _build_of(target, ["parts/b.stl"])
     assert _files(target) == ["a.txt", "manifest.json", "parts"]
 
@@ -417,7 +417,7 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     gathered = Build(tmp_path, ("one",), ("slow",), (), made).lines()
     assert gathered[0] == "warning: slow"
     assert gathered[1] == "note: shaft: have it turned"
-    assert gathered[2].startswith("warning: measure these on your own before you print")
+    assert gathered[2].startswith("warning: unverified dimensions; measure your own devices")
     assert gathered[3] == "  UTM: a = 1, b = 2"
     assert Build(tmp_path, ("one",), (), (), made).lines(in_full=True)[:3] == [
         "note: shaft: have it turned",

@@ -126,7 +126,7 @@ def test_a_file_is_overwritten_only_when_asked_and_a_link_never(loaded, tmp_path
     assert "alpha_rot_deg = 0.0" in (tmp_path / "mine.toml").read_text()
     (tmp_path / "victim").write_text("keep me")
     (tmp_path / "link.toml").symlink_to(tmp_path / "victim")
-    with pytest.raises(TaskError, match="a link"):
+    with pytest.raises(TaskError, match="a symbolic link"):
         save_task(loaded, tmp_path, "link", None, overwrite=True)
     assert (tmp_path / "victim").read_text() == "keep me"
 
