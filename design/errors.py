@@ -129,7 +129,7 @@ def suggest(word: str, known: Iterable[str]) -> str:
 
 
 def require(extra: str, need: str, *modules: str) -> None:
-    """Refuse work whose packages are not installed. None of them is imported.
+    """Require packages to be installed, without importing them.
 
     Args:
         extra: the extra of the package that brings them, such as "clouds".
