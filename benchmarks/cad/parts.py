@@ -39,6 +39,7 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding
+from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Scanner, scanner_of
 
 Products = tuple[str, str, str]
@@ -128,7 +129,7 @@ def _made(combinations: tuple[Products, ...], numbered: tuple[int, Scanner]) -> 
     setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
     try:
         assembly = make_parts(scanner)
-        checks, _ = run_checks(scanner, assembly, lambda _: None)
+        checks, _ = run_checks(scanner, assembly, no_progress)
     except BuildError as error:
         return Made(which, setting, refused=str(error))
     values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}

@@ -5,8 +5,6 @@ They use the parts without their labels: the wall between two engraved strokes i
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies
@@ -24,13 +22,12 @@ from scanwright.cad.checks.products import known_errors, module_checks, products
 from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.design.findings import Finding
+from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 from scanwright.design.self_occlusion import SelfOcclusion, self_occlusion_bytes
 
-Say = Callable[[str], None]
 
-
-def check_files(scanner: Scanner, assembly: Assembly, progress: Say) -> dict[str, bytes]:
+def check_files(scanner: Scanner, assembly: Assembly, progress: Progress) -> dict[str, bytes]:
     """Return `checks.json` and `own_body.npz` of a build.
 
     Args:
@@ -43,7 +40,7 @@ def check_files(scanner: Scanner, assembly: Assembly, progress: Say) -> dict[str
     return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}
 
 
-def check_scanner(scanner: Scanner, progress: Say) -> list[Finding]:
+def check_scanner(scanner: Scanner, progress: Progress) -> list[Finding]:
     """Make the parts of a scanner in memory and check them.
 
     Raises:
@@ -53,7 +50,7 @@ def check_scanner(scanner: Scanner, progress: Say) -> list[Finding]:
     return run_checks(scanner, make_parts(scanner), progress)[0]
 
 
-def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Finding], SelfOcclusion]:
+def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tuple[list[Finding], SelfOcclusion]:
     """Return all checks, in the order of the report, and the beams that the parts hide."""
     progress("casting the beams")
     layout, meshes = assembly.layout, assembly.meshes()

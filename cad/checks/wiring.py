@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.findings import Finding
@@ -16,4 +18,5 @@ def wiring_checks(scanner: Scanner) -> list[Finding]:
         "supply is overloaded, and every device gets its voltage"
     )
     ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", summary)
-    return [*(check_network(network) or [ok]), *network.unknown]
+    broken = [replace(fault, code="wiring") for fault in check_network(network)]
+    return [*(broken or [ok]), *network.unknown]

@@ -16,6 +16,7 @@ from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
+from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class PartsResult:
 
 
 def build_parts(
-    scanner: Scanner, folder: Path, progress: Callable[[str], None], make: Callable[[Scanner], Assembly] | None = None
+    scanner: Scanner, folder: Path, progress: Progress, make: Callable[[Scanner], Assembly] | None = None
 ) -> PartsResult:
     """Make every part and write it into a build folder.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from scanwright.cad.layout.layout import config_hash
 from scanwright.cad.layout.names import FIT_COUPON
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
+from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 
@@ -39,7 +39,7 @@ def export_scanner(
     scanner: Scanner,
     made: PartsResult,
     folder: Path,
-    progress: Callable[[str], None],
+    progress: Progress,
 ) -> Exports:
     """Write all of them into a build folder.
 
