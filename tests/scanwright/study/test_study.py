@@ -54,7 +54,7 @@ def test_the_shipped_study_crosses_everything_and_refuses_with_a_reason():
     assert len({c.name for c in combinations}) == 36
     refused = [c for c in combinations if c.loaded is None]
     assert len(refused) == 12
-    assert all(c.choice["servo"] == "AX-12A" and "no angle is read" in c.refused for c in refused)
+    assert all(c.choice["servo"] == "AX-12A" and "no angle is measured" in c.refused for c in refused)
     sweeping = [c for c in combinations if c.choice["task"] == "indoor_urg"]
     assert all(c.loaded.task.slip_ring is None for c in sweeping)
     assert len({record_digest(c.loaded) for c in sweeping}) == 6  # the same with either ring: made once
