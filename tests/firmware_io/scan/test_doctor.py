@@ -218,7 +218,11 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
 
     monkeypatch.setattr("serial.serialposix.fcntl.ioctl", listening)
     with ServoEmulator("MX-64R") as emulator:
-        serial_port.open_serial_port(emulator.port, 57600).close()
+        opened = serial_port.open_serial_port(emulator.port, 57600)
+        assert not termios.tcgetattr(opened.fileno())[2] & termios.HUPCL  # closing drops DTR no more
+        opened.baudrate = 115_200
+        assert not termios.tcgetattr(opened.fileno())[2] & termios.HUPCL
+        opened.close()
     assert not set(asked) & {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET}
 
 
