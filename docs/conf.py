@@ -55,7 +55,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Floats", "Mask", "Say", "Times")}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Floats", "Mask", "Times")}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 
