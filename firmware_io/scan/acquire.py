@@ -14,6 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from threading import Event
 
 import numpy as np
@@ -75,7 +76,10 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
         reporter.step("starting the servo")
         _wait_until_steady(scans, axis, plan.motion, reporter)
-        return _record(plan, scans, axis, reporter)
+        before = servo.lost_replies
+        axis.longest_gap_ns = 0
+        summary = _record(plan, scans, axis, reporter)
+        return replace(summary, lost_replies=servo.lost_replies - before, longest_gap_s=axis.longest_gap_ns / 1e9)
 
 
 @contextmanager

@@ -45,6 +45,7 @@ class ServoBus:
     Attributes:
         port: name of the port.
         packets: how they are packed; may be changed.
+        lost_replies: count of answers that were damaged or did not come, and were asked for again.
         return_delay_ns: what the servo waits between request and answer.
     """
 
@@ -52,6 +53,7 @@ class ServoBus:
         self.port = port
         self.packets = packets
         self.return_delay_ns = 0.0
+        self.lost_replies = 0
         self._line = SerialLine(port, baud)
 
     def listen(self, seconds: float) -> bytes:
@@ -147,6 +149,7 @@ class ServoBus:
                         excused += 1
                     else:
                         tries += 1
+                        self.lost_replies += 1
                     if tries == _TRIES:
                         raise type(error)(f"{self.port}: servo {servo_id}: {error}") from error
                     self._let_pass()
