@@ -259,11 +259,16 @@ def doctor(
     restore: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Undo the changes of --fix or servo-setup, and stop.")
     ] = None,
+    udev: Annotated[bool, typer.Option("--udev", help="Print udev rules for the adapters, and stop (Linux).")] = False,
 ) -> None:
     """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
     from scanwright.firmware_io.scan import doctor as diagnosis
+    from scanwright.firmware_io.scan import host
     from scanwright.firmware_io.servo import settings
 
+    if udev:
+        print(host.udev_rules(), end="")
+        return
     if restore is not None:
         print_steps("", settings.restore(restore, servo))
         return
@@ -274,6 +279,8 @@ def doctor(
         hint = finding.hint
         if finding.code == diagnosis.SERVO_SETTING:
             hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
+        if finding.code in host.CURED_BY_RULES:
+            hint += " (`scanwright doctor --udev` prints them)"
         print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
         failed |= finding.severity == "error"
     raise typer.Exit(1 if failed else 0)
