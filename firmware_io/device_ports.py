@@ -14,7 +14,7 @@ from serial.tools import list_ports
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import DeviceError
-from scanwright.design.files.atomic_file import place_in, whole_file
+from scanwright.design.files.atomic_file import atomic_write, place_in
 
 _FILE = "emulated.json"
 
@@ -39,7 +39,7 @@ def announced(out: Path, ports: Ports) -> Iterator[None]:
     if running is not None:
         raise DeviceError(f"{out}: process {running.pid} emulates this scanner already: stop it first")
     file = place_in(out, _FILE, DeviceError)
-    with whole_file(file, DeviceError) as part:
+    with atomic_write(file, DeviceError) as part:
         part.write_text(json.dumps(asdict(ports), indent=2) + "\n", encoding="utf-8")
     try:
         yield

@@ -17,7 +17,7 @@ from scanwright.firmware_io.servo.fitness import ServoSetupError
 _log = logging.getLogger(__name__)
 
 AGAIN_S = 3.0
-_ASKED_S = 1.0
+_POLL_S = 1.0
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -60,7 +60,7 @@ def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = 
     watch = Both(steered, viewer)
     while True:
         if not steered.running:
-            steered.wait(_ASKED_S)
+            steered.wait(_POLL_S)
             continue
         steered.begin()
         try:

@@ -9,9 +9,9 @@ from pathlib import Path
 from scanwright.design.angles import angles_in_use
 from scanwright.design.errors import RecordingError
 from scanwright.design.progress import Progress
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.ros.drive import drive
 from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
 from scanwright.firmware_io.ros.replay import replay
@@ -41,7 +41,9 @@ class Publishing:
 
     def __post_init__(self) -> None:
         if self.per_turn and self.frame == "rot":
-            raise RecordingError("--points-in rot: a turn has no place in a frame that turns; say --points-per scan")
+            raise RecordingError(
+                "frame = rot, per_turn: a frame that rotates cannot hold the points of a turn; publish per scan"
+            )
 
 
 def serve_devices(
@@ -58,7 +60,7 @@ def serve_devices(
         out: build folder.
         plan: endless.
         ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
-        progress: gets each step.
+        progress: callback.
         points: how they are published.
         viewer: gets the scan too.
 
@@ -66,8 +68,8 @@ def serve_devices(
         TaskError: the folder has no angle set.
         RecordingError: its URDF is none of ours.
     """
-    held = plan.motion.mode == "stop_and_go"
-    with running_node(_scanner(out, points, held), ros_args, replayed=False) as node:
+    at_rest = plan.motion.mode == "stop_and_go"
+    with running_node(_scanner(out, points, at_rest), ros_args, replayed=False) as node:
         drive(plan, node, progress, viewer)
 
 
@@ -79,9 +81,9 @@ def serve_recording(
     Raises:
         RecordingError: the recording is unreadable, or the rate is none.
     """
-    held = held_by(read_note(recording, NOTE))
-    with running_node(_scanner(out, points, held), ros_args, replayed=True) as node:
-        progress("waiting for a subscriber of scan, joint_states or points")
+    at_rest = rests_in_scans(read_note(recording, NOTE))
+    with running_node(_scanner(out, points, at_rest), ros_args, replayed=True) as node:
+        progress("waiting for a subscriber to scan, joint_states or points")
         node.await_subscriber()
         scans, angles = replay(recording, node, rate=rate)
         node.close()
@@ -89,13 +91,13 @@ def serve_recording(
         node.flush()
 
 
-def _scanner(out: Path, points: Publishing, held: bool) -> PublishedScanner:
+def _scanner(out: Path, points: Publishing, at_rest: bool) -> PublishedScanner:
     in_use = angles_in_use(out)
     return PublishedScanner(
         angles=in_use.angles,
-        own_body=own_body_beside(in_use.path),
+        own_body=own_body_of(in_use.path),
         urdf=description(out, in_use.angles),
-        smooth=points.smooth and not held,
+        smooth=points.smooth and not at_rest,
         publish_tf=points.publish_tf,
         per_turn=points.per_turn,
         points_frame=points.frame,

@@ -196,6 +196,8 @@ class ServoBus:
     def _port_errors(self) -> Iterator[None]:
         try:
             yield
+        except DeviceTimeoutError:
+            raise
         except (OSError, termios.error) as error:  # pyserial's own are OSErrors
             raise DeviceTimeoutError(
                 f"{self.port}: the port is gone ({error}): plug the adapter in, then open it again"

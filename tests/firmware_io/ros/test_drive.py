@@ -53,7 +53,7 @@ def test_a_recording_is_told_at_its_pace_and_a_scan_after_its_last_angle(tmp_pat
             assert 0 <= last_ns - thing.time_ns[-1] < 5_000_000  # angles come every 4 ms
             scans.append(thing.stamp_ns)
     assert scans == [scan.stamp_ns for scan in simulated.scans]
-    with pytest.raises(RecordingError, match="--rate = 0"):
+    with pytest.raises(RecordingError, match="rate = 0"):
         replay(path, listener, rate=0.0)
 
 
