@@ -1,11 +1,12 @@
-"""Other people's programs against the emulated lidars: one row for each program and model.
+"""Other people's programs against the emulated devices: one row for each program and model.
 
     python -m benchmarks.firmware_io.devices.interop [sdk=ULTRA_SIMPLE] [urg=SAMPLES] [ldlidar=SOURCES] [python=PYTHON]
 
 `sdk` is the program ultra_simple of rplidar_sdk, `urg` the folder samples/c of urg_library (both built), `ldlidar` the
 folder ldlidar_driver of ldlidar_stl_ros2 (compiled here, which needs g++), `python` an interpreter with the packages
-rplidar-roboticia, pyrplidar and lds2d. Each emulator stands before a wall whose distance is known in every direction;
-what a program prints is compared with that. A row fails if a program prints too little or something else.
+rplidar-roboticia, pyrplidar, lds2d, ftservo-python-sdk, rustypot and dynamixel-sdk. Each lidar stands before a wall
+whose distance is known in every direction; what a program prints is compared with that. Each servo is moved by half a
+radian. A row fails if a program prints too little or something else.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,12 +29,15 @@ from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.firmware_io.emulators.lidar_line import LidarLine
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import family_of
 
 _RUN_S = 10.0
 _FEWEST = 1000  # points
 _WITHIN_MM = 10.0  # of the wall, at the median
+_BAUDS = {"STS3215": 1_000_000, "AX-12A": 1_000_000}  # from the factory; the others have 57,600
+_SERVO_WITHIN_RAD = 0.03  # AX-12A: compliance of 1 step, and a load of none
 _RPLIDARS = tuple(IDENTITIES)
 
 _NO_DTR = "import sys, serial\nserial.Serial._update_dtr_state = lambda self: None  # a pseudo-terminal has none\n"
@@ -60,6 +65,44 @@ with Lidar.open(sys.argv[3].replace(" ", "-"), sys.argv[1], int(sys.argv[2])) as
     for point in lidar.points():
         print(point.angle_deg, point.dist_mm, flush=True)
 """
+_FTSERVO = """
+from scservo_sdk import PortHandler, sms_sts
+port = PortHandler(sys.argv[1])
+port.openPort(), port.setBaudRate(int(sys.argv[2]))
+servo = sms_sts(port)
+before = servo.ReadPos(1)[0]
+servo.WritePosEx(1, before + 326, 2000, 50)
+time.sleep(2)
+print(servo.ReadPos(1)[0] - before)
+"""
+_RUSTYPOT = """
+import rustypot
+kind = {"STS3215": "Sts3215", "MX-64R": "Mx", "AX-12A": "Ax"}.get(sys.argv[3], "Xl430")
+servo = getattr(rustypot, kind + "PyController")(sys.argv[1], int(sys.argv[2]), 0.5)
+before = servo.sync_read_present_position([1])[0] if kind == "Xl430" else servo.read_present_position(1)
+before = before[0] if isinstance(before, list) else before
+servo.write_torque_enable(1, 1 if kind == "Xl430" else True)
+servo.write_goal_position(1, before + (326 if kind == "Xl430" else 0.5))  # one of them counts
+time.sleep(2)
+print(before)
+"""
+_DYNAMIXEL = """
+from dynamixel_sdk import PacketHandler, PortHandler
+port = PortHandler(sys.argv[1])
+port.openPort(), port.setBaudRate(int(sys.argv[2]))
+torque, goal, size = (24, 30, 2) if sys.argv[3] in ("MX-64R", "AX-12A") else (64, 116, 4)
+bus = PacketHandler(2.0 if size == 4 else 1.0)
+bus.write1ByteTxRx(port, 1, torque, 1)
+middle, step = (512, 0.00511) if sys.argv[3] == "AX-12A" else (2048, 0.001534)
+getattr(bus, f"write{size}ByteTxRx")(port, 1, goal, middle + round(0.5 / step))
+time.sleep(2)
+print(bus.ping(port, 1))
+"""
+_SERVOS = {
+    "ftservo-python-sdk": (_FTSERVO, ("STS3215",)),
+    "rustypot": (_RUSTYPOT, ("STS3215", "XM430-W350", "MX-64R", "AX-12A")),
+    "dynamixel-sdk": (_DYNAMIXEL, ("XM430-W350", "MX-64R", "AX-12A")),
+}
 _LDLIDAR = """
 #include <chrono>
 #include <cstdio>
@@ -176,6 +219,19 @@ def result(client: Client, model: str, folder: Path) -> tuple[bool, str]:
     return min(off) < _WITHIN_MM, f"{len(points):,} points, {min(off):.1f} mm off the wall at the median"
 
 
+def moved(python: str, script: str, model: str) -> tuple[bool, str]:
+    """Let a program move an emulated servo by half a radian; whether it did, and a note."""
+    with ServoEmulator(model) as servo:
+        baud = str(_BAUDS.get(model, 57_600))
+        command = [python, "-c", "import sys, time" + script, servo.port, baud, model]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        turned_rad = abs(servo.axis.motion(time.monotonic_ns()).angle_rad)
+    note = f"the horn turned by {turned_rad:.3f} rad"
+    if ended.returncode:
+        note = (ended.stderr.strip().splitlines() or ["it failed"])[-1][:60]
+    return ended.returncode == 0 and abs(turned_rad - 0.5) < _SERVO_WITHIN_RAD, note
+
+
 def main() -> int:
     """Run every program whose path is given, and print a table."""
     paths = dict(argument.split("=", 1) for argument in sys.argv[1:])
@@ -187,6 +243,11 @@ def main() -> int:
                 works, note = result(client, model, Path(folder))
                 failed |= not works
                 print(f"| {client.name} | {model} | {'yes' if works else 'no'} | {note} |", flush=True)
+    for name, (script, models) in _SERVOS.items() if "python" in paths else ():
+        for model in models:
+            works, note = moved(paths["python"], script, model)
+            failed |= not works
+            print(f"| {name} | {model} | {'yes' if works else 'no'} | {note} |", flush=True)
     return int(failed)
 
 
