@@ -15,7 +15,7 @@ from typing import TypeVar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
 
-_POLL_S = 0.05
+_POLL_S = 0.05  # between two tries to connect
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
 _SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
 _READS = 10_000  # without finding the port empty

@@ -37,7 +37,7 @@ from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
-_STEADY_PATIENCE_S = 15.0
+_STEADY_PATIENCE_S = 15.0  # a heavy head takes some seconds
 _MOST_SPEEDS = 3600  # an hour of them, for the mean
 
 

@@ -25,7 +25,7 @@ from scanwright.firmware_io.scan.setpoints import Move, course
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import ServoDriver
 
-SERVO_HZ = 100.0
+SERVO_HZ = 100.0  # an angle every 0.6 deg at 60 deg/s
 
 _STOP_ANSWER_S = 5.0  # three tries of two orders take 1.5 s
 _DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that

@@ -19,9 +19,9 @@ from scanwright.firmware_io.emulators.servo.memory import Memory, TableItem, ro,
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-_BOOT_S = 0.5
+_BOOT_S = 0.5  # [assumed]
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32
-_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
+_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)  # memory table of the STS, by count
 _PING, _READ, _WRITE, _REG_WRITE, _ACTION, _SYNC_READ, _SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
 _ID, _BAUD, _DELAY, _LEVEL, _OFFSET, _MODE, _TORQUE, _LOCK, _PRESENT = 5, 6, 7, 8, 31, 33, 40, 55, 56
 _GOALS = 42, 46  # position, or speed of a wheel

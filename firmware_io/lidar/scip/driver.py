@@ -22,7 +22,7 @@ from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 from scanwright.firmware_io.lidar.sensor_line import until_back
 
 _SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
-_EXCHANGES = 60
+_EXCHANGES = 60  # a second or so of them
 # of its captures, and of firmware of the EW and UST; what else a sensor says of its state is trouble
 _WELL = ("sensor works well", "stable 000 no error", "sensor is working normally")
 _WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX answers TM1 with times 23 ms off its stamps

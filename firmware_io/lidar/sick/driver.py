@@ -22,10 +22,10 @@ from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAUL
 from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
 from scanwright.firmware_io.samples import Scan
 
-_SCAN_S = 1.0
+_SCAN_S = 1.0  # 15 scans of the slowest
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
-_STLMS_READY = 7
+_STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
 class SickLidar:

@@ -24,12 +24,12 @@ from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
 
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
-_TRIES = 3
-_SILENCE_NS = 500_000_000
+_TRIES = 3  # the first may meet its stream
+_SILENCE_NS = 500_000_000  # five turns: it may have restarted
 _PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
 _BUFFER_BYTES = 4095  # of a terminal (Linux, n_tty.c): nothing is lost before it is full
 _PWM = 660  # the SDK's default
-_RPM = 600
+_RPM = 600  # the SDK's default
 
 
 class SlamtecLidar:

@@ -16,7 +16,7 @@ from scanwright.firmware_io.servo.bus.packet_format import PacketFormat, Status
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
-_TRIES = 3
+_TRIES = 3  # at one damaged answer in ten, one reading in a thousand fails
 _EXCUSED = 10  # tries in which this computer was kept from running: they say nothing of the servo
 _LATE = 4  # times the wait for an answer, until it is given up for good
 
