@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeou
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.lms2xx import protocol
 from scanwright.firmware_io.lidar.lms2xx.telegram_count import TelegramCount
-from scanwright.firmware_io.lidar.sensor_line import SensorLine, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine, until_back
 from scanwright.firmware_io.samples import Scan
 
 FAMILY = "lms2xx"
@@ -37,7 +35,7 @@ _TURN_S = 1 / 75  # of its mirror
 _PATIENCE = 8  # telegrams: a fifth of a second
 
 
-class LmsLidar:
+class LmsLidar(LineDriver):
     """An LMS 2xx; `LidarDriver` says what its methods promise.
 
     Attributes:
@@ -63,14 +61,6 @@ class LmsLidar:
         self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
         self._recognise(model, _BAUDS)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._line.leave(self.stop, error)
 
     @property
     def model(self) -> str:
