@@ -82,7 +82,9 @@ def repair(
 def assemble(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
     angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="Cloud; its suffix is the format (ply, pcd, las, ...).")
+    ],
     organised: Organised = False,
     lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
     per: Annotated[
@@ -270,7 +272,7 @@ def convert(
     target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
     organised: Organised = False,
 ) -> None:
-    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
+    """Turn a cloud into another format (named by its suffix), and say what that one cannot hold.
 
     A recording becomes a ROS 1 bag where OUT ends in .bag, else a ROS 2 bag in sqlite3.
     """
