@@ -14,7 +14,7 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
@@ -95,7 +95,7 @@ def calibrate_recordings(
         **calibration_report(result, start, mount, beams, seen),
     }
     calibration = Calibration(calibrated(angles, result), record, out)
-    with whole_file(out, RecordingError) as part, whole_file(report_path(out), RecordingError) as report_part:
+    with atomic_write(out, RecordingError) as part, atomic_write(report_path(out), RecordingError) as report_part:
         part.write_text(calibration.angles.to_json(), encoding="utf-8")
         report_part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return calibration

@@ -16,7 +16,7 @@ import pye57
 from pye57 import libe57
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import (
     COLUMN_TYPES,
     Cloud,
@@ -57,7 +57,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         foreign(f"{path}: cannot write", _write_scans, part, clouds, path.stem)
     return []
 

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
 from scanwright.firmware_io.foreign import foreign
 
@@ -99,7 +99,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     las.x, las.y, las.z = world.T
     for name, column in columns.items():
         las[_OWN_FIELD.get(name, name)] = column
-    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
+    with atomic_write(path, RecordingError) as part, part.open("wb") as stream:
         foreign(f"{path}: cannot write", las.write, stream, do_compress=path.suffix.lower() == ".laz")
     return notes
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.numpy_files import read_npz
 from scanwright.firmware_io.clouds.cloud import Cloud
 
@@ -43,7 +43,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud."""
     start = {} if cloud.start_ns is None else {"start_ns": np.int64(cloud.start_ns)}
     columns = {_COLUMN + name: column for name, column in cloud.columns.items()}
-    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
+    with atomic_write(path, RecordingError) as part, part.open("wb") as stream:
         np.savez(
             stream,
             allow_pickle=False,

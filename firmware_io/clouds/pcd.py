@@ -19,7 +19,7 @@ from pypcd4.pypcd4 import Encoding, PointCloud
 
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import (
     Cloud,
     as_type,
@@ -215,7 +215,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     data = io.BytesIO()
     pcd.save(data, Encoding.BINARY)
     comments = [f"# {line}\n" for line in headlines(cloud) if line.startswith("time_s")]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_bytes("".join(comments).encode() + data.getvalue())
     return []
 

@@ -20,7 +20,7 @@ from numpy import ndarray
 from numpy.typing import NDArray
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
@@ -63,7 +63,7 @@ class PlyWriter:
 
     def __enter__(self) -> PlyWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path, RecordingError))
+            part = stack.enter_context(atomic_write(self._path, RecordingError))
             self._stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._stream.write(self._header())
             stack.push(self._finish)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from scanwright.design.arrays import Floats
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, Column, as_type, cloud_rows, headlines, with_header
 from scanwright.firmware_io.foreign import foreign
@@ -55,6 +55,11 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     layout = _layout(path, lines, comments)
     words = split(lines[layout.first], layout.separator)
     numeric = [k for k in range(layout.count) if _is_number(words[k])]
+    for axis in _AXES:
+        if axis not in layout.names:
+            raise RecordingError(f"{path}: the columns are {' '.join(layout.names)[:200]}; a cloud has x y z")
+        if (k := layout.names.index(axis)) not in numeric:
+            raise RecordingError(f"{path}: line {layout.first + 1}: {words[k][:40]!a} is not a number")
     every = len(numeric) == layout.count == len(lines[layout.first].strip().split(layout.separator))
     rows = islice(lines, layout.first, None)
     values = read_numbers(path, rows, layout.first + 1, layout.separator, None if every else numeric)
@@ -63,14 +68,10 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     typed = [words[1:] for line in comments if len(words := line.split()) == layout.count + 1 and words[0] == "types"]
     types = typed[0] if typed else ["<f8"] * layout.count
     columns = {layout.names[k]: _typed(path, layout.names[k], values[:, j], types[k]) for j, k in enumerate(numeric)}
-    points = [columns.pop(axis, None) for axis in _AXES]
-    if any(column is None or column.dtype.kind != "f" for column in points):
-        text = [k for k in range(layout.count) if layout.names[k] in _AXES and k not in numeric]
-        why = (
-            f"line {layout.first + 1}: {words[text[0]][:40]!a} is not a number" if text else "a cloud has x y z, floats"
-        )
-        raise RecordingError(f"{path}: the columns are {' '.join(layout.names)[:200]}; {why}")
-    points_m: NDArray[np.floating] = np.stack([column for column in points if column is not None], axis=1)
+    points = [columns.pop(axis) for axis in _AXES]
+    if any(column.dtype.kind != "f" for column in points):
+        raise RecordingError(f"{path}: types: x y z must be floats")
+    points_m: NDArray[np.floating] = np.stack(points, axis=1)
     if not np.isfinite(points_m).any():
         raise RecordingError(f"{path}: none of the {len(values)} lines is a point")
     cloud = Cloud(points_m, columns if typed else columns | _colours(columns))
@@ -209,6 +210,6 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     names = rows.dtype.names or ()
     kinds = [rows.dtype[name].str for name in names]
     header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
     return []

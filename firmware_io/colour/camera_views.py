@@ -99,6 +99,8 @@ def _listed(path: Path) -> Iterator[_Shot]:
             if not row["file"]:
                 raise RecordingError(f"{path}:{number}: no file named")
             yield _Shot(path.parent / row["file"], time_ns, joint_rad)
+    except RecordingError:
+        raise
     except (ValueError, TypeError) as error:
         raise RecordingError(f"{path}: not a number: {error}; time_ns is whole nanoseconds since 1970") from error
 
@@ -129,5 +131,7 @@ def opened(path: Path, camera: Camera) -> Iterator[Image.Image]:
                     "one size"
                 )
             yield image
+    except RecordingError:
+        raise
     except (OSError, ValueError) as error:  # pillow's own are OSErrors
         raise RecordingError(f"{path}: cannot read the image: {getattr(error, 'strerror', None) or error}") from error

@@ -28,7 +28,7 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError, suggest
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
@@ -147,7 +147,7 @@ class RecordingWriter:
 
     def __enter__(self) -> MessageWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path, RecordingError))
+            part = stack.enter_context(atomic_write(self._path, RecordingError))
             stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._messages = MessageWriter(stream, self._path, self._note, {})
             stack.push(self._finish)

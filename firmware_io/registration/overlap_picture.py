@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.registration.register import Registration
 from scanwright.firmware_io.registration.sensor_view import SensorView
 
@@ -52,5 +52,5 @@ def overlap_picture(png: Path, views: Sequence[SensorView], registration: Regist
     table.set_xticklabels(names, rotation=90, fontsize=7)
     table.set_yticklabels(names, fontsize=7)
     figure.colorbar(image, ax=table, shrink=0.7)
-    with whole_file(png, RecordingError) as part:
+    with atomic_write(png, RecordingError) as part:
         figure.savefig(part, format="png", metadata={"Software": None})

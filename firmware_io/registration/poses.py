@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
@@ -25,7 +25,7 @@ def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_wor
     for number, (name, cloud, T) in enumerate(zip(names, clouds, T_world, strict=True)):
         time = str(number) if cloud.start_ns is None else f"{cloud.start_ns // 10**9}.{cloud.start_ns % 10**9:09d}"
         lines += [f"# {name}", f"{time} " + " ".join(f"{value:.9f}" for value in pose_numbers(T))]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -38,7 +38,7 @@ def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndar
     lines = [",".join(["cloud", *(f"{_AXES[i]}_{_AXES[j]}" for i, j in upper)])]
     for name, matrix in zip(names, covariance, strict=True):
         lines.append(",".join([name, *(f"{matrix[i, j]:.6e}" for i, j in upper)]))
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -139,7 +139,7 @@ class ScannerNode:
         self._scanned_s = time.monotonic()
         self._push(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """See `Watch`."""
         self._check()
         self._status = line

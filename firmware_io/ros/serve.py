@@ -16,7 +16,7 @@ from scanwright.firmware_io.ros.drive import drive
 from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
-from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
 
 
@@ -47,7 +47,12 @@ class Publishing:
 
 
 def serve_devices(
-    out: Path, plan: ScanPlan, ros_args: Sequence[str], progress: Progress, points: Publishing, viewer: Watch = NOBODY
+    out: Path,
+    plan: ScanPlan,
+    ros_args: Sequence[str],
+    progress: Progress,
+    points: Publishing,
+    viewer: Watch = UNWATCHED,
 ) -> None:
     """Publish what the devices say until Ctrl-C; they are stopped on every way out.
 
@@ -57,7 +62,7 @@ def serve_devices(
         ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
         progress: callback.
         points: how they are published.
-        viewer: is told of the scan too.
+        viewer: gets the scan too.
 
     Raises:
         TaskError: the folder has no angle set.

@@ -18,7 +18,7 @@ from mcap.writer import Writer
 
 from scanwright.design.angles import angles_in_use, load_angles
 from scanwright.design.errors import RecordingError, TaskError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
 from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
@@ -89,7 +89,7 @@ def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: Foxglove reads MCAP; name it {out.with_suffix('.mcap').name}")
-    with whole_file(out, RecordingError) as part, mcap_log(part) as log:
+    with atomic_write(out, RecordingError) as part, mcap_log(part) as log:
         shown = _shown(recording, angles, log)
         scans, _ = replay(recording, shown, wait_until=lambda _: None)
         shown.close()
@@ -159,4 +159,4 @@ def tell(batch: Batch, watch: Watch) -> None:
         else:
             watch.joint(thing.time_ns, thing.position_rad)
     for line in batch.lines:
-        watch.told(line)
+        watch.message(line)

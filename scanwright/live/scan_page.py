@@ -20,7 +20,7 @@ from threading import Thread
 from scanwright.design.angles import angles_in_use
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.assembly.own_body import own_body_of
-from scanwright.firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0
@@ -44,7 +44,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         DeviceError: the page cannot be served.
     """
     if not wanted:
-        yield NOBODY
+        yield UNWATCHED
         return
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)

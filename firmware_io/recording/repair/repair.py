@@ -21,7 +21,7 @@ from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
 from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, intact_messages, survey
@@ -67,7 +67,7 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
     if summary.intact and not _read_alike(path, summary.messages):
         summary.repaired["what readers stumble over"] += 1
     if not summary.intact:
-        with whole_file(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
+        with atomic_write(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
             _write(TimedChunks(stream), data, result)
     return summary
 
