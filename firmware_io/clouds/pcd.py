@@ -144,9 +144,9 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     viewpoint = foreign(f"{path}: VIEWPOINT", lambda: [float(word) for word in entries.get("VIEWPOINT", _AT_ORIGIN)])
     if len(viewpoint) != 7:
         raise RecordingError(f"{path}: VIEWPOINT of {len(viewpoint)} numbers: x y z qw qx qy qz")
-    x, y, z, w, i, j, k = viewpoint
+    x, y, z, w, *axis = viewpoint
     comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
-    T = pose_matrix([x, y, z, i, j, k, w])
+    T = pose_matrix([x, y, z, *axis, w])
     header = PcdHeader(tuple(fields), (height, width), end[1].decode(), end.end(), T, comments)
     least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
     room = (len(data) - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)

@@ -271,7 +271,7 @@ WRONG_SOURCES = {
     ("/nothing", "/joint"): "no topic '/nothing'",
     ("/slice:laserScn", "/joint"): r"/slice: no field 'laserScn' in tilt/msg/Slice; did you mean 'laserScan'\?",
     ("/slice", "/joint"): r"/slice is tilt/msg/Slice, not a LaserScan; did you mean '/slice:laserScan'\?",
-    ("/text", "/joint"): "/text is std_msgs/msg/String, not a LaserScan",
+    ("/text", "/joint:a"): "/text is std_msgs/msg/String, not a LaserScan",
     ("/slice:laserScan", "/slice:angle"): r"no field 'angle' in tilt/msg/Slice; did you mean 'stepAngle'\?",
     ("/slice:laserScan", "/slice"): r"/slice is tilt/msg/Slice, not a number; did you mean '/slice:stepAngle'\?",
     ("/slice:laserScan", "/joint:position"): r"is a sequence of 2, not a number; name one number in it",
