@@ -19,6 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -210,11 +211,11 @@ def write(one: Fake, path: Path) -> None:
     store = get_typestore(Stores.ROS1_NOETIC)
     types = store.types
 
-    def header(time_ns: int) -> object:
+    def header(time_ns: int) -> Any:
         stamp = types["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
         return types["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="x")
 
-    def scan(k: int) -> object:
+    def scan(k: int) -> Any:
         return types["sensor_msgs/msg/LaserScan"](
             header=header(int(one.scan_ns[k])),
             angle_min=one.angle_min,
@@ -228,7 +229,7 @@ def write(one: Fake, path: Path) -> None:
             intensities=np.zeros(3 if one.unequal else 0, np.float32),
         )
 
-    def joint(k: int) -> object:
+    def joint(k: int) -> Any:
         return types["sensor_msgs/msg/JointState"](
             header=header(int(one.angle_ns[k])),
             name=["pan"],

@@ -78,11 +78,6 @@ def _shield(lidar: Lidar) -> tuple[str, ...]:
     return () if lidar.sends_only else ("shield",)
 
 
-def _plug_pin(net: str) -> str:
-    """Return the computer's pin for a net."""
-    return CROSSED.get(net, net)
-
-
 def _nets(lidar: Lidar) -> list[tuple[str, float]]:
     """Return the nets that the lidar needs in a ring: power, data, and last the shield, which is optional."""
     most = most_a(lidar)
@@ -153,7 +148,7 @@ def _boxes(
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
     pins = (*power, *data, *(_shield(lidar) if shielded else ()))
     level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
-    ends = (*map(_plug_pin, data), "shield")
+    ends = (*(CROSSED.get(net, net) for net in data), "shield")
     boxes.append(
         Box("plug", f"{plug} of the computer", (_cable(lidar, circuits), *level), (plug,), ends, 5, ("shield",))
     )
@@ -213,7 +208,7 @@ def _wires(
     wires += [Wire(("adapter", pin), ("servo", end), pin, 0.0, 0.0, note="servo cable") for pin, end in joined.items()]
     peaks = dict(_nets(lidar))
     for net in (*_data(lidar), *_shield(lidar)):
-        start = ("plug", _plug_pin(net))
+        start = ("plug", CROSSED.get(net, net))
         if not circuits:
             note = _data_note(net) if _cable(lidar, circuits) == CUT else UNCUT
             wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))

@@ -39,6 +39,7 @@ from scanwright.firmware_io.recording.bag_clocks import (
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings, header_of
@@ -183,7 +184,7 @@ def import_bag(
         if corrections.drop_outliers:
             dropped = outliers(sorted_rad)[0]
         time_ns, first_of = np.unique(sorted_ns[~dropped], return_index=True)
-        log = JointLog(time_ns, corrections.joint_rad(survey.angle[order][~dropped][first_of], unit_rad))
+        log = JointLog(time_ns, joint_positions(survey.angle[order][~dropped][first_of], unit_rad, corrections))
         left_out = survey.left_out + Counter(
             {
                 "angle_at_the_time_of_another": order.size - int(dropped.sum()) - log.time_ns.size,
@@ -354,7 +355,7 @@ def _write(
         nonlocal written
         limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
         raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
-        scan = corrections.scan(raw, time_increment_s, limits_rad)
+        scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
         if _endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:

@@ -14,7 +14,8 @@ from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
 
-_NEAR = (-2, -1, 1, 2)  # neighbours
+_REACH = 4  # neighbours on each side
+_FAR_SHARE = 0.85  # of the neighbours: at a step of an axis that stops half of them are far
 _LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are smaller
 _STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
 _SIGMAS = 8.0
@@ -31,20 +32,22 @@ def usual_speed_rad_s(log: JointLog) -> float:
 
 
 def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
-    """Return which positions lie off both sides of their neighbours, and by how much [rad], shape (n,) each."""
+    """Return which positions lie far off their neighbours, and by how much [rad], shape (n,) each.
+
+    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near.
+    """
     count = position_rad.size
-    off = np.zeros(count)
-    if count < 5:
-        return np.zeros(count, bool), off
-    inner = np.arange(2, count - 2)
-    apart = np.stack([_wrapped(position_rad[inner + k] - position_rad[inner]) for k in _NEAR])
-    before, after = apart[:2], apart[2:]
-    nearest = np.minimum(np.abs(before).min(axis=0), np.abs(after).min(axis=0))
-    middle = np.abs(np.median(apart, axis=0))
-    off[inner] = np.minimum(nearest, middle)
+    wrong, off = np.zeros(count, bool), np.zeros(count)
+    if count <= 2 * _REACH:
+        return wrong, off
+    inner = np.arange(_REACH, count - _REACH)
+    near = [k for k in range(-_REACH, _REACH + 1) if k]
+    apart = np.stack([_wrapped(position_rad[inner + k] - position_rad[inner]) for k in near])
+    off[inner] = np.abs(np.median(apart, axis=0))
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
-    spread = 1.4826 * float(np.median(off[inner]))
-    return off > max(_LEAST_RAD, _STEPS * usual, _SIGMAS * spread), off
+    limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
+    wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
+    return wrong, off
 
 
 def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool) -> Iterator[Finding]:

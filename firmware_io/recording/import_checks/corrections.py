@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from scanwright.design.arrays import Floats
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.samples import Scan
 
 Echo = Literal["first", "last", "strongest"]
 _COUNTS = re.compile(r"(\d{1,12}(?:\.\d+)?)/turn")
@@ -31,22 +27,32 @@ def radians_per(angle_unit: str) -> float:
     return 2 * math.pi / float(counts[1])
 
 
+def read_time_increment(text: str) -> float | Literal["auto"]:
+    """Read a time increment: seconds, or `auto`.
+
+    Raises:
+        RecordingError: it is neither.
+    """
+    try:
+        return "auto" if text == "auto" else float(text)
+    except ValueError as error:
+        raise RecordingError(f"time_increment = '{text}': write seconds, or auto") from error
+
+
 @dataclass(frozen=True, slots=True)
 class Corrections:
     """What the import changes in a recording.
 
     Attributes:
-        angle_scale: turns of the axis for one turn of the angle: negative for the other sense, 0.75 behind a gear.
+        angle_scale: turns of the axis per turn of the angle; negative reverses, 0.75 is a gear.
         angle_zero: angle at joint position 0, in the unit of the angle.
-        time_increment: seconds from beam to beam; "auto" computes it from the step and the time of a mirror turn; None
-            keeps the one of the header.
-        stamp: moment of a scan that its stamp means: its first beam, its last beam, or nothing ("receipt": times of
-            receipt are used for scans and angles).
-        bearings: "limits" spreads the beams from angle_min to angle_max; "increment" keeps the step of the header.
-        scan_offset_s: added to the times of the scans, for a clock that is slow.
-        no_return_from_m: ranges from this one on are no returns; None keeps all ranges.
-        echo: which echo of a MultiEchoLaserScan becomes the range.
-        drop_outliers: drop angles that do not lie between their neighbours.
+        time_increment: seconds from beam to beam; "auto" is the step's share of a mirror turn.
+        stamp: moment that the stamp of a scan means; receipt uses no stamps at all.
+        bearings: limits spreads the beams from angle_min to angle_max.
+        scan_offset_s: added to the times of the scans.
+        no_return_from_m: ranges from this one on are no returns.
+        echo: range of a MultiEchoLaserScan.
+        drop_outliers: drop angles far off both neighbours.
 
     Raises:
         RecordingError: a number is out of bounds.
@@ -72,29 +78,3 @@ class Corrections:
             raise RecordingError(f"time_increment = {self.time_increment}: allowed 0 to 1 s")
         if self.no_return_from_m is not None and not 0 < self.no_return_from_m < math.inf:
             raise RecordingError(f"no_return_from_m = {self.no_return_from_m}: must be above 0 and finite")
-
-    def joint_rad(self, angle: Floats, unit_rad: float) -> Floats:
-        """Return joint positions of angles in the order of their times, turns counted, shape (n,).
-
-        Args:
-            angle: in its unit.
-            unit_rad: radians of that unit.
-        """
-        return self.angle_scale * np.unwrap((angle - self.angle_zero) * unit_rad)
-
-    def scan(self, scan: Scan, time_increment_s: float | None, limits_rad: tuple[float, float]) -> Scan:
-        """Return a scan with the corrections of its header and ranges.
-
-        Args:
-            scan: as received.
-            time_increment_s: to use; None for that of the scan.
-            limits_rad: angle_min and angle_max of its header.
-        """
-        if time_increment_s is not None:
-            scan = replace(scan, time_increment_s=time_increment_s)
-        if self.bearings == "limits" and scan.range_m.size > 1:
-            scan = replace(scan, angle_increment_rad=(limits_rad[1] - limits_rad[0]) / (scan.range_m.size - 1))
-        if self.no_return_from_m is not None:
-            far = scan.range_m >= np.float32(self.no_return_from_m)
-            scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
-        return scan

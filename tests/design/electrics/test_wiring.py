@@ -90,7 +90,7 @@ def test_a_supply_that_no_converter_gives_is_refused():
     scanner = scanner_of(angle_set(), "fdm-0.4", CATALOGUE)
     odd = scanner.servo.model_copy(update={"supply_v": (6.0, 8.4)})
     made = network_of(replace(scanner, servo=odd))
-    assert "MX-64R: gets 11.71 V, wants 6 to 8.4" in [
+    assert "MX-64R: gets 11.71 V, requires 6 to 8.4" in [
         f"{fault.subject}: {fault.message}" for fault in check_network(made)
     ]
     assert "Do not connect MX-64R: it accepts 6 to 8.4 V" in " ".join(made.cautions)
@@ -178,9 +178,9 @@ def test_each_rule_sees_what_it_is_there_for():
     assert "F2: 4 A blows at the 4.1 A of MX-64R" in said(branches=small)
     assert "supply: gives 5 A, all together draw 6.6" in said(supply_a=5.0)
     low = tuple(replace(drop, volts=9.0) for drop in made.drops)
-    assert "UTM-30LX: gets 9.00 V, wants 10.8 to 13.2" in said(drops=low)
+    assert "UTM-30LX: gets 9.00 V, requires 10.8 to 13.2" in said(drops=low)
     high = tuple(replace(drop, idle_v=13.5) for drop in made.drops)
-    assert "UTM-30LX: gets 13.50 V, wants 10.8 to 13.2" in said(drops=high)
+    assert "UTM-30LX: gets 13.50 V, requires 10.8 to 13.2" in said(drops=high)
     red = (*made.wires[1:], replace(made.wires[0], colour="red", source=""))
     assert "switch: the colour red of + in has no source" in said(wires=red)
 

@@ -145,4 +145,4 @@ def test_outliers_are_neither_turning_points_nor_steps_of_an_axis_that_stops():
         assert not outliers(angle)[0].any()
         spiked = angle.copy()
         spiked[[50, 51, 90]] += [1.0, 1.0, -2.0]
-        assert outliers(spiked)[0][90]
+        assert {50, 51, 90} >= set(np.flatnonzero(outliers(spiked)[0]).tolist()) >= {90}

@@ -177,7 +177,7 @@ def test_a_file_that_no_build_wrote_is_one_line(name, content, tmp_path, command
     (tmp_path / name).write_bytes(content)
     code, out, complaint = command("report", tmp_path)
     assert (code, out, len(complaint)) == (2, "", 1)
-    assert complaint[0].startswith(f"scanwright: {tmp_path}") and name in complaint[0]
+    assert complaint[0].startswith(f"error: {tmp_path}") and name in complaint[0]
     assert "build the folder again" in complaint[0]
 
 
