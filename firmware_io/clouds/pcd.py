@@ -122,8 +122,8 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     entries.setdefault("COUNT", ["1"] * len(names))
     for key in ("SIZE", "TYPE", "COUNT"):
         if len(entries.get(key, [])) != len(names):
-            words = " ".join(entries.get(key, []))[:80]
-            raise RecordingError(f"{path}: {key} {words}: must be one for each of {len(names)} fields")
+            given = " ".join(entries.get(key, []))[:80]
+            raise RecordingError(f"{path}: {key} {given}: must be one for each of {len(names)} fields")
     fields = []
     for k, name in enumerate(names):
         kind = f"<{entries['TYPE'][k].lower()}{entries['SIZE'][k]}"

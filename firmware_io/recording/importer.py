@@ -91,7 +91,10 @@ class ImportSummary:
         said = [
             line
             for finding in self.findings
-            for line in (f"{finding.severity}: {finding.message}", *([f"hint: {finding.hint}"] if finding.hint else []))
+            for line in (
+                f"{finding.severity}: {finding.message}",
+                *([f"  hint: {finding.hint}"] if finding.hint else []),
+            )
         ]
         return [
             *said,
@@ -197,7 +200,8 @@ def import_bag(
         doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         findings += [_remark("angle_unit", doubt) for doubt in doubts]
         if not still:
-            findings += angle_findings(sorted_ns, sorted_rad, dropped=corrections.drop_outliers)
+            prompt = not clock.note  # times of receipt are too uneven to judge speeds by
+            findings += angle_findings(sorted_ns, sorted_rad, dropped=corrections.drop_outliers, timed=prompt)
         findings += header_findings(headers.corrected(increment_s, corrections), speed_rad_s)
         if not clock.note and corrections.stamp != "receipt":
             same = angle_source is not None and angle_source.topic == scan_source.topic

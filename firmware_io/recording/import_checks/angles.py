@@ -50,13 +50,14 @@ def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     return wrong, off
 
 
-def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool) -> Iterator[Finding]:
+def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
     """Check the angles in the order of their times.
 
     Args:
         time_ns: shape (n,).
         position_rad: shape (n,).
         dropped: outliers are dropped.
+        timed: the times are exact enough to judge speeds by.
     """
     wrong, off = outliers(position_rad)
     if wrong.any():
@@ -71,7 +72,8 @@ def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool) -> It
             float(share),
             hint="" if dropped else "drop_outliers = true drops them",
         )
-    yield from _jumps(time_ns, position_rad, wrong)
+    if timed:
+        yield from _jumps(time_ns, position_rad, wrong)
     again = np.diff(time_ns) == 0
     apart = np.abs(_wrapped(np.diff(position_rad)))[again]
     if apart.size and apart.max() > _LEAST_RAD / 10:

@@ -13,7 +13,7 @@ from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 
 _JITTER_S = 1e-3  # clocks that agree by NTP or PTP are nearer than this
-_LATE_S = 0.02  # scans that arrive so much later than angles: another clock, or a driver that holds them back
+_LATE_S = 0.01  # scans that arrive so much later than angles: another clock, or a driver that holds them back
 _BLOCKS = 12  # of a recording, in which the shortest delays are compared
 _LEAST = 5  # messages in a block
 _OF_SPREAD = 0.9  # by how much of the jitter in a block the shortest delays of 12 blocks of 7 messages differ by chance
@@ -64,7 +64,7 @@ def clock_findings(
 
 def _drift(scans: Stamps, angles: Stamps, speed_rad_s: float) -> Iterator[Finding]:
     """Compare the shortest delays in blocks of time: a clock that drifts or steps changes them."""
-    edges = np.linspace(*np.quantile(scans.receive_ns, [0, 1]), _BLOCKS + 1)
+    edges = np.linspace(float(scans.receive_ns.min()), float(scans.receive_ns.max()), _BLOCKS + 1)
     least, spread = [], [2 * _JITTER_S]
     for stamps in (scans, angles):
         block = np.clip(np.searchsorted(edges, stamps.receive_ns, side="right") - 1, 0, _BLOCKS - 1)

@@ -52,8 +52,8 @@ class Headers:
     @classmethod
     def of(cls, rows: list[tuple[Any, ...]], longest: Counter[float]) -> Headers:
         """Make the record of `header_of` each scan."""
-        columns = [np.array(column) for column in zip(*rows, strict=True)]
-        return cls(*columns[:7], longest, int(np.sum(columns[7])))
+        stamps, beams, steps, spans, increments, scan_times, limits, unequal = map(np.array, zip(*rows, strict=True))
+        return cls(stamps, beams, steps, spans, increments, scan_times, limits, longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
         """Return the headers as they are after corrections."""
@@ -148,7 +148,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
     hint = f'time_increment = "auto" uses {even_s:.4g} s'
     if not told_s.any():
         cost = f", off by up to {_mm(cost_mm)} at {AT_M:g} m at this speed" if cost_mm >= _LEAST_MM else ""
-        text = f"time_increment is 0: every beam takes the time of its scan's stamp, not its own{cost}"
+        text = f"the time increment is 0: every beam takes the time of its scan's stamp, not its own{cost}"
         yield Finding("time_increment_zero", "warning", "time_increment", text, cost_mm, unit="mm", hint=hint)
         return
     if not even_s:
@@ -159,7 +159,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
             "time_increment_off",
             "warning",
             "time_increment",
-            f"time_increment is {ratio:.3g} times the step's share of a mirror turn ({headers.mirror_turn_s:.4g} s): "
+            f"the time increment is {ratio:.3g} times the step's share of a mirror turn ({headers.mirror_turn_s:.4g} s): "
             f"beams are up to {_mm(cost_mm)} off at {AT_M:g} m at this speed",
             ratio,
             1.0,
@@ -174,7 +174,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
                 "time_increment_changes",
                 "warning",
                 "time_increment",
-                f"{np.sum(wander)} scans have another time_increment than most: beams are up to {_mm(worst_mm)} off at "
+                f"{np.sum(wander)} scans have another time increment than most: beams are up to {_mm(worst_mm)} off at "
                 f"{AT_M:g} m at this speed",
                 float(np.sum(wander)),
                 hint=hint,

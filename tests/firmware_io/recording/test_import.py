@@ -231,7 +231,7 @@ def test_what_is_no_scan_or_no_angle_is_counted(ros1, tmp_path):
     }
     assert [scan.range_max_m for scan in recording.scans()] == [np.inf, 5.0]
     said = "\n".join(summary.warnings)
-    for words in ("1 scans have no beam", "1 to 3 beams", "time_increment is 0", "not later than", "range_max"):
+    for words in ("1 scans have no beam", "1 to 3 beams", "time increment is 0", "not later than", "range_max"):
         assert words in said
 
 
@@ -414,7 +414,7 @@ def test_the_servo_bag_is_taken_with_clear_words(tmp_path):
         "angles carry no stamp",
         "another clock",
         "whole number of degrees",
-        "time_increment is 0",
+        "time increment is 0",
         "33 scans have no beam",
         "408 to 588 beams",
         "up to 1.80 s",
