@@ -159,7 +159,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
             "time_increment_off",
             "warning",
             "time_increment",
-            f"the time increment is {ratio:.3g} times the step's share of a mirror turn ({headers.mirror_turn_s:.4g} s): "
+            f"the time increment is {ratio:.3g} times the step's share of a turn of {headers.mirror_turn_s:.4g} s: "
             f"beams are up to {_mm(cost_mm)} off at {AT_M:g} m at this speed",
             ratio,
             1.0,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.firmware_io.import_mutations import AT_M, FAULTS, errors_mm, good, sample, write
+from benchmarks.firmware_io.recordings.import_mutations import AT_M, FAULTS, errors_mm, good, sample, write
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording.import_checks.angles import outliers
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per

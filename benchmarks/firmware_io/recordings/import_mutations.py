@@ -1,6 +1,6 @@
 """Do the import checks report every fault that matters? Random faults in good recordings.
 
-    python -m benchmarks.firmware_io.import_mutations 400 [FIRST_SEED]
+    python -m benchmarks.firmware_io.recordings.import_mutations 400 [FIRST_SEED]
 
 Each sample is a good recording of a random scanner with one random fault in its headers, clocks or angles. It is
 imported, and the place of every beam at 5 m is compared with the truth. A sample is wrong if more than 1 % of its beams
