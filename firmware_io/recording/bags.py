@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign, foreign_items
 from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.mcap_chunks import profile_of, unchunked_messages
 
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _SEQUENCES = (list, tuple, np.ndarray)
@@ -100,7 +101,10 @@ class Bag:
         """
         self.check(topics)
         wanted = [connection for connection in self._reader.connections if connection.topic in topics]
-        raw_messages = self._reader.messages(connections=wanted)
+        raw_messages: Iterable[tuple[Any, int, bytes]] = self._reader.messages(connections=wanted)
+        if self.path.suffix == ".mcap" and (unchunked := unchunked_messages(self.path, topics)) is not None:
+            by_topic = {connection.topic: connection for connection in wanted}
+            raw_messages = [(by_topic[topic], log_ns, data) for log_ns, topic, data in unchunked]
         for connection, receive_ns, raw in foreign_items(f"{self.path}: damaged bag", raw_messages):
             what = f"{self.path}: {connection.topic}: a message that is not a {connection.msgtype}"
             body = foreign(what, self._reader.deserialize, raw, connection.msgtype)
@@ -141,6 +145,8 @@ def _bag_file(path: Path) -> Path:
         with foreign(_unreadable(path), path.open, "rb") as stream:
             if stream.read(7) != b"#ROSBAG":
                 raise RecordingError(f"{path}: not a ROS 1 bag: it does not begin with #ROSBAG")
+    if path.suffix == ".mcap" and profile_of(path) == "ros1":
+        raise RecordingError(f"{path}: holds ROS 1 messages: name the .bag that it was converted from")
     return path
 
 

@@ -15,18 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from scanwright.design.arrays import Floats, Times
-from scanwright.design.errors import RecordingError, suggest
+from scanwright.design.arrays import Times
+from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.angle_sources import (
-    FrameSource,
-    angles_in,
     is_table,
     parse_frames,
     read_table,
-    turned_rad,
     unit_doubts,
 )
 from scanwright.firmware_io.recording.bag_clocks import (
@@ -35,14 +32,14 @@ from scanwright.firmware_io.recording.bag_clocks import (
     gap_warnings,
     log_at_rest,
     one_clock,
-    times,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
 from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
-from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings, header_of
+from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings
+from scanwright.firmware_io.recording.import_checks.survey import Survey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
@@ -104,20 +101,6 @@ class ImportSummary:
         ]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Survey:
-    """First pass. Scan arrays have one entry per usable scan, angle arrays one per usable angle."""
-
-    scan_stamps: Stamps
-    headers: Headers
-    endless: int
-    angle_stamps: Stamps
-    angle: Floats
-    turned: bool
-    angle_note: str
-    left_out: Counter[str]
-
-
 def import_bag(
     bag: Path | Sequence[Path],
     out: Path,
@@ -163,52 +146,41 @@ def import_bag(
         raise RecordingError(f"also {min(reserved)}: the recording has a topic of its own under this name")
     with open_bag(bag, *parts) as opened:
         opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
-        survey = _survey(opened, scan_source, angle_source, table, corrections)
+        survey = survey_bag(opened, scan_source, angle_source, table, corrections)
         if survey.turned:
             angle_unit, unit_rad = "rad", 1.0
         if unit_rad is None or angle_unit is None:
             raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
         headers = survey.headers
-        increment_s: float | None = None
-        if corrections.time_increment is not None:
-            auto = corrections.time_increment == "auto"
-            increment_s = headers.time_increment_from_turn_s if auto else float(corrections.time_increment)
-        arc_ns = np.rint(
-            1e9 * (headers.time_increment_s if increment_s is None else increment_s) * (headers.beams - 1)
-        ).astype(np.int64)
+        increment_s = _time_increment_s(headers, corrections)
+        told_s = headers.time_increment_s if increment_s is None else increment_s
+        arc_ns = np.rint(1e9 * told_s * (headers.beams - 1)).astype(np.int64)
         clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps), survey, arc_ns, corrections)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
         if not in_time.any():
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
         order = np.argsort(clock.angle_ns, kind="stable")
-        sorted_ns, sorted_rad = clock.angle_ns[order], survey.angle[order] * unit_rad
-        dropped = np.zeros(order.size, bool)
-        if corrections.drop_outliers:
-            dropped = outliers(sorted_rad)[0]
-        time_ns, first_of = np.unique(sorted_ns[~dropped], return_index=True)
-        log = JointLog(time_ns, joint_positions(survey.angle[order][~dropped][first_of], unit_rad, corrections))
+        wrong = outliers(survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
+        time_ns, first_of = np.unique(clock.angle_ns[order][~wrong], return_index=True)
+        log = JointLog(time_ns, joint_positions(survey.angle[order][~wrong][first_of], unit_rad, corrections))
+        doubled = order.size - int(wrong.sum()) - log.time_ns.size
         left_out = survey.left_out + Counter(
-            {
-                "angle_at_the_time_of_another": order.size - int(dropped.sum()) - log.time_ns.size,
-                "angle_outlier": int(dropped.sum()),
-            }
+            {"angle_at_the_time_of_another": doubled, "angle_outlier": int(wrong.sum())}
         )
         still = hold or rests_in_scans(note_in(opened))
-        speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
         findings = [_remark("clock", note) for note in (clock.note, survey.angle_note) if note]
         doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         findings += [_remark("angle_unit", doubt) for doubt in doubts]
         if not still:
-            prompt = not clock.note  # times of receipt are too uneven to judge speeds by
-            findings += angle_findings(sorted_ns, sorted_rad, dropped=corrections.drop_outliers, timed=prompt)
+            in_order = clock.angle_ns[order], survey.angle[order] * unit_rad
+            findings += angle_findings(*in_order, dropped=corrections.drop_outliers, timed=not clock.note)
+        speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
         findings += header_findings(headers.corrected(increment_s, corrections), speed_rad_s)
         if not clock.note and corrections.stamp != "receipt":
             same = angle_source is not None and angle_source.topic == scan_source.topic
             shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
-            even_s = headers.time_increment_from_turn_s  # the header's own may be wrong, and is checked by itself
-            arc_even_ns = np.rint(1e9 * even_s * (headers.beams - 1)).astype(np.int64) if even_s else arc_ns
-            findings += clock_findings(shifted, survey.angle_stamps, arc_even_ns, speed_rad_s, one_message=same)
+            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, one_message=same)
         findings += _scan_findings(survey)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"
@@ -246,7 +218,14 @@ def import_bag(
     )
 
 
-def _corrected(clock: OneClock, survey: _Survey, arc_ns: Times, corrections: Corrections) -> OneClock:
+def _time_increment_s(headers: Headers, corrections: Corrections) -> float | None:
+    """Return the time increment to use; None for that of each scan."""
+    if corrections.time_increment == "auto":
+        return headers.time_increment_from_turn_s
+    return corrections.time_increment
+
+
+def _corrected(clock: OneClock, survey: Survey, arc_ns: Times, corrections: Corrections) -> OneClock:
     """Return the times after the corrections of stamps."""
     scan_ns, angle_ns, note = clock.scan_ns, clock.angle_ns, clock.note
     if corrections.stamp == "receipt":
@@ -256,79 +235,11 @@ def _corrected(clock: OneClock, survey: _Survey, arc_ns: Times, corrections: Cor
     return OneClock(scan_ns + round(1e9 * corrections.scan_offset_s), angle_ns, note)
 
 
-def _survey(
-    bag: Bag,
-    scan_source: Source,
-    angle_source: Source | FrameSource | None,
-    table: tuple[Times, Floats] | None,
-    corrections: Corrections,
-) -> _Survey:
-    left_out: Counter[str] = Counter()
-    scans: list[tuple[int, int, bool]] = []
-    rows: list[tuple[Any, ...]] = []
-    longest: Counter[float] = Counter()
-    angles: list[tuple[int, int, tuple[float, ...]]] = []
-    joints: set[str] = set()
-    if table is not None:
-        angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
-    topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
-    for message in bag.messages(topics):
-        scan_stamp_ns = 0
-        if message.topic == scan_source.topic:
-            laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path, corrections.echo)
-            fault = scan_fault(laser_scan)
-            if fault:
-                left_out[fault] += 1
-            else:
-                scans.append((scan_stamp_ns, message.receive_ns, _endless(laser_scan)))
-                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns, longest))
-        if angle_source is not None and message.topic == angle_source.topic:
-            values = angles_in(message.body, angle_source, bag.path)
-            if not values and isinstance(angle_source, Source):
-                left_out["message_without_the_joint"] += 1
-                joints.update(message.body.name)
-            for value, angle_stamp_ns in values:
-                if all(map(math.isfinite, value)) and (len(value) == 1 or any(value)):
-                    angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, value))
-                else:
-                    left_out["angle_not_a_number"] += 1
-    for source, samples in ((scan_source, scans), (angle_source, angles)):
-        if not samples:
-            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it has no such message"
-            if source is angle_source and isinstance(source, Source) and joints and source.field not in joints:
-                why = f"no joint '{source.field}'{suggest(source.field, joints)}; known: {', '.join(sorted(joints))}"
-                raise RecordingError(f"{bag.path}: {source.topic}: {why}")
-            raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
-    stamps, receives, endless = zip(*scans, strict=True)
-    angle_stamps, angle_receives, values_of = zip(*angles, strict=True)
-    numbers, note = np.array(values_of, dtype=float), ""
-    turned = numbers.shape[1] == 4 and angle_source is not None
-    if turned and angle_source is not None:
-        angle, note = turned_rad(numbers, angle_source)
-    else:
-        angle = numbers[:, 0]
-    return _Survey(
-        scan_stamps=Stamps(times(stamps), times(receives)),
-        headers=Headers.of(rows, longest),
-        endless=sum(endless),
-        angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
-        angle=angle,
-        turned=turned,
-        angle_note=note,
-        left_out=left_out,
-    )
-
-
-def _endless(laser_scan: Any) -> bool:
-    """Whether the longest range is not told: some drivers leave it 0."""
-    return not laser_scan.range_max > laser_scan.range_min
-
-
 def _remark(code: str, message: str) -> Finding:
     return Finding(code, "warning", "recording", message)
 
 
-def _scan_findings(survey: _Survey) -> Iterator[Finding]:
+def _scan_findings(survey: Survey) -> Iterator[Finding]:
     beams = survey.headers.beams
     if survey.left_out["empty_scan"]:
         yield _remark("empty_scans", f"{survey.left_out['empty_scan']} scans have no beam and are left out")
@@ -360,7 +271,7 @@ def _write(
         limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
         raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
         scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
-        if _endless(laser_scan):
+        if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:
             scan = replace(scan, beam_bearing_rad=beams[0], beam_offset_ns=beams[1])

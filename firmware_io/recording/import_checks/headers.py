@@ -84,6 +84,13 @@ class Headers:
         """Time from beam to beam of a mirror that turns evenly: the step's share of a mirror turn."""
         return float(np.median(np.abs(self.step_rad))) / (2 * math.pi) * self.mirror_turn_s
 
+    @property
+    def arc_ns(self) -> Times:
+        """Time from the first to the last beam of each scan, by the mirror turn if it is known, shape (n,)."""
+        even_s = self.time_increment_from_turn_s
+        increment_s = np.full(self.beams.size, even_s) if even_s else self.time_increment_s
+        return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
+
 
 def header_of(scan: Any, stamp_ns: int, longest: Counter[float]) -> tuple[Any, ...]:
     """Return the row of one LaserScan for `Headers.of`, and count its longest range."""
