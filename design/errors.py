@@ -18,10 +18,8 @@
 A command prints the message and exits with the code of its kind, 2 if none is named; any other exception is a bug and
 prints its traceback. The message is one line, or one line for each fault of a file: file, line, field, value, bound
 and a suggestion, as far as they apply.
-
-Messages name fields in Python form, `min_range_m = 9: at most 5`. The command line prints fields that are options of
-the running command as options, `--min-range-m`. It recognises a field by an underscore, at the start of the message
-before ":" or " = ", or in backquotes: "pole = 'x': three numbers", "name `angles` or `poses`".
+It names fields in Python form: `min_range_m = 9: at most 5`. The command line prints those that are its options as
+options. It recognises a field by an underscore, before ":" or " = " at the start, or in backquotes.
 """
 
 from __future__ import annotations

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from scanwright.api import write_cloud as write_cloud
     from scanwright.api.devices import Scanned as Scanned
     from scanwright.cad.assembly.assembly import Assembly as Assembly
-    from scanwright.cad.checks.check import Check as Check
     from scanwright.design.angles import AngleSet as AngleSet
     from scanwright.design.errors import BuildError as BuildError
     from scanwright.design.errors import DeviceError as DeviceError
@@ -58,6 +57,7 @@ if TYPE_CHECKING:
     from scanwright.design.evaluation.evaluation import Evaluation as Evaluation
     from scanwright.design.evaluation.evaluation import Lever as Lever
     from scanwright.design.evaluation.poles import Pole as Pole
+    from scanwright.design.findings import Finding as Finding
     from scanwright.design.search.optimum import Optimum as Optimum
     from scanwright.design.task.task import LoadedTask as LoadedTask
     from scanwright.design.task.task import Task as Task
@@ -79,7 +79,6 @@ if TYPE_CHECKING:
 _MODULES = {
     "scanwright.api.devices": "Scanned",
     "scanwright.cad.assembly.assembly": "Assembly",
-    "scanwright.cad.checks.check": "Check",
     "scanwright.design.angles": "AngleSet",
     "scanwright.design.errors": (
         "BuildError DeviceError DeviceFaultError DeviceTimeoutError InstallError MissingFileError "
@@ -88,6 +87,7 @@ _MODULES = {
     "scanwright.design.evaluation.comparison": "ComparisonRow",
     "scanwright.design.evaluation.evaluation": "Evaluation Lever",
     "scanwright.design.evaluation.poles": "Pole",
+    "scanwright.design.findings": "Finding",
     "scanwright.design.search.optimum": "Optimum",
     "scanwright.design.task.task": "LoadedTask Task",
     "scanwright.firmware_io.assembly.assemble": "AssembleSummary",

@@ -1,4 +1,4 @@
-"""The electrical rule check of a wiring."""
+"""Electrical rule check of a wiring."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ def check_network(network: Network) -> list[Finding]:
         "voltage": _volts,
         "colour_source": _colours,
     }
-    return [Finding(code, "error", *fault) for code, rule in rules.items() for fault in rule(network)]
+    faults = [(code, *fault) for code, rule in rules.items() for fault in rule(network)]
+    return [Finding(code, "error", subject, f"{subject}: {message}") for code, subject, message in faults]
 
 
 def _open(network: Network) -> Faults:

@@ -16,7 +16,7 @@ from scanwright.pipeline.manifest import require_as_built
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.checks.check import Check
+    from scanwright.design.findings import Finding
 
 _LOG = logging.getLogger(__name__)
 
@@ -67,7 +67,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
 
 
 @with_say
-def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Check]:
+def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Finding]:
     """Check the parts of a build folder: clearance, beams, loads, printing. A failed check has severity "error".
 
     The parts are generated from `task.toml` and `angles.json`; no other file is required.

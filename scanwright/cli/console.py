@@ -50,7 +50,6 @@ _SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a 
 _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
 _options: dict[str, str] = {}
-_PERCENTAGE = re.compile(r"\s*\(?(\d{1,3})%\)?\s*")
 
 
 def set_verbosity(value: Verbosity) -> None:
@@ -192,8 +191,6 @@ class ConsoleProgress:
         """See `design.progress.Progress`."""
         if verbosity() is Verbosity.QUIET:
             return
-        if fraction is None:
-            step, fraction = fraction_in(step)
         verbose, terminal = verbosity() is Verbosity.VERBOSE, on_terminal(sys.stderr)
         if terminal and fraction is not None and not verbose:
             print(f"\r\033[K{self._drawn(step, fraction)}", end="", file=sys.stderr, flush=True)
@@ -223,18 +220,12 @@ class ConsoleProgress:
                 speed_estimate_period=_SPEED_S,
             )
             self._bar.add_task(step, total=1.0)
-            self._bar.update(TaskID(0), completed=fraction - 1e-9)  # rich takes the time of what is above this only
+            self._bar.update(TaskID(0), completed=max(fraction, 1e-9))  # rich times from here on, but not from 0
         console = self._bar.console
         self._bar.update(TaskID(0), completed=fraction, description=step)
         with console.capture() as capture:
             console.print(self._bar.get_renderable(), end="", width=console.width - 1)
         return capture.get().rstrip("\n")
-
-
-def fraction_in(line: str) -> tuple[str, float | None]:
-    """Return a step and the fraction that its text ends with, such as "searching (40%)"; goes when no text has one."""
-    share = _PERCENTAGE.search(line)
-    return (line, None) if share is None else (_PERCENTAGE.sub(" ", line, count=1).strip(), int(share[1]) / 100)
 
 
 def _end_bar() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,7 +27,7 @@ from scanwright.cli.help import Commands
 from scanwright.design.errors import notes_of, require
 
 if TYPE_CHECKING:
-    from scanwright.cad.checks.check import Check, Severity
+    from scanwright.design.findings import Finding, Severity
 
 app = Commands("Parts")
 
@@ -52,6 +51,7 @@ def build(
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
+    from scanwright.cad.checks.checks_json import entries_of
 
     try:
         built = api.build(task, out, progress=ConsoleProgress())
@@ -60,7 +60,7 @@ def build(
         raise typer.Exit(130) from None
     _print_failed_checks(built.checks)
     record = {"folder": built.folder, "files": built.files, "warnings": built.warnings, "misfits": built.misfits}
-    record |= {"checks": [asdict(each) for each in built.checks]}
+    record |= {"checks": entries_of(built.checks)}
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     warn(built.misfits)
     report = built.folder / "report.html"
@@ -84,16 +84,18 @@ def report(out: BuildFolder) -> None:
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build (fit, loads, printing)."""
     from scanwright import api
+    from scanwright.cad.checks.checks_json import entries_of
+    from scanwright.design.findings import errors_in, sentence
 
     checks = api.check(out, progress=ConsoleProgress())
     _print_failed_checks(checks)
     warn(api.load_task(out / "task.toml").misfits())
     if as_json:
-        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
+        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": entries_of(checks)})
     else:
-        show(f"{entry.severity:7} {entry.message}" for entry in checks)
+        show(f"{entry.severity:7} {sentence(entry)}" for entry in checks)
         print(_tally(Counter(entry.severity for entry in checks)))
-    raise typer.Exit(1 if any(entry.severity == "error" for entry in checks) else 0)
+    raise typer.Exit(1 if errors_in(checks) else 0)
 
 
 @app.command(example="study fleet --plan")
@@ -124,9 +126,9 @@ def study(
         raise typer.Exit(130) from None
 
 
-def _print_failed_checks(checks: Sequence[Check]) -> None:
+def _print_failed_checks(checks: Sequence[Finding]) -> None:
     """Print the failed checks on standard error, before any result."""
-    from scanwright.cad.checks.check import failure_lines
+    from scanwright.cad.checks.checks_json import failure_lines
 
     for line in failure_lines(checks):
         print_error(line)
@@ -136,4 +138,4 @@ def _tally(counts: Counter[Severity]) -> str:
     """Return how many checks have each severity, as in the report."""
     named: tuple[Severity, ...] = ("error", "warning", "note")
     words = [f"{counts[severity]} {severity}{'' if counts[severity] == 1 else 's'}" for severity in named]
-    return ", ".join([*words, f"{counts['pass']} passed"])
+    return ", ".join([*words, f"{counts['ok']} passed"])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.checks.check import Check, failed_of, read_checks
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.concurrency.processes import Packed, worker_processes
+from scanwright.design.findings import Finding, errors_in, sentence
 from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
@@ -22,7 +24,6 @@ from scanwright.pipeline.ros2.package import write_package
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.cad.files.part_files import PartReport, PartsResult
-    from scanwright.cad.findings import PartFinding
     from scanwright.design.evaluation.as_built import AsBuilt
     from scanwright.design.evaluation.metres import PlaneFigures
     from scanwright.design.left_out import LeftOut
@@ -62,7 +63,7 @@ class Made:
     optimum: Optimum
     chosen: Chosen
     as_built: AsBuilt
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
 
 
@@ -82,14 +83,14 @@ class Build:
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[Finding, ...]
     made: Made | None
     misfits: tuple[str, ...] = ()
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[Finding, ...]:
         """The checks that failed; the parts are safe to make only if there are none."""
-        return failed_of(self.checks)
+        return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
         """Return the result as lines; warnings with the same remedy are one, unless `in_full`."""
@@ -101,7 +102,7 @@ class Build:
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
-            *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
+            *finding_lines(self.made.findings, self.checks, in_full),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
 
@@ -111,26 +112,18 @@ class PartsMade:
     """The parts: reports, findings, omissions, and the solids for processes that have the kernel."""
 
     parts: tuple[PartReport, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     left_out: tuple[LeftOut, ...]
     result: Packed[PartsResult]
 
 
-def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
-    return [f"{finding.severity}: {finding.message}" for finding in findings]
-
-
-def _gathered(findings: Sequence[PartFinding]) -> list[str]:
-    """Return each finding as a line; those about values of products as one list of values to measure."""
-    to_measure: dict[str, list[str]] = {}
-    for finding in findings:
-        if finding.value:
-            to_measure.setdefault(finding.subject, []).append(finding.value)
-    lines = _one_by_one([finding for finding in findings if not finding.value])
-    if to_measure:
-        lines.append("warning: unverified dimensions; measure your own devices before printing (details: -v):")
-        lines += [f"  {product}: {', '.join(values)}" for product, values in to_measure.items()]
-    return lines
+def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_full: bool) -> list[str]:
+    """Return one line for each finding and each unverified value; unless `in_full`, only a count of these."""
+    unverified = [check for check in checks if check.code == "unverified"]
+    lines = [f"{each.severity}: {sentence(each)}" for each in (*findings, *(unverified if in_full else ()))]
+    counts = Counter(check.subject for check in unverified) if not in_full else {}
+    todo = "measure yours before you print, report.html lists them"
+    return lines + [f"warning: {name}: unverified values that shape parts: {n}: {todo}" for name, n in counts.items()]
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
@@ -230,7 +223,7 @@ def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progres
 
 def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, progress: Progress
-) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
+) -> tuple[tuple[Finding, ...], tuple[LeftOut, ...]]:
     """Write the files for the workshop except the drawings; returns findings and omissions."""
     from scanwright.cad.files.workshop_files import export_scanner
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -82,7 +82,8 @@ def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
     Raises:
         TaskError: there is no such region.
     """
-    lines = _REGIONS[word](numbers, height_m)
+    values = (90 - numbers[0], 90 + numbers[1]) if word == "around" else numbers
+    lines = _LINES[word].format(*values, height_m=height_m).splitlines()
     try:
         _REGION.validate_python(tomllib.loads("\n".join(lines)))
     except ValidationError as error:
@@ -91,53 +92,28 @@ def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
     return ["[[weight]]", *lines, ""]
 
 
-def _ground(numbers: Numbers, height_m: float) -> list[str]:
-    return [
-        'shape = "ground"      # what matters, all of it alike: value = 2 makes a region count twice',
-        f"from_m = {numbers[0]:g}",
-        f"to_m = {numbers[1]:g}",
-        f"width_m = {numbers[2]:g}",
-        f"height_m = {height_m:g}        # of the scanner over the ground",
-        "heading_deg = 0       # 0 is ahead, 90 to the left",
-    ]
-
-
-def _ceiling(numbers: Numbers, height_m: float) -> list[str]:
-    return [
-        'shape = "ceiling"',
-        f"ceiling_m = {numbers[0]:g}       # over the ground",
-        f"height_m = {height_m:g}        # of the scanner over the ground",
-        "from_m = -2           # behind",
-        "to_m = 2              # ahead",
-        "width_m = 4",
-    ]
-
-
-def _wall(numbers: Numbers, height_m: float) -> list[str]:
-    return [
-        'shape = "wall"',
-        f"distance_m = {numbers[0]:g}",
-        f"width_m = {numbers[1]:g}",
-        f"height_m = {height_m:g}        # of the scanner over the ground",
-        "bottom_m = 0          # of the wall, over the ground",
-        "top_m = 2.5",
-        "heading_deg = 0       # 0 is ahead, 90 to the left",
-    ]
-
-
-def _around(numbers: Numbers, _: float) -> list[str]:
-    up, down = numbers
-    return ['shape = "band"', f"theta_deg = [{90 - up:g}, {90 + down:g}]  # 0 is up, 90 level, 180 down"]
-
-
-def _all(_numbers: Numbers, _: float) -> list[str]:
-    return ['shape = "all"']
-
-
-_REGIONS: dict[str, Callable[[Numbers, float], list[str]]] = {
-    "ground": _ground,
-    "ceiling": _ceiling,
-    "wall": _wall,
-    "around": _around,
-    "all": _all,
+_LINES = {
+    "ground": """shape = "ground"      # what matters, all of it alike: value = 2 makes a region count twice
+from_m = {0:g}
+to_m = {1:g}
+width_m = {2:g}
+height_m = {height_m:g}        # of the scanner over the ground
+heading_deg = 0       # 0 is ahead, 90 to the left""",
+    "ceiling": """shape = "ceiling"
+ceiling_m = {0:g}       # over the ground
+height_m = {height_m:g}        # of the scanner over the ground
+from_m = -2           # behind
+to_m = 2              # ahead
+width_m = 4""",
+    "wall": """shape = "wall"
+distance_m = {0:g}
+width_m = {1:g}
+height_m = {height_m:g}        # of the scanner over the ground
+bottom_m = 0          # of the wall, over the ground
+top_m = 2.5
+heading_deg = 0       # 0 is ahead, 90 to the left""",
+    "around": """shape = "band"
+theta_deg = [{0:g}, {1:g}]  # 0 is up, 90 level, 180 down""",
+    "all": 'shape = "all"',
 }
+"""Word of a region -> its lines in a task file."""

@@ -35,7 +35,7 @@ from scanwright.study.results import Result
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.checks.check import Check
+    from scanwright.design.findings import Finding
 
 LOADS = ("static_torque", "spin_up_torque", "tilt_moment", "axial_load", "bearing_load")
 BENDS = "deflection"  # of linkage and shaft, by finite elements
@@ -161,20 +161,20 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
     return Refused(failed[0]) if failed else _weighed(scanner, assembly, checks, shadow)
 
 
-def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: SelfOcclusion) -> BuiltSetting:
+def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Finding], shadow: SelfOcclusion) -> BuiltSetting:
     from scanwright.cad.assembly.masses import link_bodies
 
     margins = {
-        check.kind: check.limit / check.value
+        check.code: check.limit / check.value
         for check in checks
-        if check.kind in LOADS and check.limit is not None and check.value
+        if check.code in LOADS and check.limit is not None and check.value
     }
     weakest = min(margins, key=lambda kind: margins[kind], default="")
     ring = () if scanner.slip_ring is None else (scanner.slip_ring,)
     values = {
         "mass_g": 1000 * sum(body.mass_kg for body in link_bodies(scanner, assembly).values()),
         "load_margin": margins.get(weakest),
-        "deflection_deg": next((check.value for check in checks if check.kind == BENDS), None),
+        "deflection_deg": next((check.value for check in checks if check.code == BENDS), None),
         "cost_usd": price_usd([scanner.lidar, scanner.servo, *ring, *assembly.layout.drive.products]),
     }
     return BuiltSetting(shadow, values, weakest)

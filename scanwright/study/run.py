@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.cad.checks.check import failure_lines
+from scanwright.cad.checks.checks_json import failure_lines
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError

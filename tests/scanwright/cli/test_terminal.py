@@ -61,10 +61,20 @@ def test_fractions_become_one_bar_with_the_time_that_is_left(screen):
     progress("making the parts", 0.25)
     assert re.fullmatch("\u2501{6}.* 25% 0:01:30 making the parts", screen.lines()[-1])
     clock.now_s += 30
-    progress("drawing (50%)")
+    progress("drawing", 0.5)
     assert " 50% 0:01:00 drawing" in screen.lines()[-1]
     show(["done"])
     assert screen.lines() == ["  .. reading the task", "done", ""]
+
+
+def test_a_bar_that_begins_late_estimates_from_there_on(screen):
+    screen, clock = screen(), Clock()
+    progress = ConsoleProgress(clock)
+    for fraction in (0.5, 0.5, 0.75):
+        progress("writing", fraction)
+        assert fraction == 0.75 or " 50% -:--:-- writing" in screen.lines()[-1]
+        clock.now_s += 10
+    assert " 75% 0:00:20 writing" in screen.lines()[-1]
 
 
 def test_a_bar_begins_anew_with_other_work(screen):
@@ -109,20 +119,18 @@ def test_the_environment_variable_of_version_0_1_still_works(monkeypatch, capsys
     assert capsys.readouterr().err == ""
 
 
-def test_in_a_file_a_percentage_is_printed_every_ten_seconds_and_nothing_moves(capsys):
+def test_in_a_file_a_fraction_is_printed_every_ten_seconds_and_nothing_moves(capsys):
     clock = Clock()
-    say = ConsoleProgress(clock)
+    progress = ConsoleProgress(clock)
     for second in range(25):
         clock.now_s = float(second)
-        say(f"scanning ({4 * second}%)")
-    say("drawing (97%)")
-    say("assembling")
-    said = capsys.readouterr().err
-    assert said.splitlines() == [f"  .. scanning ({p}%)" for p in (0, 40, 80)] + [
-        "  .. drawing (97%)",
-        "  .. assembling",
-    ]
-    assert not re.search(r"[\r\033]", said)
+        progress(f"scanning, {second} scans", second / 25)
+    progress("drawing", 0.97)
+    progress("assembling")
+    lines = [f"  .. scanning, {second} scans ({4 * second}%)" for second in (0, 10, 20)]
+    printed = capsys.readouterr().err
+    assert printed.splitlines() == [*lines, "  .. drawing (97%)", "  .. assembling"]
+    assert not re.search(r"[\r\033]", printed)
 
 
 def test_quiet_prints_results_only_and_verbose_all(capsys):
@@ -134,9 +142,9 @@ def test_quiet_prints_results_only_and_verbose_all(capsys):
     assert capsys.readouterr() == ("result\n", "")
     with command_console():
         set_verbosity(Verbosity.VERBOSE)
-        say = ConsoleProgress(Clock())
-        for percent in range(3):
-            say(f"scanning ({percent}%)")
+        progress = ConsoleProgress(Clock())
+        for fraction in (0.0, 0.01, 0.02):
+            progress("scanning", fraction)
     assert len(capsys.readouterr().err.splitlines()) == 3
     assert console.verbosity() is Verbosity.USUAL
 

@@ -15,10 +15,10 @@ from imports import ROOT
 from patience import BOUND_S
 
 import scanwright.api as sw
-from scanwright.cad.findings import PartFinding
 from scanwright.cli.app import run as scanwright_command
 from scanwright.design.angles import load_angles
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
 from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import load_task
@@ -410,17 +410,17 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
 
 
 def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
-    found = [PartFinding("turn_from_metal", "note", "shaft", "shaft: have it turned")]
-    found += [PartFinding("unverified", "warning", "UTM", f"UTM: {v} is not verified", v) for v in ("a = 1", "b = 2")]
+    found = [Finding("turn_from_metal", "note", "shaft", "shaft: of metal", hint="have it turned")]
+    checks = tuple(Finding("unverified", "note", "UTM", f"UTM: {v} is not verified") for v in ("a = 1", "b = 2"))
     told = SimpleNamespace(table=list, lines=list)
     made = Made(told, told, told, tuple(found), ())
-    gathered = Build(tmp_path, ("one",), ("slow",), (), made).lines()
+    gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
     assert gathered[0] == "warning: slow"
-    assert gathered[1] == "note: shaft: have it turned"
-    assert gathered[2].startswith("warning: unverified dimensions; measure your own devices")
-    assert gathered[3] == "  UTM: a = 1, b = 2"
-    assert Build(tmp_path, ("one",), (), (), made).lines(in_full=True)[:3] == [
-        "note: shaft: have it turned",
-        "warning: UTM: a = 1 is not verified",
-        "warning: UTM: b = 2 is not verified",
+    assert gathered[1] == "note: shaft: of metal: have it turned"
+    assert gathered[2].startswith("warning: UTM: unverified values that shape parts: 2: measure yours")
+    assert len(gathered) == 4
+    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[:3] == [
+        "note: shaft: of metal: have it turned",
+        "note: UTM: a = 1 is not verified",
+        "note: UTM: b = 2 is not verified",
     ]
