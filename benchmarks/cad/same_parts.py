@@ -1,12 +1,12 @@
 """Whether a change of the code leaves the parts and checks of some scanners as they were.
 
     python -m benchmarks.cad.same_parts choose SCANNERS.json [RANDOM]
-    python -m benchmarks.cad.same_parts build SCANNERS.json RESULT.json [EARLIER.json] [NAME...]
+    python -m benchmarks.cad.same_parts build SCANNERS.json RESULT.json [EARLIER.json] [--parts] [NAME...]
 
 `choose` searches each shipped task once, adds random scanners that can be laid out, and writes them. `build` makes
 the parts of each scanner, or of those whose names are given, and writes the SHA-256 of every file of the build (STEP,
-STL, drawings, print files, lists) and every check. If an earlier result is given, it prints what differs: parts and
-checks fail, other files are listed.
+STL, drawings, print files, lists) and every check; with `--parts` no drawings, print files and lists. If an earlier
+result is given, it prints what differs: parts and checks fail, other files are listed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
@@ -50,7 +50,7 @@ def choose(file: Path, count: int) -> None:
     file.write_text(json.dumps(scanners, indent=1) + "\n", encoding="utf-8")
 
 
-def build(scanners: Path, result: Path, earlier: Path | None, names: list[str]) -> int:
+def build(scanners: Path, result: Path, earlier: Path | None, names: list[str], parts_only: bool) -> int:
     """Build them, write the result, and return 1 if parts or checks differ from an earlier result."""
     catalogue, built = load_catalogue(), Result()
     before: Result = {} if earlier is None else json.loads(earlier.read_text(encoding="utf-8"))
@@ -58,9 +58,13 @@ def build(scanners: Path, result: Path, earlier: Path | None, names: list[str]) 
     for name, record in json.loads(scanners.read_text(encoding="utf-8")).items():
         if names and name not in names:
             continue
-        built[name] = _built(_scanner(record, catalogue))
+        built[name] = _built(_scanner(record, catalogue), parts_only)
         result.write_text(json.dumps(built, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        faults = list(_differences(before[name], built[name])) if name in before else ["not in the earlier result"]
+        faults = ["not in the earlier result"]
+        if name in before:
+            faults = [
+                fault for fault in _differences(before[name], built[name]) if not (parts_only and "missing" in fault)
+            ]
         differ |= any(fault.startswith(("part", "check", "error")) for fault in faults)
         print(f"{name}: {len(built[name]['files'])} files, {len(built[name]['checks'])} checks", flush=True)
         for fault in faults if before else ():
@@ -68,12 +72,11 @@ def build(scanners: Path, result: Path, earlier: Path | None, names: list[str]) 
     return int(differ)
 
 
-def _built(scanner: Scanner) -> dict[str, Any]:
+def _built(scanner: Scanner, parts_only: bool) -> dict[str, Any]:
     from scanwright.cad.checks.run import check_files
     from scanwright.cad.drawings.files import drawing_files
     from scanwright.cad.files.part_files import build_parts, write_files
     from scanwright.cad.files.workshop_files import export_scanner
-    from scanwright.cad.layout.layout import config_hash
 
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -82,8 +85,9 @@ def _built(scanner: Scanner) -> dict[str, Any]:
         except BuildError as error:
             return {"error": str(error), "files": {}, "checks": []}
         checks = check_files(scanner, made.assembly, lambda _: None)
-        export_scanner(scanner, made, folder, lambda _: None)
-        write_files(folder, drawing_files(scanner, made.assembly, made.masses_g(), config_hash(scanner)))
+        if not parts_only:
+            export_scanner(scanner, made, folder, lambda _: None)
+            write_files(folder, drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest))
         write_files(folder, checks)
         files = {
             str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
@@ -136,11 +140,11 @@ def _random(catalogue: Catalogue) -> Iterator[Scanner]:
             sensor=lidar,
             servo=servo,
             slip_ring=None if sweeps else ring,
-            motion={"mode": "sweep", "limits_deg": (-90, 90), "period_s": 20.0} if sweeps else None,  # type: ignore[arg-type]
+            motion={"mode": "sweep", "limits_deg": (-90, 90), "period_s": 20.0} if sweeps else None,
         )
         scanner = scanner_of(angles, printer, catalogue, modules=Modules(tripod_foot=foot))
         try:
-            layout_of(scanner)
+            laid_out(scanner)
         except BuildError:
             continue
         yield scanner
@@ -166,8 +170,8 @@ def main(arguments: list[str]) -> int:
         return 0
     scanners, result, *rest = arguments[1:]
     files = [Path(one) for one in rest if one.endswith(".json")]
-    names = [one for one in rest if not one.endswith(".json")]
-    return build(Path(scanners), Path(result), files[0] if files else None, names)
+    names = [one for one in rest if not one.endswith(".json") and one != "--parts"]
+    return build(Path(scanners), Path(result), files[0] if files else None, names, "--parts" in rest)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,11 @@ from scanwright.cad.checks.check import Check, Severity, at_most, doubted, note,
 from scanwright.cad.checks.loads.belt import belt_loads
 from scanwright.cad.checks.loads.direct import direct_loads
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.balance.counterweight import RUBS_NM
-from scanwright.cad.layout.balance.imbalance import keeps_flank, play_matters
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.drive import Stack
 from scanwright.cad.layout.loads import FAR_MM, Weight
 from scanwright.cad.layout.names import SERVO
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.counterweight import RUBS_NM
+from scanwright.cad.layout.rotor.imbalance import keeps_flank, play_matters
 from scanwright.design.scanner import Scanner
 
 SPIN_UP_S = 0.2
@@ -23,14 +22,14 @@ SLOWEST_PERIOD_S = 1.0  # where the angle set names no motion
 BALANCE_AT_MM = 50.0  # from the axis, where a counterweight is worked out
 
 
-def mechanics_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> list[Check]:
+def mechanics_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Check]:
     """Everything that has to do with weight.
 
     Args:
-        scanner: angles and products.
-        stack: its layout.
+        layout: of the scanner.
         bodies: of `masses.link_bodies`.
     """
+    scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
     doubt_m = off_axis_doubt_m(bodies)
     off = "centre of mass off the axis"
@@ -38,16 +37,15 @@ def mechanics_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inerti
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * doubt_m),
         *_torques(scanner, rotor, weight, weight.across_n * doubt_m),
         _flanks(scanner, rotor, weight, doubt_m),
-        *load_checks(scanner, stack, bodies),
+        *load_checks(layout, bodies),
     ]
 
 
-def load_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> list[Check]:
+def load_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Check]:
     """Forces on servo and bearings against their ratings; arguments as for `mechanics_checks`."""
-    rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
-    if isinstance(stack, BeltStack):
-        return belt_loads(scanner, stack, rotor, weight, spin_up_nm(scanner, rotor, weight))
-    return direct_loads(scanner, stack, weight)
+    scanner = layout.scanner
+    rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, layout.stack, bodies)
+    return [*belt_loads(layout, rotor, weight, spin_up_nm(scanner, rotor, weight)), *direct_loads(layout, weight)]
 
 
 def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_nm: float) -> list[Check]:

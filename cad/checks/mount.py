@@ -61,10 +61,10 @@ def mount_checks(
 
 def carried(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:
     """All above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
-    rotor, standing = rotor_of(scanner, bodies), bodies["servo"]
+    rotor, fixed = rotor_of(scanner, bodies), bodies["servo"]
     below = [assembly.inertial(name) for name in (BASE_MOUNT, TRIPOD_FOOT) if name in assembly.made]
     shares = [
-        (standing.mass_kg, standing.centre_m),
+        (fixed.mass_kg, fixed.centre_m),
         (rotor.mass_kg, rotor.centre_m * [0.0, 0.0, 1.0]),
         *((-body.mass_kg, body.centre_m) for body in below),
     ]

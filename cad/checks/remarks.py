@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import rotor_weight
-from scanwright.cad.checks.mechanics import load_checks
+from scanwright.cad.assembly.masses import rotor_of, rotor_weight
+from scanwright.cad.checks.loads.belt import belt_loads
+from scanwright.cad.checks.mechanics import spin_up_nm
 from scanwright.cad.findings import PartFinding
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
-from scanwright.cad.layout.direct.cage import share_weight
+from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.direct.misalignment import SHARE, worst_moment_nm
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import DriveLayout, Mounted
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
-from scanwright.cad.layout.modules.unasked import unasked
-from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.placement import Placement
 from scanwright.cad.screws import passing_hole
 from scanwright.design.catalogue.products import Printer, Product
-from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 # Values of a product that shape no part alone.
@@ -36,14 +36,8 @@ def findings_of(scanner: Scanner, assembly: Assembly, bodies: dict[str, Inertial
     found = [
         _turn_from_metal(part.name, part.why_metal) for part in assembly.parts.values() if part.process == "turned"
     ]
-    if isinstance(layout.stack, BeltStack):
-        found += [
-            PartFinding(check.kind, "warning", check.where, check.message)
-            for check in load_checks(scanner, layout.stack, bodies)
-            if check.severity in ("warning", "error")
-        ]
-    else:
-        found += _tilt_moment(scanner, layout.stack, bodies)
+    found += _overloads(layout, bodies)
+    found += _tilt_moment(layout, bodies)
     if layout.deck.flat:
         found.append(_held_by_screws(scanner, layout.drive.mounted))
     for product in products_of(scanner, layout.drive):
@@ -57,22 +51,7 @@ def products_of(scanner: Scanner, drive: DriveLayout) -> list[Product]:
     return list({product.name: product for product in found if product is not None}.values())
 
 
-def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
-    """Parts that this scanner does not need."""
-    layout = assembly.layout
-    out = [*layout.drive.left_out]
-    if isinstance(layout.counterweight, LeftOut):
-        out.append(layout.counterweight)
-    ties = hub_tie_of(layout.scanner, layout.linkage), plate_ties_of(layout.scanner.lidar, layout.linkage)
-    out += [tie for tie in ties if isinstance(tie, LeftOut)]
-    if layout.deck.tripod is None:
-        out.append(unasked(TRIPOD_FOOT))
-    if layout.deck.flat:
-        out.append(LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
-    return tuple(out)
-
-
-def without_traps(printer: Printer, joints: list[Joint]) -> list[PartFinding]:
+def without_traps(printer: Printer, joints: Sequence[Joint]) -> list[PartFinding]:
     """Screws that hold in plain threads although the printer's profile asks for nuts."""
     if printer.thread != "nut":
         return []
@@ -93,12 +72,25 @@ def _turn_from_metal(part: str, why: str) -> PartFinding:
     return PartFinding("turn_from_metal", "note", part, message)
 
 
-def _tilt_moment(scanner: Scanner, stack: DirectStack, bodies: dict[str, Inertial]) -> list[PartFinding]:
+def _overloads(layout: Placement, bodies: dict[str, Inertial]) -> list[PartFinding]:
+    """What a belt, its bearings and the horn under it carry too much of."""
+    rotor, weight = rotor_of(layout.scanner, bodies), rotor_weight(layout.scanner, layout.stack, bodies)
+    return [
+        PartFinding(check.kind, "warning", check.where, check.message)
+        for check in belt_loads(layout, rotor, weight, spin_up_nm(layout.scanner, rotor, weight))
+        if check.severity in ("warning", "error")
+    ]
+
+
+def _tilt_moment(layout: Placement, bodies: dict[str, Inertial]) -> list[PartFinding]:
     """What the weight of all that turns puts on a horn that carries it, against its rating."""
+    scanner, stack, cage = layout.scanner, layout.drive.of(DirectStack), layout.drive.of(BearingCage)
+    if stack is None:
+        return []
     rated, servo, weight = rated_moment_nm(scanner), scanner.servo, rotor_weight(scanner, stack, bodies)
-    moment = share_weight(scanner, stack, weight).horn_moment_nm
-    if rated is not None and stack.bearing is not None:
-        rated, moment = SHARE * rated, max(worst_moment_nm(scanner, stack, weight).values())
+    moment = share_weight(scanner, stack, cage, weight).horn_moment_nm
+    if rated is not None and cage is not None:
+        rated, moment = SHARE * rated, max(worst_moment_nm(cage, weight).values())
     if rated is None or moment <= rated:
         return []
     help_ = "lighten what turns, or raise the axis"

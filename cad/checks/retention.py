@@ -18,7 +18,6 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.check import Check, at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import DECK, LIDAR, TRIPOD
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
@@ -34,7 +33,7 @@ AXIAL = 0.9  # cosine to the rotation axis above which a screw does not point at
 
 def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Check]:
     """For each joint what hangs on it and how often over it holds that, and how its screws are tightened."""
-    return [check for joint in joints_of(assembly.layout) for check in _of_joint(scanner, assembly, joint)]
+    return [check for joint in assembly.layout.joints for check in _of_joint(scanner, assembly, joint)]
 
 
 def material_of(assembly: Assembly, body: str) -> Material:
@@ -50,7 +49,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     """Parts and products that have no way to the deck but through a joint."""
     layout = assembly.layout
-    ways = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
+    ways = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in layout.joints if other != joint]
     ways += layout.drive.borne
     everything = {name for way in ways for name in way} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
     reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}

@@ -9,14 +9,14 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.check import Check, at_least, note, tidy
 from scanwright.cad.layout.cables import joint
 from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
-from scanwright.cad.layout.cables.tie_seat import TieSeat
 from scanwright.cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
+from scanwright.cad.layout.tie_seat import TieSeat
 
 
-def standing_checks(assembly: Assembly) -> list[Check]:
-    """Bend and length of every cable that stands still."""
+def cable_checks(assembly: Assembly) -> list[Check]:
+    """Bend and length of every cable that does not turn."""
     found = []
-    for lead in assembly.standing:
+    for lead in assembly.layout.cables:
         if lead.path is None:
             what = (
                 f"{lead.name}: from {lead.device} no way to the deck bends by {lead.radius:g} mm or more and clears "
@@ -34,16 +34,14 @@ def standing_checks(assembly: Assembly) -> list[Check]:
 
 def lead_checks(assembly: Assembly) -> list[Check]:
     """Four values of every lead; one word where there are none to check."""
-    ring = assembly.layout.scanner.slip_ring
-    if not assembly.leads:
+    ring, leads = assembly.layout.scanner.slip_ring, assembly.layout.leads
+    if not leads:
         what = "no ring: the cables of the lidar need a loose loop for the sweep"
         if ring is not None:
             what = f"lead_diameter_mm of {ring.name} is not in the catalogue, nor how its leads bend: no way was laid"
         return [Check("leads", "note", None, None, "", ROTOR_LEADS, f"{ROTOR_LEADS}: {what}")]
     seat = assembly.layout.linkage.hub_tie
-    return [
-        check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}", seat)
-    ]
+    return [check for i, lead in enumerate(leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}", seat)]
 
 
 def _checks(lead: RotorLead, where: str, seat: TieSeat | None) -> list[Check]:

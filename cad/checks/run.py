@@ -18,9 +18,9 @@ from scanwright.cad.checks.deflection import deflection_checks
 from scanwright.cad.checks.mechanics import mechanics_checks
 from scanwright.cad.checks.mount import mount_checks
 from scanwright.cad.checks.printing import printing_checks
-from scanwright.cad.checks.remarks import left_out_of, products_of, unverified
+from scanwright.cad.checks.remarks import products_of, unverified
 from scanwright.cad.checks.retention import retention_checks
-from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
+from scanwright.cad.checks.rotor_leads import cable_checks, lead_checks
 from scanwright.design.catalogue.products import Product
 from scanwright.design.electrics.rules import broken_rules
 from scanwright.design.electrics.wiring import network_of
@@ -73,15 +73,15 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
         *known_errors(products),
         *clearance_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
-        *mechanics_checks(scanner, layout.stack, bodies),
+        *mechanics_checks(layout, bodies),
         *retention_checks(scanner, assembly),
         *electric_checks(scanner),
         *lead_checks(assembly),
-        *standing_checks(assembly),
+        *cable_checks(assembly),
         *deflection_checks(scanner, assembly, bodies, meshes),
         *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
-        *module_checks(scanner, left_out_of(assembly)),
+        *module_checks(scanner, layout.left_out),
         *doubts,
     ]
     return checks, shadow

@@ -9,18 +9,18 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import print_words
 from scanwright.cad.checks.remarks import products_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.words import tied_at
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.joints import Joint
+from scanwright.cad.parts.part_spec import Row
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from scanwright.design.electrics.wiring import network_of
@@ -86,7 +86,7 @@ class BomItem:
 def items_of(
     scanner: Scanner,
     assembly: Assembly,
-    joints: list[Joint],
+    joints: Sequence[Joint],
     masses_g: dict[str, float],
     config_hash: str,
 ) -> list[BomItem]:
@@ -95,7 +95,7 @@ def items_of(
     Args:
         scanner: angles and products.
         assembly: the solids.
-        joints: of `joints_of`.
+        joints: of the layout.
         masses_g: of the made parts.
         config_hash: of what shapes the parts.
     """
@@ -113,7 +113,7 @@ def items_of(
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _with_it(assembly.layout.drive, joints)
+    items += _with_it(assembly, joints)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
@@ -132,16 +132,8 @@ def bom_text(items: list[BomItem]) -> str:
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
         if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            number = _order_number(product, drive)
-            yield _bought(product, max(1, drive.products.count(product)), number)
-
-
-def _order_number(product: Product, drive: DriveLayout) -> str:
-    """What to ask a shop for: a belt comes in lengths."""
-    stack = drive.stack
-    if isinstance(stack, BeltStack) and product == stack.belt:
-        return f"{product.name}, {stack.belt_teeth} teeth, {stack.belt_teeth * stack.belt.pitch_mm:g} mm"
-    return product.name
+            orders = (station.order for station in drive.stations if station.product == product and station.order)
+            yield _bought(product, max(1, drive.products.count(product)), next(orders, product.name))
 
 
 def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
@@ -163,7 +155,7 @@ def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, n
     )
 
 
-def _screws(joints: list[Joint]) -> Iterator[BomItem]:
+def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: dict[str, int] = {}
     inserts: dict[str, int] = {}
@@ -206,7 +198,7 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
 
 def _ties(assembly: Assembly) -> Iterator[BomItem]:
     """Cable ties, one for each place that the steps name."""
-    places = Counter(tied_at(assembly.layout, assembly.leads))
+    places = Counter(tied_at(assembly.layout))
     if places:
         note = f"{', '.join(f'{count} at the {place}' for place, count in places.items())}; price unknown"
         yield BomItem("wiring", "cable tie, 2.5 mm", quantity=places.total(), source="assembly.md", note=note)
@@ -273,11 +265,10 @@ def _electrics(scanner: Scanner) -> Iterator[BomItem]:
         )
 
 
-def _with_it(drive: DriveLayout, joints: list[Joint]) -> Iterator[BomItem]:
-    """Small things of the drive, what is used up, and tools."""
-    for part, source in drive.needs:
-        kind = "consumable" if estimate_usd("consumable", part) else "wiring"
-        yield BomItem(kind, part, quantity=1, source=source, note="price unknown")
+def _with_it(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomItem]:
+    """Small things of the parts, what is used up, and tools."""
+    rows = dict.fromkeys(row for name in assembly.made for row in assembly.parts[name].rows)
+    yield from (_row(row) for row in rows if row.kind != "tool")
     locked = "screws that end in metal or nuts"
     yield BomItem(
         "consumable", "threadlocker, medium strength", quantity=1, source=locked, note="a few drops; price unknown"
@@ -286,14 +277,14 @@ def _with_it(drive: DriveLayout, joints: list[Joint]) -> Iterator[BomItem]:
     yield BomItem("tool", "hexagon keys", quantity=1, source=JOINTS, note=f"for {sizes}; price unknown")
     yield BomItem("tool", "torque screwdriver, 0.1 to 1 N m", quantity=1, source="assembly.md", note="price unknown")
     yield BomItem("tool", "multimeter", quantity=1, source="wiring.md", note="price unknown")
-    if any("retaining ring" in part for part, _ in drive.needs):
-        note = "reads 0.01 mm; price unknown"
-        yield BomItem("tool", "dial indicator on a stand", quantity=1, source="assembly.md", note=note)
-    if any(part.startswith(("cable tie", "a soft tube")) for part, _ in drive.needs):
-        note = "for the leads; price unknown"
-        yield BomItem("tool", "crimping pliers", quantity=1, source="assembly.md", note=note)
+    yield from (_row(row) for row in rows if row.kind == "tool")
     if any(joint.inserts for joint in joints):
         yield BomItem("tool", "soldering iron", quantity=1, source="assembly.md", note="for the inserts; price unknown")
+
+
+def _row(row: Row) -> BomItem:
+    note = "; ".join(filter(None, (row.note, "price unknown")))
+    return BomItem(row.kind, row.part, quantity=1, source=row.source, note=note)
 
 
 def _ranged(item: BomItem) -> BomItem:

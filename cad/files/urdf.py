@@ -32,11 +32,12 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         meshes: names of the parts whose STL files belong to the links servo and rot.
     """
     angles = scanner.angles
+    shapes = [_fixed_shape(station.shape) for station in drive.stations if station.shape is not None]
     lines = [
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
         '  <link name="world"/>',
-        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *map(_standing_shape, drive.shapes)]),
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *shapes]),
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
@@ -96,7 +97,7 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _standing_shape(shape: Cuboid | Rod) -> tuple[str, str]:
+def _fixed_shape(shape: Cuboid | Rod) -> tuple[str, str]:
     if isinstance(shape, Rod):
         return _origin((0.0, 0.0, (shape.low + shape.high) / 2000)), _cylinder(shape.radius, shape.high - shape.low)
     low, high = np.array(shape.low), np.array(shape.high)

@@ -10,19 +10,22 @@ from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg
 from scanwright.cad.layout.names import BEARING, BELT
+from scanwright.cad.layout.placement import Placement
 from scanwright.design.scanner import Scanner
 
 
-def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weight, torque: float) -> list[Check]:
-    """What bearings, belt and horn carry, and how far the belt turns the axis away from the servo.
+def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float) -> list[Check]:
+    """What bearings, belt and horn carry, and how far the belt turns the axis away from the servo; none without one.
 
     Args:
-        scanner: angles and products.
-        stack: its layout.
+        layout: of the scanner.
         rotor: all that turns.
         weight: of it.
         torque: the largest of the servo's work [N m].
     """
+    scanner, stack = layout.scanner, layout.drive.of(BeltStack)
+    if stack is None:
+        return []
     pull = belt_pull(stack, torque)
     upper, lower = carrier_forces(stack, weight, 1000 * float(rotor.centre_m[2]), pull.shaft_n)
     name, limit = stack.carrier.name, stack.carrier.static_load_n
